@@ -1,0 +1,54 @@
+/// Rigid transforms, alone and with a covariance.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "estimator/core/so3.hpp"
+
+namespace crepes {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+/// T_A_B: the pose of frame B in frame A; maps coordinates,  p_A = T_A_B * p_B.
+struct Pose {
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();            ///< origin of B in A [m]
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  ///< attitude of B in A (Hamilton)
+
+  [[nodiscard]] Eigen::Matrix3d R() const { return q.toRotationMatrix(); }
+
+  [[nodiscard]] Pose inverse() const {
+    const Eigen::Quaterniond q_inv = q.conjugate();
+    return {-(q_inv * p), q_inv};
+  }
+};
+
+[[nodiscard]] inline Eigen::Vector3d operator*(const Pose& T_A_B, const Eigen::Vector3d& p_B) {
+  return T_A_B.q * p_B + T_A_B.p;
+}
+
+[[nodiscard]] inline Pose operator*(const Pose& T_A_B, const Pose& T_B_C) {
+  return {T_A_B * T_B_C.p, (T_A_B.q * T_B_C.q).normalized()};
+}
+
+/// Pose with uncertainty. Error order [p, theta]:  p_true = p + dp  in A's axes,
+/// R_true = R Exp(dtheta)  in B's axes.
+struct GaussianPose {
+  Pose pose;
+  Matrix6d covariance = Matrix6d::Zero();
+};
+
+/// The perturbation d that takes `from` to `to`, in GaussianPose's error convention.
+[[nodiscard]] inline Vector6d pose_difference(const Pose& from, const Pose& to) {
+  Vector6d d;
+  d << to.p - from.p, so3_log(from.q.conjugate() * to.q);
+  return d;
+}
+
+/// `pose` moved by `d`, in GaussianPose's error convention.
+[[nodiscard]] inline Pose perturbed(const Pose& pose, const Vector6d& d) {
+  return {pose.p + d.head<3>(), (pose.q * so3_exp(d.tail<3>())).normalized()};
+}
+
+}  // namespace crepes

@@ -1,0 +1,81 @@
+#include "estimator/core/so3.hpp"
+
+#include <cmath>
+
+namespace crepes {
+namespace {
+
+// Below this angle the series to fourth order is exact to double precision.
+constexpr double kSmallAngle = 1e-3;
+
+}  // namespace
+
+Eigen::Matrix3d hat(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
+Eigen::Quaterniond so3_exp(const Eigen::Vector3d& theta) {
+  const double angle2 = theta.squaredNorm();
+  const double angle = std::sqrt(angle2);
+  const double half_sinc =
+      angle < kSmallAngle ? 0.5 - angle2 / 48.0 : std::sin(0.5 * angle) / angle;
+  const double w = std::cos(0.5 * angle);
+  const Eigen::Vector3d v = half_sinc * theta;
+  return Eigen::Quaterniond(w, v.x(), v.y(), v.z());
+}
+
+Eigen::Vector3d so3_log(const Eigen::Quaterniond& q) {
+  const double sign = q.w() < 0.0 ? -1.0 : 1.0;  // q and -q are one rotation: take the short way
+  const Eigen::Vector3d v = sign * q.vec();
+  const double sine = v.norm();
+  const double cosine = sign * q.w();
+  if (sine < kSmallAngle) {
+    // angle / sin(angle/2) = 2 (1 + s^2/6 + ...) with s = sin(angle/2)
+    return (2.0 + sine * sine / 3.0) * v;
+  }
+  return 2.0 * std::atan2(sine, cosine) / sine * v;
+}
+
+Eigen::Matrix3d so3_right_jacobian(const Eigen::Vector3d& theta) {
+  const double angle2 = theta.squaredNorm();
+  const double angle = std::sqrt(angle2);
+  const Eigen::Matrix3d W = hat(theta);
+  // J_r = I - (1 - cos a)/a^2 W + (a - sin a)/a^3 W^2
+  const bool small = angle < kSmallAngle;
+  const double a = small ? 0.5 - angle2 / 24.0 : (1.0 - std::cos(angle)) / angle2;
+  const double b =
+      small ? 1.0 / 6.0 - angle2 / 120.0 : (angle - std::sin(angle)) / (angle2 * angle);
+  return Eigen::Matrix3d::Identity() - a * W + b * W * W;
+}
+
+Eigen::Matrix3d so3_right_jacobian_inverse(const Eigen::Vector3d& theta) {
+  const double angle2 = theta.squaredNorm();
+  const double angle = std::sqrt(angle2);
+  const Eigen::Matrix3d W = hat(theta);
+  // J_r^-1 = I + W/2 + (1/a^2 - (1 + cos a)/(2 a sin a)) W^2, the last factor written with the
+  // half angle so that it stays finite at pi.
+  const double half = 0.5 * angle;
+  const double c = angle < kSmallAngle ? 1.0 / 12.0 + angle2 / 720.0
+                                       : (1.0 - half * std::cos(half) / std::sin(half)) / angle2;
+  return Eigen::Matrix3d::Identity() + 0.5 * W + c * W * W;
+}
+
+double yaw_of(const Eigen::Quaterniond& q) {
+  return std::atan2(2.0 * (q.w() * q.z() + q.x() * q.y()),
+                    1.0 - 2.0 * (q.y() * q.y() + q.z() * q.z()));
+}
+
+Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& u) {
+  const double sign = std::copysign(1.0, u.z());
+  const double a = -1.0 / (sign + u.z());
+  const double b = u.x() * u.y() * a;
+  Eigen::Matrix<double, 3, 2> basis;
+  basis << 1.0 + sign * u.x() * u.x() * a, b,  //
+      sign * b, sign + u.y() * u.y() * a,      //
+      -sign * u.x(), -u.y();
+  return basis;
+}
+
+}  // namespace crepes

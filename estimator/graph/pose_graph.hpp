@@ -1,0 +1,17 @@
+/// The pose graph over the team (paper III-E): one node a robot, one edge a measured relative pose.
+#pragma once
+
+#include "estimator/core/config.hpp"
+#include "estimator/core/measurements.hpp"
+
+namespace crepes {
+
+/// Solves for the poses of all robots that edges connect to `problem.self`, in self's body frame.
+///
+/// Two edges over one pair of robots rest on the same measurements, so each pair carries the weight
+/// of one. Covariances are the marginals of the solution. Deterministic; bounded by
+/// `config.max_iterations`.
+[[nodiscard]] GraphSolution solve_pose_graph(const GraphProblem& problem,
+                                             const GraphConfig& config);
+
+}  // namespace crepes
