@@ -1,0 +1,90 @@
+#include "daemon/ctl/csv_file.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "estimator/core/contract.hpp"
+
+namespace crepes {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
+    text.remove_suffix(1);
+  return text;
+}
+
+}  // namespace
+
+Result<std::string> read_text_file(const std::filesystem::path& file) {
+  std::error_code status;
+  if (!std::filesystem::exists(file, status))
+    return fail(ErrorCode::kNotFound, file.string() + ": no such file");
+  if (!std::filesystem::is_regular_file(file, status))
+    return fail(ErrorCode::kIo, file.string() + ": not a file");
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return fail(ErrorCode::kIo, file.string() + ": " + std::strerror(errno));
+  std::string text(std::filesystem::file_size(file, status), '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (in.bad()) return fail(ErrorCode::kIo, file.string() + ": cannot be read");
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+Result<CsvFile> CsvFile::open(const std::filesystem::path& file, std::size_t columns,
+                              DatasetFaults& faults, Header header) {
+  CREPES_EXPECT(columns > 0 && columns <= kMaxColumns, "more columns than a row holds");
+  Result<std::string> text = read_text_file(file);
+  if (!text) return tl::unexpected(text.error());
+  CsvFile csv(file, std::move(*text), columns);
+  if (header == Header::kHash && !csv.text_.starts_with('#')) {
+    faults.add(file, 1, "no header that begins with '#'");
+    return csv;
+  }
+  const std::size_t end = csv.text_.find('\n');
+  csv.position_ = end == std::string::npos ? csv.text_.size() : end + 1;
+  csv.line_ = 1;
+  return csv;
+}
+
+bool CsvFile::next(DatasetFaults& faults) {
+  while (position_ < text_.size()) {
+    ++line_;
+    const std::size_t end = text_.find('\n', position_);
+    if (end == std::string::npos) {
+      position_ = text_.size();
+      faults.add(path_, line_, "cut-off last line");
+      return false;
+    }
+    const std::string_view row(text_.data() + position_, end - position_);
+    position_ = end + 1;
+    const std::size_t found = split(row);
+    if (found == columns_) return true;
+    faults.add(path_, line_, "wrong number of columns",
+               std::to_string(found) + " instead of " + std::to_string(columns_));
+  }
+  return false;
+}
+
+std::size_t CsvFile::split(std::string_view row) {
+  std::size_t count = 0;
+  for (;;) {
+    const std::size_t comma = row.find(',');
+    if (count < fields_.size()) fields_.at(count) = trimmed(row.substr(0, comma));
+    ++count;
+    if (comma == std::string_view::npos) return count;
+    row.remove_prefix(comma + 1);
+  }
+}
+
+void CsvFile::refuse(std::string_view wrong, std::size_t column, DatasetFaults& faults) const {
+  constexpr std::size_t kShown = 40;  // enough to recognise a field, too little to flood a log
+  faults.add(path_, line_, wrong,
+             "column " + std::to_string(column + 1) + " is '" +
+                 std::string(field(column).substr(0, kShown)) + "'");
+}
+
+}  // namespace crepes

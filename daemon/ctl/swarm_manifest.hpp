@@ -1,0 +1,42 @@
+/// swarm.yaml: who took part in a recording, and how it was made.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "daemon/ctl/robot_clock.hpp"
+#include "estimator/core/measurements.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+/// A packet takes latency + U(0, jitter) to each receiver and is lost with probability `loss`.
+struct NetworkModel {
+  double latency_ms = 0.0;
+  double jitter_ms = 0.0;
+  double loss = 0.0;
+  std::uint64_t seed = 0;
+};
+
+/// A robot as swarm.yaml lists it.
+struct SwarmRobot {
+  RobotId id{};
+  std::string name;
+  std::filesystem::path dir;  ///< relative to the data set
+  RobotClock clock;
+};
+
+/// swarm.yaml.
+struct SwarmManifest {
+  std::string scenario;
+  double duration_s = 0.0;
+  NetworkModel network;
+  std::vector<SwarmRobot> robots;
+};
+
+/// Reads and checks DIR/swarm.yaml; an error names file, line and key.
+[[nodiscard]] Result<SwarmManifest> load_manifest(const std::filesystem::path& dir);
+
+}  // namespace crepes
