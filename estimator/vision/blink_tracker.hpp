@@ -1,0 +1,94 @@
+/// Spots of successive frames of one camera to bearings of identified robots.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "estimator/core/config.hpp"
+#include "estimator/core/measurements.hpp"
+#include "estimator/vision/camera_model.hpp"
+#include "estimator/vision/gyro_history.hpp"
+#include "estimator/vision/id_decoder.hpp"
+#include "estimator/vision/id_library.hpp"
+
+namespace crepes {
+
+/// What a tracker is doing, for STATUS.
+struct TrackerStatus {
+  std::size_t tracks = 0;
+  std::size_t identified = 0;
+  std::uint64_t refused_frames = 0;          ///< stamp not after the one before
+  std::uint64_t refused_spots = 0;           ///< not finite, outside the image circle, too many
+  std::uint64_t refused_imu = 0;             ///< not finite, stamp not after the one before
+  std::uint64_t merged_spots = 0;            ///< two boards in one spot: no bearing
+  std::map<RobotId, std::uint64_t> decodes;  ///< tracks that were given this ID
+  std::uint64_t lost_ids = 0;                ///< tracks that stopped blinking as their ID should
+};
+
+/// Follows spots as directions in the body frame, turned by the gyro between frames, and reads
+/// what they blink. The same ID seen twice gives two bearings: which is the mirror image is for
+/// the estimator to decide.
+class BlinkTracker {
+ public:
+  BlinkTracker(const CameraConfig& camera, const CameraModel& model, const VisionConfig& config,
+               const IdLibrary& library);
+
+  void add_imu(const ImuSample& sample);
+  /// The identified robots that are lit in `frame`, ordered by ID; stamps are body time.
+  [[nodiscard]] std::vector<Bearing> step(const SpotFrame& frame);
+  [[nodiscard]] TrackerStatus status() const;
+
+ private:
+  /// A spot as a direction.
+  struct Sighting {
+    Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
+    double radius_rad = 0.0;  ///< of the blob
+    double px_rad = 0.0;      ///< what a pixel subtends here
+  };
+  struct Track {
+    Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
+    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();  ///< du/dt that own rotation leaves [1/s]
+    double variance = 0.0;                             ///< of the direction, per axis [rad^2]
+    double covariance = 0.0;
+    double rate_variance = 0.0;
+    Sighting seen;  ///< the latest
+    Timestamp last_seen{};
+    int hits = 0;
+    BlinkEvidence evidence;
+  };
+  struct Pairing {
+    std::size_t track = 0;
+    std::size_t sighting = 0;
+    double cost = 0.0;
+  };
+
+  [[nodiscard]] std::vector<Sighting> look(const SpotFrame& frame);
+  void predict(Timestamp stamp);
+  [[nodiscard]] double gate_of(const Track& track) const;
+  [[nodiscard]] std::vector<Pairing> assign(const std::vector<Sighting>& sightings,
+                                            Timestamp stamp) const;
+  [[nodiscard]] bool is_established(const Track& track, Timestamp stamp) const;
+  [[nodiscard]] bool hides_another(std::size_t track, const Sighting& sighting,
+                                   const std::vector<bool>& is_paired, Timestamp stamp) const;
+  void observe(Track& track, const Sighting& sighting, Timestamp stamp);
+  void observe_absence(Track& track, Timestamp stamp) const;
+  void retire(Timestamp stamp);
+
+  VisionConfig config_;
+  CameraModel model_;
+  Pose T_B_C_;
+  Pose T_C_B_;
+  Duration timeshift_{};
+  Duration timeout_{};
+  IdDecoder decoder_;
+  GyroHistory gyro_;
+  std::vector<Track> tracks_;
+  std::optional<Timestamp> now_;
+  TrackerStatus counts_;
+};
+
+}  // namespace crepes
