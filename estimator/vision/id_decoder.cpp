@@ -10,8 +10,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Duration kPhaseStep = 1250us;
-constexpr Duration kEdgeBlur = 400us;  // exposure and switching
+constexpr Duration kPhaseStep = 625us;
+constexpr Duration kEdgeBlur = 200us;  // exposure and switching
 constexpr Duration kDarkSlack = 12ms;  // the frames at both edges of a dark stretch
 constexpr Duration kMinCheck = 150ms;
 constexpr std::size_t kMaxPhases = 320;
@@ -22,6 +22,8 @@ constexpr double kMaxFlipRate = 0.3;
 // Neighboring frames share their faults, so each counts less than an independent one would.
 constexpr double kTemper = 0.75;
 constexpr double kUnitsPerNat = 32.0;
+constexpr double kClutterOdds = 10.0;  // sources that are no boards, for each that is one
+constexpr double kLostPosterior = 0.01;
 
 // A board that matches may err in so many frames of a check; at twice as many the ID is lost.
 double tolerated(double frames) { return 1.0 + 0.06 * frames; }
@@ -186,38 +188,36 @@ IdDecoder::Best IdDecoder::best_of(const BlinkEvidence& evidence) const {
     total += std::exp(log_likelihood - best_log);
     return false;
   };
-  bool is_board = false;
   for (std::size_t c = 0; c < codes_.size(); ++c) {
     const std::span<const std::int16_t> scores =
         std::span(evidence.score).subspan(codes_[c].first_score, codes_[c].phases);
     const std::int16_t top = highest(scores);
-    // About four steps of phase look alike to a camera; the others are as likely beforehand.
-    const double prior = 4.0 / static_cast<double>(codes_[c].phases * codes_.size());
+    // About eight steps of phase look alike to a camera; the others are as likely beforehand.
+    const double prior = 8.0 / static_cast<double>(codes_[c].phases * codes_.size());
     if (include(top / kUnitsPerNat + std::log(prior))) {
-      is_board = true;
       // The middle of the phases that fit equally well.
       const auto first = std::find(scores.begin(), scores.end(), top);
       const auto last = std::find_if(first, scores.end(), [top](auto s) { return s != top; });
       best.match = {c, static_cast<std::size_t>((first - scores.begin()) + (last - first) / 2)};
     }
   }
-  if (include(kTemper * log_markov(evidence))) is_board = false;
-  best.posterior = is_board ? 1.0 / total : 0.0;
+  const double board_log = best_log;
+  include(kTemper * log_markov(evidence) + std::log(kClutterOdds));
+  best.posterior = std::exp(board_log - best_log) / total;
   return best;
 }
 
 void IdDecoder::judge(BlinkEvidence& evidence, Timestamp now) const {
   const Best best = best_of(evidence);
-  const auto& assigned = evidence.assigned;
-  if (assigned && best.posterior >= min_confidence_ && best.match.code != assigned->code) {
-    evidence.assigned.reset();
-  } else if (best.posterior >= min_confidence_ || (assigned && best.match.code == assigned->code)) {
-    if (!assigned && now - evidence.window.front().stamp < codes_[best.match.code].check_span)
+  const bool is_sure = best.posterior >= min_confidence_;
+  if (!evidence.assigned) {
+    if (!is_sure || now - evidence.window.front().stamp < codes_[best.match.code].check_span)
       return;
     evidence.assigned = best.match;
-    evidence.confidence = best.posterior;
   }
-  if (!evidence.assigned) return;
+  const bool is_same = best.match.code == evidence.assigned->code;
+  if (is_same) evidence.assigned = best.match;  // its clock drifts
+  evidence.confidence = is_same ? best.posterior : 1.0 - best.posterior;
 
   const Code& code = codes_[evidence.assigned->code];
   double frames = 0.0;
@@ -228,12 +228,12 @@ void IdDecoder::judge(BlinkEvidence& evidence, Timestamp now) const {
     frames += 1.0;
     if ((it->lit ? lit : 1.0 - lit) < 0.25) mismatches += 1.0;
   }
-  evidence.is_doubted = mismatches > tolerated(frames) || now - evidence.resumed < code.check_span;
-  if (mismatches > 2.0 * tolerated(frames)) {
-    const Timestamp resumed = now;
+  evidence.is_doubted = mismatches > tolerated(frames) || evidence.confidence < 0.5 ||
+                        now - evidence.resumed < code.check_span;
+  if (mismatches > 2.0 * tolerated(frames) || evidence.confidence < kLostPosterior) {
     evidence = BlinkEvidence{};
     evidence.last_lit = now;
-    evidence.resumed = resumed;
+    evidence.resumed = now;
   }
 }
 

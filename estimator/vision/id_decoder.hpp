@@ -37,7 +37,7 @@ struct BlinkEvidence {
 
 /// Maximum-likelihood decoding of cyclic codes over their unknown phase, one frame at a time.
 ///
-/// Every code in every phase (steps of about 1.25 ms) keeps the log likelihood of a sliding window.
+/// Every code in every phase (steps of about 0.6 ms) keeps the log likelihood of a sliding window.
 /// It competes with the other codes and with a source that is no board: a two-state Markov chain
 /// of unknown rates, which covers steady, flickering and alternating lamps. The winner is given
 /// when its posterior is high and at least one whole period was seen; it is checked against the
