@@ -44,10 +44,14 @@ Result<CsvFile> CsvFile::open(const std::filesystem::path& file, std::size_t col
     faults.add(file, 1, "no header that begins with '#'");
     return csv;
   }
-  const std::size_t end = csv.text_.find('\n');
-  csv.position_ = end == std::string::npos ? csv.text_.size() : end + 1;
+  csv.header_size_ = std::min(csv.text_.find('\n'), csv.text_.size());
+  csv.position_ = std::min(csv.header_size_ + 1, csv.text_.size());
   csv.line_ = 1;
   return csv;
+}
+
+std::string_view CsvFile::header() const {
+  return trimmed(std::string_view(text_).substr(0, header_size_));
 }
 
 bool CsvFile::next(DatasetFaults& faults) {

@@ -49,6 +49,8 @@ class CsvFile {
   /// Goes to the next row with the right number of columns; false at the end.
   [[nodiscard]] bool next(DatasetFaults& faults);
 
+  /// The first line, unless it was taken for a row.
+  [[nodiscard]] std::string_view header() const;
   [[nodiscard]] std::size_t line() const { return line_; }
   [[nodiscard]] std::string_view field(std::size_t column) const { return fields_.at(column); }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
@@ -72,6 +74,7 @@ class CsvFile {
   std::filesystem::path path_;
   std::string text_;
   std::size_t columns_;
+  std::size_t header_size_ = 0;
   std::size_t position_ = 0;
   std::size_t line_ = 0;
   std::array<std::string_view, kMaxColumns> fields_{};

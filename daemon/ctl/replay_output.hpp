@@ -1,0 +1,90 @@
+/// What a replay leaves behind: a file of poses for every ordered pair, and a report.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/ctl/dataset_faults.hpp"
+#include "estimator/core/outputs.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+/// What `observer` believed of a peer's clock at some instant of its own.
+struct ClockSample {
+  RobotId observer{};
+  Timestamp stamp{};
+  ClockStatus clock;
+};
+
+/// One robot's end of the replay.
+struct RobotReport {
+  RobotId robot{};
+  EstimatorStatus status;
+  /// Bearings by neighbor that truth says were another's; left out where there is no truth.
+  std::optional<std::map<RobotId, std::uint64_t>> id_mistakes;
+  std::uint64_t datagrams_sent = 0;
+  std::uint64_t bytes_sent = 0;
+  std::vector<std::pair<std::string, std::uint64_t>> network;  ///< received and refused, by reason
+  std::vector<std::pair<std::string, double>> cpu_s;           ///< by stage
+};
+
+struct ReplayReport {
+  std::string scenario;
+  std::string profile;
+  bool graph = true;
+  std::uint64_t seed = 0;
+  double duration_s = 0.0;
+  std::vector<RobotReport> robots;
+  std::vector<ClockSample> clocks;  ///< about one a second and pair
+  DatasetFaults faults;
+};
+
+/// Writes DIR/<observer>/<neighbor>.csv and .tum as poses come, and DIR/report.json at the end.
+/// Everything has its proper name only after `finish`; before, files end in ".part" and results of
+/// an earlier replay are gone.
+class ReplayOutput {
+ public:
+  /// One robot: what its directory is called.
+  using Names = std::map<RobotId, std::string>;
+
+  [[nodiscard]] static Result<ReplayOutput> create(const std::filesystem::path& dir, Names names);
+
+  /// `pose.neighbor` must be among the names. Failures of the disk are told by `finish`.
+  void write(RobotId observer, const NeighborPose& pose);
+
+  [[nodiscard]] Result<void> finish(const ReplayReport& report);
+
+ private:
+  struct PairFile {
+    std::filesystem::path csv;
+    std::filesystem::path tum;
+    std::string csv_text;
+    std::string tum_text;
+  };
+
+  ReplayOutput(std::filesystem::path dir, Names names)
+      : dir_(std::move(dir)), names_(std::move(names)) {}
+
+  void flush(PairFile& file);
+
+  std::filesystem::path dir_;
+  Names names_;
+  std::map<std::pair<RobotId, RobotId>, PairFile> pairs_;
+  std::optional<Error> failure_;
+};
+
+/// report.json's text.
+[[nodiscard]] std::string report_json(const ReplayReport& report, const ReplayOutput::Names& names);
+
+/// The clock samples of a report.json, with robots by name as in `names`. Robots that are not in
+/// `names` are an error.
+[[nodiscard]] Result<std::vector<ClockSample>> read_clock_samples(const std::filesystem::path& file,
+                                                                  const ReplayOutput::Names& names);
+
+}  // namespace crepes
