@@ -1,0 +1,146 @@
+#include "estimator/graph/pose_graph.hpp"
+
+#include <ceres/autodiff_cost_function.h>
+#include <ceres/autodiff_manifold.h>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "estimator/graph/relative_pose_factor.hpp"
+#include "estimator/graph/spanning_tree.hpp"
+#include "estimator/graph/team_velocity.hpp"
+
+namespace crepes {
+namespace {
+
+// The paper's cost has no sigmas: an entry off by this much counts as one.
+constexpr double kFrobeniusSigma = 0.1;
+
+using Parameters = std::array<double, kPoseParameters>;
+using Nodes = std::map<RobotId, Parameters>;
+
+Parameters to_parameters(const Pose& pose) {
+  return {pose.p.x(), pose.p.y(), pose.p.z(), pose.q.x(), pose.q.y(), pose.q.z(), pose.q.w()};
+}
+
+Pose to_pose(const Parameters& x) {
+  return {{x[0], x[1], x[2]}, Eigen::Quaterniond(x[6], x[3], x[4], x[5]).normalized()};
+}
+
+// The edge with the covariance that makes all edges over one pair weigh as one, as L of L^T L =
+// covariance^-1. Empty where the covariance is not positive definite.
+std::optional<Matrix6d> weight(const RelativePoseEdge& edge,
+                               const std::vector<RelativePoseEdge>& edges) {
+  const auto same_pair = [&](const RelativePoseEdge& other) {
+    return (other.from == edge.from && other.to == edge.to) ||
+           (other.from == edge.to && other.to == edge.from);
+  };
+  const auto count = static_cast<double>(std::count_if(edges.begin(), edges.end(), same_pair));
+  const Eigen::LLT<Matrix6d> chol(count * edge.T_from_to.covariance);
+  if (chol.info() != Eigen::Success) return std::nullopt;
+  return chol.matrixL().solve(Matrix6d::Identity());
+}
+
+void add_factor(const RelativePoseEdge& edge, const Matrix6d& L, const GraphConfig& config,
+                Nodes& nodes, ceres::Problem& problem) {
+  double* X_i = nodes.at(edge.from).data();
+  double* X_j = nodes.at(edge.to).data();
+  if (config.cost == GraphCost::kPaper) {
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<FrobeniusFactor, 12, kPoseParameters, kPoseParameters>(
+            new FrobeniusFactor{edge.T_from_to.pose}),
+        new ceres::CauchyLoss(kFrobeniusSigma * config.kernel_scale), X_i, X_j);
+    return;
+  }
+  problem.AddResidualBlock(
+      new ceres::AutoDiffCostFunction<LieFactor, 6, kPoseParameters, kPoseParameters>(
+          new LieFactor{edge.T_from_to.pose, L}),
+      new ceres::CauchyLoss(config.kernel_scale), X_i, X_j);
+}
+
+// A graph over `nodes`, with self held fast.
+std::unique_ptr<ceres::Problem> build(const GraphProblem& input, const GraphConfig& config,
+                                      Nodes& nodes) {
+  auto problem = std::make_unique<ceres::Problem>();
+  for (auto& [robot, x] : nodes) {
+    problem->AddParameterBlock(
+        x.data(), kPoseParameters,
+        new ceres::AutoDiffManifold<RightPerturbation, kPoseParameters, 6>());
+  }
+  problem->SetParameterBlockConstant(nodes.at(input.self).data());
+  for (const RelativePoseEdge& edge : input.edges) {
+    if (!nodes.contains(edge.from) || !nodes.contains(edge.to) || edge.from == edge.to) continue;
+    if (const auto L = weight(edge, input.edges)) add_factor(edge, *L, config, nodes, *problem);
+  }
+  return problem;
+}
+
+// The inverse of J^T J of the covariance-weighted residuals at the solution, self left out.
+Eigen::MatrixXd marginals(const GraphProblem& input, GraphConfig config, Nodes nodes) {
+  config.cost = GraphCost::kLie;
+  const auto problem = build(input, config, nodes);
+  ceres::Problem::EvaluateOptions options;
+  for (auto& [robot, x] : nodes) {
+    if (robot != input.self) options.parameter_blocks.push_back(x.data());
+  }
+  ceres::CRSMatrix jacobian;
+  problem->Evaluate(options, nullptr, nullptr, nullptr, &jacobian);
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(jacobian.num_rows, jacobian.num_cols);
+  for (std::size_t row = 0; row + 1 < jacobian.rows.size(); ++row) {
+    for (auto k = jacobian.rows[row]; k < jacobian.rows[row + 1]; ++k) {
+      const auto entry = static_cast<std::size_t>(k);
+      J(static_cast<Eigen::Index>(row), jacobian.cols[entry]) = jacobian.values[entry];
+    }
+  }
+  const Eigen::MatrixXd information = J.transpose() * J;
+  return information.ldlt().solve(
+      Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+}
+
+}  // namespace
+
+GraphSolution solve_pose_graph(const GraphProblem& problem, const GraphConfig& config) {
+  GraphSolution solution{.stamp = problem.stamp, .poses = {}};
+  Nodes nodes;
+  for (const auto& [robot, pose] : spanning_tree_poses(problem.self, problem.edges)) {
+    nodes.emplace(robot, to_parameters(pose));
+  }
+  if (nodes.size() < 2) return solution;
+
+  ceres::Solver::Options options;
+  options.max_num_iterations = config.max_iterations;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  options.max_solver_time_in_seconds = 1e9;  // bounded by iterations: a clock would not replay
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, build(problem, config, nodes).get(), &summary);
+  if (!summary.IsSolutionUsable()) return solution;
+
+  const Eigen::MatrixXd covariance = marginals(problem, config, nodes);
+  std::map<RobotId, Pose> poses;
+  for (const auto& [robot, x] : nodes) poses.emplace(robot, to_pose(x));
+  const auto velocities = team_velocities(problem.self, poses, problem.edges);
+
+  Eigen::Index block = 0;
+  for (const auto& [robot, pose] : poses) {
+    if (robot == problem.self) continue;
+    const Matrix6d P = covariance.block<6, 6>(block, block);
+    block += 6;
+    if (!P.allFinite()) continue;  // hangs on an edge without a covariance
+    solution.poses.push_back({robot, {pose, 0.5 * (P + P.transpose())}, velocities.at(robot)});
+  }
+  solution.cost = summary.final_cost;
+  solution.iterations = static_cast<int>(summary.iterations.size());
+  return solution;
+}
+
+}  // namespace crepes

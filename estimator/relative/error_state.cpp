@@ -1,0 +1,20 @@
+#include "estimator/relative/error_state.hpp"
+
+namespace crepes {
+
+void inject(const ErrorState::Vector& dx, NominalState& state) {
+  using E = ErrorState;
+  Pose& T_B_N = state.motion.T_B_N;
+  T_B_N.p += dx.segment<3>(E::kP);
+  T_B_N.q = (T_B_N.q * so3_exp(dx.segment<3>(E::kTheta))).normalized();
+  state.motion.v_B_N += dx.segment<3>(E::kV);
+  state.bias_B.gyro_radps += dx.segment<3>(E::kGyroB);
+  state.bias_B.accel_mps2 += dx.segment<3>(E::kAccelB);
+  state.bias_N.gyro_radps += dx.segment<3>(E::kGyroN);
+  state.bias_N.accel_mps2 += dx.segment<3>(E::kAccelN);
+  state.range_bias_m += dx(E::kRangeBias);
+  state.misalignment_B += dx.segment<3>(E::kMisalignB);
+  state.misalignment_N += dx.segment<3>(E::kMisalignN);
+}
+
+}  // namespace crepes

@@ -1,0 +1,56 @@
+/// The state of one neighbor's filter and the layout of its error.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "estimator/core/pose.hpp"
+#include "estimator/core/time.hpp"
+
+namespace crepes {
+
+/// Relative motion of N seen by B. Gravity has no place in it: it pulls both alike.
+struct RelativeMotion {
+  Pose T_B_N;
+  Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
+};
+
+struct ImuBias {
+  Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
+};
+
+/// Everything that the tight filter estimates.
+struct NominalState {
+  RelativeMotion motion;
+  ImuBias bias_B;
+  ImuBias bias_N;
+  double range_bias_m = 0.0;
+  /// Rotation vectors that take a direction in calibrated body axes to the one the camera reports.
+  Eigen::Vector3d misalignment_B = Eigen::Vector3d::Zero();
+  Eigen::Vector3d misalignment_N = Eigen::Vector3d::Zero();
+};
+
+/// Layout of the error state. Position and velocity are additive in B's axes, attitude is a right
+/// perturbation (N's axes), the rest is additive.
+struct ErrorState {
+  enum Index : int {
+    kP = 0,
+    kV = 3,
+    kTheta = 6,
+    kGyroB = 9,
+    kAccelB = 12,
+    kGyroN = 15,
+    kAccelN = 18,
+    kRangeBias = 21,
+    kMisalignB = 22,
+    kMisalignN = 25,
+    kSize = 28,
+  };
+  using Vector = Eigen::Matrix<double, kSize, 1>;
+  using Covariance = Eigen::Matrix<double, kSize, kSize>;
+};
+
+/// x <- x (+) dx
+void inject(const ErrorState::Vector& dx, NominalState& state);
+
+}  // namespace crepes

@@ -1,0 +1,54 @@
+/// The recent IMU samples of one robot, as continuous signals.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include "estimator/core/measurements.hpp"
+
+namespace crepes {
+
+/// Mean rate and specific force over an interval, body axes.
+struct ImuMean {
+  Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
+  double guessed = 0.0;  ///< share of the interval, 0..1, that no sample covers
+};
+
+/// Bounded: keeps the newest `kCapacity` samples in order of their stamps. Between samples the
+/// signal is linear; outside and across gaps longer than `kMaxGap` it is held and called guessed.
+class ImuHistory {
+ public:
+  static constexpr std::size_t kCapacity = 256;
+  static constexpr Duration kMaxGap = std::chrono::milliseconds{50};
+
+  /// False, and nothing changes: not finite, a stamp already there, or older than everything kept.
+  bool push(const ImuSample& sample);
+
+  [[nodiscard]] bool empty() const { return size_ == 0; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  /// Counted from the oldest.
+  [[nodiscard]] const ImuSample& operator[](std::size_t i) const {
+    return samples_[(first_ + i) % kCapacity];
+  }
+  [[nodiscard]] const ImuSample& newest() const { return (*this)[size_ - 1]; }
+
+  /// Mean over [from, to], from < to; there must be a sample.
+  [[nodiscard]] ImuMean mean(Timestamp from, Timestamp to) const;
+
+  /// The body's rotation R_from_to between two instants, in either order, by the gyroscope alone.
+  [[nodiscard]] Eigen::Quaterniond rotation(Timestamp from, Timestamp to) const;
+
+ private:
+  ImuSample& slot(std::size_t i) { return samples_[(first_ + i) % kCapacity]; }
+  [[nodiscard]] std::size_t first_after(Timestamp t) const;
+
+  std::array<ImuSample, kCapacity> samples_{};
+  std::size_t first_ = 0;
+  std::size_t size_ = 0;
+};
+
+}  // namespace crepes

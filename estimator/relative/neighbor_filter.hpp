@@ -1,0 +1,73 @@
+/// The tight filter of one neighbor: every measurement by itself, at its own time.
+#pragma once
+
+#include "estimator/core/outputs.hpp"
+#include "estimator/relative/error_state.hpp"
+#include "estimator/relative/imu_history.hpp"
+#include "estimator/relative/kalman_update.hpp"
+#include "estimator/relative/propagation.hpp"
+#include "estimator/relative/raw_pose.hpp"
+
+namespace crepes {
+
+/// What is believed of sensors before they speak, one sigma.
+struct Priors {
+  double speed_mps = 2.0;
+  double gyro_bias_radps = 0.0;
+  double accel_bias_mps2 = 0.0;
+  double range_bias_m = 0.0;
+  double misalignment_rad = 0.0;
+};
+
+/// A camera's word on where a ring is, in the seeing robot's body.
+struct DirectionReading {
+  Eigen::Vector3d u = Eigen::Vector3d::UnitX();
+  Eigen::Vector3d camera = Eigen::Vector3d::Zero();
+  double sigma_rad = 0.0;
+};
+
+struct RangeReading {
+  double range_m = 0.0;
+  double sigma_m = 0.0;
+};
+
+/// ErrorState::kSize error states: relative motion, both IMUs' biases, the pair's range bias and
+/// both cameras' misalignment. Moves forward only; corrections apply at `stamp()`.
+class NeighborFilter {
+ public:
+  /// `first` as a raw pose gives it, neighbor's speed unknown.
+  NeighborFilter(Timestamp stamp, const GaussianPose& first, const ProcessNoise& noise,
+                 const Priors& priors);
+  /// From the pose graph: the speed is known as well as that of the robots between.
+  NeighborFilter(Timestamp stamp, const GraphPose& first, const ProcessNoise& noise,
+                 const Priors& priors);
+
+  [[nodiscard]] Timestamp stamp() const { return stamp_; }
+  void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
+
+  /// Our camera on the neighbor's ring.
+  Verdict fuse_bearing(const DirectionReading& z, const Eigen::Vector3d& p_N_M, double gate_nis);
+  /// The neighbor's camera on our ring.
+  Verdict fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,
+                            double gate_nis);
+  Verdict fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
+                     const Eigen::Vector3d& p_N_Q, double gate_nis);
+  Verdict fuse_pose(const GaussianPose& T_B_N, double gate_nis);
+
+  [[nodiscard]] const RelativeMotion& motion() const { return state_.motion; }
+  [[nodiscard]] const NominalState& state() const { return state_; }
+  [[nodiscard]] const ErrorState::Covariance& covariance() const { return P_; }
+  /// Of T_B_N, in GaussianPose's convention.
+  [[nodiscard]] Matrix6d pose_covariance() const;
+
+ private:
+  template <int M>
+  Verdict correct(const Innovation<M, ErrorState::kSize>& z, double gate_nis);
+
+  Timestamp stamp_;
+  NominalState state_;
+  ErrorState::Covariance P_ = ErrorState::Covariance::Zero();
+  ProcessNoise noise_;
+};
+
+}  // namespace crepes

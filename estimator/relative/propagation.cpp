@@ -1,0 +1,153 @@
+#include "estimator/relative/propagation.hpp"
+
+#include <algorithm>
+
+#include "estimator/core/so3.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr Duration kMaxStep = std::chrono::milliseconds{10};
+// Scale and axis errors are constant in the sensor but change in effect as the motion does: as
+// white noise they weigh as if they held for this long.
+constexpr double kScaleTime = 0.2;  // s
+
+BodyRates rates(const ImuMean& mean, const ImuBias& bias) {
+  return {mean.gyro_radps - bias.gyro_radps, mean.accel_mps2 - bias.accel_mps2};
+}
+
+// dx = F dx with F = [A B 0; 0 I 0; 0 0 I]: only the rows of the motion change.
+void propagate_covariance(const PropagationJacobian& J,
+                          const Eigen::Matrix<double, 12, 1>& variance, const ProcessNoise& noise,
+                          double dt, ErrorState::Covariance& P) {
+  using E = ErrorState;
+  constexpr int kMotion = E::kGyroB;         // size of [p, v, theta]
+  constexpr int kRest = E::kSize - kMotion;  // biases and calibration
+  const auto& A = J.by_motion;
+  const Eigen::Matrix<double, 9, 12> B = -J.by_rates;  // a bias is subtracted from its rate
+
+  const Eigen::Matrix<double, kMotion, E::kSize> rows =
+      A * P.topRows<kMotion>() + B * P.middleRows<12>(E::kGyroB);
+  const Eigen::Matrix<double, kMotion, kMotion> motion =
+      rows.leftCols<kMotion>() * A.transpose() + rows.middleCols<12>(E::kGyroB) * B.transpose() +
+      J.by_rates * variance.asDiagonal() * J.by_rates.transpose();
+  P.topLeftCorner<kMotion, kMotion>() = 0.5 * (motion + motion.transpose());
+  P.topRightCorner<kMotion, kRest>() = rows.rightCols<kRest>();
+  P.bottomLeftCorner<kRest, kMotion>() = rows.rightCols<kRest>().transpose();
+
+  const double gyro_walk = noise.gyro_walk * noise.gyro_walk * dt;
+  const double accel_walk = noise.accel_walk * noise.accel_walk * dt;
+  P.diagonal().segment<3>(E::kGyroB).array() += gyro_walk;
+  P.diagonal().segment<3>(E::kAccelB).array() += accel_walk;
+  P.diagonal().segment<3>(E::kGyroN).array() += gyro_walk;
+  P.diagonal().segment<3>(E::kAccelN).array() += accel_walk;
+  P(E::kRangeBias, E::kRangeBias) += noise.range_bias_walk * noise.range_bias_walk * dt;
+}
+
+}  // namespace
+
+RelativeMotion propagated(const RelativeMotion& motion, const BodyRates& body,
+                          const BodyRates& neighbor, double dt) {
+  const Eigen::Quaterniond dq_B = so3_exp(body.w * dt).conjugate();
+  const Eigen::Vector3d a = motion.T_B_N.q * (so3_exp(0.5 * dt * neighbor.w) * neighbor.a) -
+                            so3_exp(0.5 * dt * body.w) * body.a;
+  RelativeMotion next;
+  next.T_B_N.p = dq_B * (motion.T_B_N.p + motion.v_B_N * dt + 0.5 * dt * dt * a);
+  next.v_B_N = dq_B * (motion.v_B_N + a * dt);
+  next.T_B_N.q = (dq_B * motion.T_B_N.q * so3_exp(neighbor.w * dt)).normalized();
+  return next;
+}
+
+PropagationJacobian propagation_jacobian(const RelativeMotion& before, const RelativeMotion& after,
+                                         const BodyRates& body, const BodyRates& neighbor,
+                                         double dt) {
+  const Eigen::Matrix3d R = before.T_B_N.R();
+  const Eigen::Matrix3d dR_B = so3_exp(body.w * dt).conjugate().toRotationMatrix();
+  const Eigen::Matrix3d dR_N = so3_exp(neighbor.w * dt).conjugate().toRotationMatrix();
+  const Eigen::Matrix3d half_B = so3_exp(0.5 * dt * body.w).toRotationMatrix();
+  const Eigen::Matrix3d half_N = so3_exp(0.5 * dt * neighbor.w).toRotationMatrix();
+  const Eigen::Matrix3d J_B = dt * so3_right_jacobian(body.w * dt);
+  const Eigen::Matrix3d J_N = dt * so3_right_jacobian(neighbor.w * dt);
+
+  // da, in B's axes before the step, by theta and by the rates; the last two through Exp(w dt/2).
+  const Eigen::Matrix3d a_by_theta = -R * hat(half_N * neighbor.a);
+  const Eigen::Matrix3d a_by_w_B = 0.5 * dt * half_B * hat(body.a);
+  const Eigen::Matrix3d a_by_w_N = -0.5 * dt * R * half_N * hat(neighbor.a);
+  const Eigen::Matrix3d a_by_a_N = R * half_N;
+
+  const double half_dt2 = 0.5 * dt * dt;
+  PropagationJacobian J;
+  J.by_motion.setZero();
+  J.by_motion.block<3, 3>(0, 0) = dR_B;
+  J.by_motion.block<3, 3>(0, 3) = dR_B * dt;
+  J.by_motion.block<3, 3>(0, 6) = half_dt2 * dR_B * a_by_theta;
+  J.by_motion.block<3, 3>(3, 3) = dR_B;
+  J.by_motion.block<3, 3>(3, 6) = dt * dR_B * a_by_theta;
+  J.by_motion.block<3, 3>(6, 6) = dR_N;
+
+  J.by_rates.setZero();
+  J.by_rates.block<3, 3>(0, 0) = hat(after.T_B_N.p) * J_B + half_dt2 * dR_B * a_by_w_B;
+  J.by_rates.block<3, 3>(0, 3) = -half_dt2 * dR_B * half_B;
+  J.by_rates.block<3, 3>(0, 6) = half_dt2 * dR_B * a_by_w_N;
+  J.by_rates.block<3, 3>(0, 9) = half_dt2 * dR_B * a_by_a_N;
+  J.by_rates.block<3, 3>(3, 0) = hat(after.v_B_N) * J_B + dt * dR_B * a_by_w_B;
+  J.by_rates.block<3, 3>(3, 3) = -dt * dR_B * half_B;
+  J.by_rates.block<3, 3>(3, 6) = dt * dR_B * a_by_w_N;
+  J.by_rates.block<3, 3>(3, 9) = dt * dR_B * a_by_a_N;
+  J.by_rates.block<3, 3>(6, 0) = -after.T_B_N.R().transpose() * J_B;
+  J.by_rates.block<3, 3>(6, 6) = J_N;
+  return J;
+}
+
+Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body, const ImuMean& neighbor,
+                                           const ProcessNoise& noise, double dt) {
+  const auto square = [](double x) { return x * x; };
+  const auto density2 = [&](double white, double guess, double guessed, double size) {
+    return square(white) + guessed * square(guess) +
+           square(noise.scale_sigma) * size * size * kScaleTime;
+  };
+  Eigen::Matrix<double, 12, 1> variance;
+  int row = 0;
+  for (const ImuMean* imu : {&body, &neighbor}) {
+    variance.segment<3>(row).setConstant(density2(noise.gyro_density, noise.gyro_guess_density,
+                                                  imu->guessed, imu->gyro_radps.norm()));
+    variance.segment<3>(row + 3).setConstant(density2(noise.accel_density,
+                                                      noise.accel_guess_density, imu->guessed,
+                                                      imu->accel_mps2.norm() - 9.81));
+    row += 6;
+  }
+  return variance / dt;
+}
+
+void propagate(const ImuHistory& imu_B, const ImuHistory& imu_N, Timestamp from, Timestamp to,
+               const ProcessNoise& noise, NominalState& state, ErrorState::Covariance& P) {
+  for (Timestamp t = from; t < to;) {
+    const Timestamp next = std::min(to, t + kMaxStep);
+    const double dt = to_seconds(next - t);
+    const ImuMean mean_B = imu_B.mean(t, next);
+    const ImuMean mean_N = imu_N.mean(t, next);
+    const BodyRates body = rates(mean_B, state.bias_B);
+    const BodyRates neighbor = rates(mean_N, state.bias_N);
+    const RelativeMotion before = state.motion;
+    state.motion = propagated(before, body, neighbor, dt);
+    propagate_covariance(propagation_jacobian(before, state.motion, body, neighbor, dt),
+                         rate_variance(mean_B, mean_N, noise, dt), noise, dt, P);
+    t = next;
+  }
+}
+
+RelativeMotion moved(const RelativeMotion& motion, const ImuHistory& imu_B, const ImuHistory& imu_N,
+                     Timestamp from, Timestamp to) {
+  RelativeMotion state = motion;
+  const bool back = to < from;
+  for (Timestamp t = from; t != to;) {
+    const Timestamp next = back ? std::max(to, t - kMaxStep) : std::min(to, t + kMaxStep);
+    const ImuMean mean_B = imu_B.mean(std::min(t, next), std::max(t, next));
+    const ImuMean mean_N = imu_N.mean(std::min(t, next), std::max(t, next));
+    state = propagated(state, rates(mean_B, {}), rates(mean_N, {}), to_seconds(next - t));
+    t = next;
+  }
+  return state;
+}
+
+}  // namespace crepes

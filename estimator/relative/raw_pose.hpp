@@ -1,0 +1,54 @@
+/// One-shot relative pose from mutual bearings, range and gravity (paper III-C).
+#pragma once
+
+#include <Eigen/Core>
+#include <variant>
+
+#include "estimator/core/outputs.hpp"
+#include "estimator/core/pose.hpp"
+
+namespace crepes {
+
+/// Where camera, LED ring and antenna sit on a robot, in its body axes [m].
+struct Mounting {
+  Eigen::Vector3d camera = Eigen::Vector3d::Zero();
+  Eigen::Vector3d led = Eigen::Vector3d::Zero();
+  Eigen::Vector3d antenna = Eigen::Vector3d::Zero();
+};
+
+/// What one of the two robots contributes.
+struct Sighting {
+  Eigen::Vector3d u = Eigen::Vector3d::UnitX();   ///< where its camera sees the other's ring
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity
+  Mounting mounting;
+  double bearing_sigma_rad = 0.0;
+  double tilt_sigma_rad = 0.0;
+};
+
+/// Two robots that see each other at one instant: B, the observer, and N, its neighbor.
+struct MutualSighting {
+  Sighting B;
+  Sighting N;
+  double range_m = 0.0;  ///< antenna to antenna
+  double range_sigma_m = 0.0;
+};
+
+/// The measurement z of the paper's filter (eq. 16): p of N in B, p of B in N, R of N in B.
+struct RawPose {
+  Pose T_B_N;
+  Eigen::Vector3d p_N_B = Eigen::Vector3d::Zero();
+  /// Of [p_B_N, p_N_B, theta], theta a right perturbation of T_B_N's rotation.
+  Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
+
+  [[nodiscard]] GaussianPose gaussian() const;
+};
+
+/// A RawPose, or why the geometry does not give one: kNearVertical, kTooClose, kNoRange (the range
+/// is shorter than the mountings allow), kUncertain (the two elevations contradict each other by
+/// more than 5 sigma: not one line of sight).
+///
+/// With all mountings zero this is the paper's formula:  p = d u;  psi = psi_B - psi_N + pi;
+/// R = (R_pitch R_roll)_B^T R_yaw(psi) (R_pitch R_roll)_N. Lever arms enter by iterating it.
+[[nodiscard]] std::variant<RawPose, NoPoseReason> compute_raw_pose(const MutualSighting& sighting);
+
+}  // namespace crepes

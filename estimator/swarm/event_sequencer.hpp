@@ -1,0 +1,48 @@
+/// Puts measurements of one neighbor in order of their stamps, late ones included.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "estimator/core/outputs.hpp"
+#include "estimator/relative/neighbor_filter.hpp"
+#include "estimator/relative/raw_pose.hpp"
+
+namespace crepes {
+
+/// One reading that a neighbor's filter can be corrected with.
+struct Measurement {
+  Timestamp stamp{};
+  MeasurementKind kind = MeasurementKind::kBearing;
+  std::variant<DirectionReading, RangeReading, RawPose, GaussianPose> reading;
+};
+
+/// Waits `lag` for late data: what has waited so long is released in order, what comes later is
+/// refused. Bounded: beyond `kCapacity` the oldest is dropped and counted.
+class EventSequencer {
+ public:
+  static constexpr std::size_t kCapacity = 2048;
+
+  explicit EventSequencer(Duration lag) : lag_(lag) {}
+
+  /// False if the stamp lies before what was released already.
+  bool push(Measurement measurement);
+
+  /// The oldest measurement with a stamp of at most `now - lag`.
+  [[nodiscard]] std::optional<Measurement> pop_ready(Timestamp now);
+
+  /// What still waits, oldest first.
+  [[nodiscard]] const std::vector<Measurement>& pending() const { return pending_; }
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+  void clear() { pending_.clear(); }
+
+ private:
+  Duration lag_;
+  Timestamp released_ = Timestamp::min();
+  std::vector<Measurement> pending_;
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace crepes

@@ -1,0 +1,233 @@
+#include "estimator/swarm/neighbor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace crepes {
+namespace {
+
+constexpr Duration kMaxAge = std::chrono::milliseconds{20};  // of a published state
+constexpr Duration kSilence = std::chrono::seconds{2};
+constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
+// A filter whose sightings were all refused for so long is wrong, not unlucky.
+constexpr Duration kPatience = std::chrono::milliseconds{500};
+
+}  // namespace
+
+Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
+                   const FilterSettings& settings)
+    : member_(neighbor),
+      self_id_(self.id),
+      mounting_{self.p_body_led, self.p_body_uwb, neighbor.p_body_led, neighbor.p_body_uwb},
+      settings_(settings),
+      sightings_(self, neighbor, settings.priors.misalignment_rad,
+                 std::hypot(settings.range_sigma_m, settings.priors.range_bias_m)),
+      sequencer_(settings.lag) {
+  status_.neighbor = neighbor.id;
+  status_.name = neighbor.name;
+}
+
+void Neighbor::add_bearing(const Bearing& bearing) {
+  last_seen_ = std::max(last_seen_, bearing.stamp);
+  sightings_.add_own(bearing);
+  enqueue({bearing.stamp, MeasurementKind::kBearing,
+           DirectionReading{bearing.u_B, bearing.p_B_C, bearing.sigma_rad}});
+}
+
+void Neighbor::add_range(const UwbRange& range) { take_range(range, MeasurementKind::kRange); }
+
+void Neighbor::take_range(const UwbRange& range, MeasurementKind kind) {
+  const bool plausible = range.range_m > 0.0 && range.range_m <= settings_.max_range_m;
+  const bool late_path = range.received_dbm - range.first_path_dbm > settings_.late_path_db;
+  if (!plausible || late_path) {
+    count(kind, Verdict::kGated);
+    return;
+  }
+  last_range_ = std::max(last_range_, range.stamp);
+  sightings_.add_range(range.stamp, range.range_m);
+  enqueue({range.stamp, kind, RangeReading{range.range_m, settings_.range_sigma_m}});
+}
+
+void Neighbor::add_report(const ReceivedReport& received, const BodyState& self) {
+  const Report& report = received.report;
+  last_heard_ = std::max(last_heard_, report.stamp);
+  for (const ImuSample& sample : report.imu) body_.imu.push(sample);
+  if (!body_.tilt || report.tilt.stamp > body_.tilt->stamp) body_.tilt = report.tilt;
+  for (const UwbRange& range : report.ranges) {
+    if (range.neighbor == self_id_) take_range(range, MeasurementKind::kPeerRange);
+  }
+  for (const Bearing& bearing : report.bearings) {
+    if (bearing.neighbor == self_id_) take_peer_bearing(bearing, received.clock_sigma_s, self);
+  }
+}
+
+void Neighbor::take_peer_bearing(const Bearing& bearing, double clock_sigma_s,
+                                 const BodyState& self) {
+  last_seen_by_ = std::max(last_seen_by_, bearing.stamp);
+  // A stamp off by dt turns the direction by w dt.
+  const double w = body_.imu.empty() ? 0.0 : body_.imu.newest().gyro_radps.norm();
+  const double sigma = std::hypot(bearing.sigma_rad, w * clock_sigma_s);
+  enqueue({bearing.stamp, MeasurementKind::kPeerBearing,
+           DirectionReading{bearing.u_B, bearing.p_B_C, sigma}});
+
+  const bool wanted = settings_.profile == Profile::kPaper || needs_start(bearing.stamp);
+  if (!wanted) return;
+  const auto result = sightings_.raw_pose(bearing, self, body_);
+  if (const auto* raw = std::get_if<RawPose>(&result)) {
+    raw_reason_ = NoPoseReason::kNone;
+    start_or_feed(bearing.stamp, *raw);
+  } else {
+    raw_reason_ = std::get<NoPoseReason>(result);
+    count(MeasurementKind::kRawPose, Verdict::kDegenerate);
+  }
+}
+
+bool Neighbor::needs_start(Timestamp stamp) const {
+  if (!track_ || !track_->is_certain()) return true;
+  // Seen and refused ever since, while raw poses are there: the filter has lost its way.
+  return stamp - track_->last_sighting() > kPatience + settings_.lag;
+}
+
+void Neighbor::start_or_feed(Timestamp stamp, const RawPose& raw) {
+  if (needs_start(stamp)) {
+    if (track_ && stamp <= track_->stamp()) return;
+    track_.emplace(stamp, raw, settings_);
+    correction_.reset();
+    ++starts_;
+    count(MeasurementKind::kRawPose, Verdict::kFused);
+    return;
+  }
+  if (settings_.profile == Profile::kPaper) {
+    enqueue({stamp, MeasurementKind::kRawPose, raw});
+  }
+}
+
+void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
+  const bool sighted =
+      track_ && stamp - track_->last_sighting() <= settings_.recent + settings_.lag;
+  if (sighted) {
+    // The graph rests on this filter's own edge: fusing it back would count that twice. It is laid
+    // over what is published instead.
+    if (!pose_ || pose_->stamp < stamp) return;
+    correction_ = Correction{stamp, pose_difference(pose_->T_B_N.pose, pose.T_B_N.pose),
+                             pose.T_B_N.covariance};
+    return;
+  }
+  if (body_.imu.empty()) return;
+  if (!track_ || !track_->is_certain()) {
+    track_.emplace(stamp, pose, settings_);
+    ++starts_;
+    count(MeasurementKind::kGraphPose, Verdict::kFused);
+    return;
+  }
+  enqueue({stamp, MeasurementKind::kGraphPose, pose.T_B_N});
+}
+
+void Neighbor::enqueue(Measurement measurement) {
+  const MeasurementKind kind = measurement.kind;
+  const bool poses_only = settings_.profile == Profile::kPaper;
+  if (poses_only && kind != MeasurementKind::kRawPose && kind != MeasurementKind::kGraphPose)
+    return;
+  if (!sequencer_.push(std::move(measurement))) count(kind, Verdict::kLate);
+}
+
+void Neighbor::count(MeasurementKind kind, Verdict verdict) {
+  ++status_.measurements[static_cast<std::size_t>(kind)][static_cast<std::size_t>(verdict)];
+}
+
+void Neighbor::tick(Timestamp now, const BodyState& self) {
+  pose_.reset();
+  release(now, self);
+  look_ahead(now, self);
+  reason_ = pose_ ? NoPoseReason::kNone : reason(now, self);
+}
+
+void Neighbor::release(Timestamp now, const BodyState& self) {
+  while (const auto measurement = sequencer_.pop_ready(now)) {
+    const bool usable =
+        track_ && measurement->stamp >= track_->stamp() && !self.imu.empty() && !body_.imu.empty();
+    if (!usable) {
+      count(measurement->kind, Verdict::kNoState);
+      continue;
+    }
+    track_->advance_to(measurement->stamp, self.imu, body_.imu);
+    count(measurement->kind, track_->fuse(*measurement, mounting_, settings_.gates));
+  }
+}
+
+void Neighbor::look_ahead(Timestamp now, const BodyState& self) {
+  if (!track_ || self.imu.empty() || body_.imu.empty()) return;
+  const Timestamp state_time = std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
+  if (track_->stamp() > state_time) return;
+  NeighborTrack head = *track_;
+  for (const Measurement& measurement : sequencer_.pending()) {
+    if (measurement.stamp > state_time) break;
+    if (measurement.stamp < head.stamp()) continue;
+    head.advance_to(measurement.stamp, self.imu, body_.imu);
+    static_cast<void>(head.fuse(measurement, mounting_, settings_.gates));
+  }
+  head.advance_to(state_time, self.imu, body_.imu);
+  if (!head.is_certain()) return;
+
+  const auto is_recent = [&](Timestamp t) { return state_time - t <= settings_.recent; };
+  const Timestamp graph = head.last(MeasurementKind::kGraphPose);
+  const bool sighted = is_recent(head.last_sighting());
+  NeighborPose pose;
+  pose.neighbor = member_.id;
+  pose.stamp = state_time;
+  pose.published = now;
+  pose.mode = sighted            ? PoseMode::kDirect
+              : is_recent(graph) ? PoseMode::kGraph
+                                 : PoseMode::kPredicted;
+  pose.T_B_N = head.pose();
+  pose.v_B_N = head.motion().v_B_N;
+  const Timestamp range =
+      std::max(head.last(MeasurementKind::kRange), head.last(MeasurementKind::kPeerRange));
+  pose.age_s = to_seconds(state_time - std::max({head.last_sighting(), graph, range}));
+  pose.reset_counter = starts_;
+  pose.sources = {.bearing = is_recent(last_seen_),
+                  .peer_bearing = is_recent(last_seen_by_),
+                  .range = is_recent(last_range_),
+                  .imu = is_recent(body_.imu.newest().stamp),
+                  .graph = is_recent(graph)};
+  pose_ = pose;
+}
+
+std::optional<NeighborEstimate> Neighbor::estimate() const {
+  if (!pose_ || pose_->mode != PoseMode::kDirect) return std::nullopt;
+  return NeighborEstimate{pose_->stamp, member_.id, pose_->T_B_N, pose_->v_B_N};
+}
+
+std::optional<NeighborPose> Neighbor::improved_pose() const {
+  if (!pose_ || !correction_ || pose_->mode != PoseMode::kDirect ||
+      pose_->stamp - correction_->stamp > kCorrectionLife) {
+    return pose_;
+  }
+  NeighborPose improved = *pose_;
+  improved.T_B_N = {perturbed(pose_->T_B_N.pose, correction_->step), correction_->covariance};
+  improved.sources.graph = true;
+  return improved;
+}
+
+NoPoseReason Neighbor::reason(Timestamp now, const BodyState& self) const {
+  if (last_heard_ == kNever) return NoPoseReason::kNeverHeard;
+  if (now - last_heard_ > kSilence) return NoPoseReason::kSilent;
+  if (self.imu.empty() || now - self.imu.newest().stamp > kSilence) return NoPoseReason::kNoOwnImu;
+  if (body_.imu.empty()) return NoPoseReason::kNoPeerImu;
+  if (!self.tilt || !body_.tilt) return NoPoseReason::kTiltUnknown;
+  if (now - last_seen_ > kSilence) return NoPoseReason::kNotSeen;
+  if (now - last_seen_by_ > kSilence) return NoPoseReason::kDoesNotSeeUs;
+  if (now - last_range_ > kSilence) return NoPoseReason::kNoRange;
+  if (raw_reason_ != NoPoseReason::kNone) return raw_reason_;
+  return NoPoseReason::kUncertain;
+}
+
+NeighborStatus Neighbor::status() const {
+  NeighborStatus status = status_;
+  status.reason = reason_;
+  status.pose = improved_pose();
+  return status;
+}
+
+}  // namespace crepes

@@ -1,0 +1,85 @@
+/// Everything that this robot knows about one neighbor.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "estimator/core/config.hpp"
+#include "estimator/core/outputs.hpp"
+#include "estimator/swarm/body_state.hpp"
+#include "estimator/swarm/event_sequencer.hpp"
+#include "estimator/swarm/filter_settings.hpp"
+#include "estimator/swarm/neighbor_track.hpp"
+#include "estimator/swarm/sighting_log.hpp"
+
+namespace crepes {
+
+/// Gathers readings from both sides, starts and feeds the neighbor's filter, and says where it is
+/// now. Readings wait in the sequencer until the lag has passed; poses do not wait: they come from
+/// a copy of the filter that runs ahead over what is still waiting.
+class Neighbor {
+ public:
+  Neighbor(const MemberConfig& self, const MemberConfig& neighbor, const FilterSettings& settings);
+
+  void add_bearing(const Bearing& bearing);
+  void add_range(const UwbRange& range);
+  void add_report(const ReceivedReport& received, const BodyState& self);
+  void add_graph_pose(Timestamp stamp, const GraphPose& pose);
+
+  /// Moves on to `now`: fuses what has waited long enough and looks ahead.
+  void tick(Timestamp now, const BodyState& self);
+
+  /// The pose at the last tick, by the filter alone. Empty while unknown or too uncertain.
+  [[nodiscard]] const std::optional<NeighborPose>& pose() const { return pose_; }
+  /// What the graph may use: a certain pose that rests on a recent sighting.
+  [[nodiscard]] std::optional<NeighborEstimate> estimate() const;
+  /// The last pose with the graph's correction, where there is a fresh one.
+  [[nodiscard]] std::optional<NeighborPose> improved_pose() const;
+
+  [[nodiscard]] const BodyState& body() const { return body_; }
+  [[nodiscard]] Timestamp last_heard() const { return last_heard_; }
+  [[nodiscard]] NeighborStatus status() const;
+
+ private:
+  void take_range(const UwbRange& range, MeasurementKind kind);
+  void take_peer_bearing(const Bearing& bearing, double clock_sigma_s, const BodyState& self);
+  void start_or_feed(Timestamp stamp, const RawPose& raw);
+  void enqueue(Measurement measurement);
+  void count(MeasurementKind kind, Verdict verdict);
+  void release(Timestamp now, const BodyState& self);
+  void look_ahead(Timestamp now, const BodyState& self);
+  [[nodiscard]] bool needs_start(Timestamp stamp) const;
+  [[nodiscard]] NoPoseReason reason(Timestamp now, const BodyState& self) const;
+
+  MemberConfig member_;
+  RobotId self_id_;
+  PairMounting mounting_;
+  FilterSettings settings_;
+
+  BodyState body_;
+  SightingLog sightings_;
+  EventSequencer sequencer_;
+  std::optional<NeighborTrack> track_;
+  std::uint32_t starts_ = 0;
+
+  // What the last tick found.
+  std::optional<NeighborPose> pose_;
+  NoPoseReason reason_ = NoPoseReason::kNeverHeard;
+
+  // The graph's latest word, as the difference to this filter at that instant.
+  struct Correction {
+    Timestamp stamp;
+    Vector6d step;
+    Matrix6d covariance;
+  };
+  std::optional<Correction> correction_;
+
+  Timestamp last_heard_ = kNever;
+  Timestamp last_seen_ = kNever;
+  Timestamp last_seen_by_ = kNever;
+  Timestamp last_range_ = kNever;
+  NoPoseReason raw_reason_ = NoPoseReason::kNotSeen;
+  NeighborStatus status_;
+};
+
+}  // namespace crepes

@@ -1,0 +1,118 @@
+#include "estimator/swarm/neighbor_track.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <numbers>
+#include <utility>
+
+#include "estimator/core/contract.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr double kMaxSigma = 1.0;                                      // m
+constexpr double kMaxAttitudeSigma = 20.0 * std::numbers::pi / 180.0;  // rad
+
+double largest_sigma(const Eigen::Matrix3d& covariance) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()(2)));
+}
+
+template <class First>
+std::variant<NeighborFilter, PaperFilter> make_filter(Timestamp stamp, const First& first,
+                                                      const FilterSettings& settings) {
+  if (settings.profile == Profile::kPaper) return PaperFilter(stamp, first, settings.noise);
+  if constexpr (std::is_same_v<First, RawPose>) {
+    return NeighborFilter(stamp, first.gaussian(), settings.noise, settings.priors);
+  } else {
+    return NeighborFilter(stamp, first, settings.noise, settings.priors);
+  }
+}
+
+Verdict fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounting& mounting,
+                   const Gates& gates) {
+  switch (m.kind) {
+    case MeasurementKind::kBearing:
+      return filter.fuse_bearing(std::get<DirectionReading>(m.reading), mounting.p_N_M,
+                                 gates.bearing);
+    case MeasurementKind::kPeerBearing:
+      return filter.fuse_peer_bearing(std::get<DirectionReading>(m.reading), mounting.p_B_M,
+                                      gates.bearing);
+    case MeasurementKind::kRange:
+    case MeasurementKind::kPeerRange:
+      return filter.fuse_range(std::get<RangeReading>(m.reading), mounting.p_B_U, mounting.p_N_Q,
+                               gates.range);
+    case MeasurementKind::kGraphPose:
+      return filter.fuse_pose(std::get<GaussianPose>(m.reading), gates.pose);
+    case MeasurementKind::kRawPose:
+      break;
+  }
+  return Verdict::kNoState;  // a raw pose only starts this filter
+}
+
+Verdict fuse_paper(PaperFilter& filter, const Measurement& m, const Gates& gates) {
+  if (m.kind == MeasurementKind::kRawPose) {
+    return filter.fuse(std::get<RawPose>(m.reading), gates.raw_pose);
+  }
+  CREPES_EXPECT(m.kind == MeasurementKind::kGraphPose, "the paper's filter takes poses only");
+  return filter.fuse(std::get<GaussianPose>(m.reading), gates.pose);
+}
+
+}  // namespace
+
+NeighborTrack::NeighborTrack(Timestamp stamp, const RawPose& first, const FilterSettings& settings)
+    : filter_(make_filter(stamp, first, settings)) {
+  last_[static_cast<std::size_t>(MeasurementKind::kRawPose)] = stamp;
+}
+
+NeighborTrack::NeighborTrack(Timestamp stamp, const GraphPose& first,
+                             const FilterSettings& settings)
+    : filter_(make_filter(stamp, first, settings)) {
+  last_[static_cast<std::size_t>(MeasurementKind::kGraphPose)] = stamp;
+}
+
+Timestamp NeighborTrack::stamp() const {
+  return std::visit([](const auto& filter) { return filter.stamp(); }, filter_);
+}
+
+void NeighborTrack::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
+  std::visit([&](auto& filter) { filter.advance_to(to, imu_B, imu_N); }, filter_);
+}
+
+Verdict NeighborTrack::fuse(const Measurement& measurement, const PairMounting& mounting,
+                            const Gates& gates) {
+  auto* tight = std::get_if<NeighborFilter>(&filter_);
+  const Verdict verdict = tight != nullptr
+                              ? fuse_tight(*tight, measurement, mounting, gates)
+                              : fuse_paper(std::get<PaperFilter>(filter_), measurement, gates);
+  if (verdict == Verdict::kFused) {
+    last_[static_cast<std::size_t>(measurement.kind)] = measurement.stamp;
+  }
+  return verdict;
+}
+
+RelativeMotion NeighborTrack::motion() const {
+  return std::visit([](const auto& filter) { return filter.motion(); }, filter_);
+}
+
+GaussianPose NeighborTrack::pose() const {
+  return std::visit(
+      [](const auto& filter) {
+        return GaussianPose{filter.motion().T_B_N, filter.pose_covariance()};
+      },
+      filter_);
+}
+
+bool NeighborTrack::is_certain() const {
+  const Matrix6d P = pose().covariance;
+  return P.allFinite() && largest_sigma(P.topLeftCorner<3, 3>()) <= kMaxSigma &&
+         largest_sigma(P.bottomRightCorner<3, 3>()) <= kMaxAttitudeSigma;
+}
+
+Timestamp NeighborTrack::last_sighting() const {
+  return std::max({last(MeasurementKind::kBearing), last(MeasurementKind::kPeerBearing),
+                   last(MeasurementKind::kRawPose)});
+}
+
+}  // namespace crepes

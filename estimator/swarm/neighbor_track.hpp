@@ -1,0 +1,58 @@
+/// A neighbor's filter of either profile, with a memory of what it was fed.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <variant>
+
+#include "estimator/relative/neighbor_filter.hpp"
+#include "estimator/relative/paper_filter.hpp"
+#include "estimator/swarm/event_sequencer.hpp"
+#include "estimator/swarm/filter_settings.hpp"
+
+namespace crepes {
+
+/// The lever arms that readings refer to.
+struct PairMounting {
+  Eigen::Vector3d p_B_M;  ///< our LED ring
+  Eigen::Vector3d p_B_U;  ///< our antenna
+  Eigen::Vector3d p_N_M;
+  Eigen::Vector3d p_N_Q;
+};
+
+/// Long before any stamp, yet safe to subtract from one.
+inline constexpr Timestamp kNever{Duration{std::numeric_limits<std::int64_t>::min() / 4}};
+
+/// A value: copies are used to look ahead over readings that still wait for late ones.
+class NeighborTrack {
+ public:
+  NeighborTrack(Timestamp stamp, const RawPose& first, const FilterSettings& settings);
+  NeighborTrack(Timestamp stamp, const GraphPose& first, const FilterSettings& settings);
+
+  [[nodiscard]] Timestamp stamp() const;
+  void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
+  /// Corrects with a reading taken at `stamp()`.
+  Verdict fuse(const Measurement& measurement, const PairMounting& mounting, const Gates& gates);
+
+  [[nodiscard]] RelativeMotion motion() const;
+  [[nodiscard]] GaussianPose pose() const;
+  /// Its own covariance says at most 1 m and 20 deg, one sigma, in any direction.
+  [[nodiscard]] bool is_certain() const;
+  /// When a reading of this kind was last used; kNever if never.
+  [[nodiscard]] Timestamp last(MeasurementKind kind) const {
+    return last_[static_cast<std::size_t>(kind)];
+  }
+  /// When anything that shows the neighbor itself (not the graph) was last used.
+  [[nodiscard]] Timestamp last_sighting() const;
+
+ private:
+  std::variant<NeighborFilter, PaperFilter> filter_;
+  std::array<Timestamp, kMeasurementKindCount> last_ = [] {
+    std::array<Timestamp, kMeasurementKindCount> never{};
+    never.fill(kNever);
+    return never;
+  }();
+};
+
+}  // namespace crepes

@@ -1,0 +1,35 @@
+/// What this robot broadcasts.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "estimator/core/measurements.hpp"
+#include "estimator/swarm/body_state.hpp"
+
+namespace crepes {
+
+/// Every report repeats the last 160 ms: a datagram in three may be lost. Bearings are thinned to
+/// one a neighbor and report; the filter at the other end gains nothing from a camera's every
+/// frame.
+class ReportComposer {
+ public:
+  explicit ReportComposer(RobotId self) : self_(self) {}
+
+  void add(const Bearing& bearing) { newest_[bearing.neighbor].push_back(bearing); }
+  void add(const UwbRange& range) { ranges_.push_back(range); }
+
+  /// Empty before there is a tilt: peers could do nothing with the rest.
+  [[nodiscard]] std::optional<Report> compose(Timestamp now, const BodyState& self,
+                                              const std::vector<NeighborEstimate>& estimates);
+
+ private:
+  RobotId self_;
+  std::map<RobotId, std::vector<Bearing>> newest_;  ///< since the last report
+  std::deque<Bearing> bearings_;
+  std::deque<UwbRange> ranges_;
+};
+
+}  // namespace crepes

@@ -1,0 +1,103 @@
+#include "estimator/swarm/sighting_log.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace crepes {
+namespace {
+
+constexpr Duration kKept = std::chrono::milliseconds{500};
+constexpr Duration kBearingReach = std::chrono::milliseconds{20};  // two dark slots
+constexpr Duration kRangeReach = std::chrono::milliseconds{60};
+// What moves between two instants that the gyroscope does not show: the line of sight, as robots
+// pass each other.
+constexpr double kLineRate = 0.3;  // rad/s
+// Raw poses lean on calibration as they find it. This much of their error never averages out, and
+// keeps the covariance of z regular where p_B_N and p_N_B tell the same distance.
+constexpr double kMountingSigma = 0.01;   // m
+constexpr double kAttitudeSigma = 0.002;  // rad
+
+template <class Readings>
+void forget_before(Timestamp t, Readings& readings) {
+  while (!readings.empty() && readings.front().stamp < t) readings.pop_front();
+}
+
+}  // namespace
+
+SightingLog::SightingLog(const MemberConfig& self, const MemberConfig& neighbor,
+                         double calibration_sigma_rad, double range_sigma_m)
+    : self_(self),
+      neighbor_(neighbor),
+      calibration_sigma_rad_(calibration_sigma_rad),
+      range_sigma_m_(range_sigma_m) {}
+
+void SightingLog::add_own(const Bearing& bearing) {
+  own_.push_back(bearing);
+  forget_before(bearing.stamp - kKept, own_);
+}
+
+void SightingLog::add_range(Timestamp stamp, double range_m) {
+  ranges_.push_back({stamp, range_m});
+  forget_before(stamp - kKept, ranges_);
+}
+
+std::optional<Bearing> SightingLog::own_at(Timestamp t, const ImuHistory& imu) const {
+  const auto nearest =
+      std::min_element(own_.begin(), own_.end(), [t](const auto& a, const auto& b) {
+        return std::chrono::abs(a.stamp - t) < std::chrono::abs(b.stamp - t);
+      });
+  if (nearest == own_.end() || std::chrono::abs(nearest->stamp - t) > kBearingReach) {
+    return std::nullopt;
+  }
+  Bearing turned = *nearest;
+  turned.u_B = imu.rotation(nearest->stamp, t).conjugate() * nearest->u_B;
+  turned.sigma_rad =
+      std::hypot(nearest->sigma_rad, kLineRate * to_seconds(std::chrono::abs(nearest->stamp - t)));
+  turned.stamp = t;
+  return turned;
+}
+
+// The median of what both modules said around t: an outlier does not pass.
+std::optional<double> SightingLog::range_at(Timestamp t) const {
+  std::vector<double> near;
+  for (const StampedRange& range : ranges_) {
+    if (std::chrono::abs(range.stamp - t) <= kRangeReach) near.push_back(range.range_m);
+  }
+  if (near.empty()) return std::nullopt;
+  const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
+  std::nth_element(near.begin(), middle, near.end());
+  return *middle;
+}
+
+std::variant<RawPose, NoPoseReason> SightingLog::raw_pose(const Bearing& peer_bearing,
+                                                          const BodyState& self,
+                                                          const BodyState& neighbor) const {
+  const Timestamp t = peer_bearing.stamp;
+  const auto tilt_B = self.tilt_at(t);
+  const auto tilt_N = neighbor.tilt_at(t);
+  if (!tilt_B || !tilt_N) return NoPoseReason::kTiltUnknown;
+  const auto own = own_at(t, self.imu);
+  if (!own) return NoPoseReason::kNotSeen;
+  const auto range_m = range_at(t);
+  if (!range_m) return NoPoseReason::kNoRange;
+
+  const auto sighting = [&](const Bearing& bearing, const Tilt& tilt, const MemberConfig& member) {
+    return Sighting{.u = bearing.u_B,
+                    .up = tilt.up_B,
+                    .mounting = {bearing.p_B_C, member.p_body_led, member.p_body_uwb},
+                    .bearing_sigma_rad = std::hypot(bearing.sigma_rad, calibration_sigma_rad_),
+                    .tilt_sigma_rad = tilt.sigma_rad};
+  };
+  auto result = compute_raw_pose({.B = sighting(*own, *tilt_B, self_),
+                                  .N = sighting(peer_bearing, *tilt_N, neighbor_),
+                                  .range_m = *range_m,
+                                  .range_sigma_m = range_sigma_m_});
+  if (auto* raw = std::get_if<RawPose>(&result)) {
+    raw->covariance.diagonal().head<6>().array() += kMountingSigma * kMountingSigma;
+    raw->covariance.diagonal().tail<3>().array() += kAttitudeSigma * kAttitudeSigma;
+  }
+  return result;
+}
+
+}  // namespace crepes

@@ -1,0 +1,61 @@
+#include "estimator/swarm/team.hpp"
+
+#include <cmath>
+
+#include "estimator/relative/propagation.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr Duration kMaxAge = std::chrono::milliseconds{500};
+// What carrying an estimate by bare IMU integration may lose.
+constexpr double kCarrySpeed = 0.1;  // m/s
+constexpr double kCarryTurn = 0.02;  // rad/s
+
+// The estimate at `stamp`. Its position covariance turns with the observer's axes.
+RelativePoseEdge carried(RobotId from, const NeighborEstimate& estimate, const ImuHistory& imu_from,
+                         const ImuHistory& imu_to, Timestamp stamp) {
+  const RelativeMotion motion =
+      moved({estimate.T_B_N.pose, estimate.v_B_N}, imu_from, imu_to, estimate.stamp, stamp);
+  Matrix6d turn = Matrix6d::Identity();
+  turn.topLeftCorner<3, 3>() =
+      imu_from.rotation(estimate.stamp, stamp).conjugate().toRotationMatrix();
+  turn.bottomRightCorner<3, 3>() =
+      imu_to.rotation(estimate.stamp, stamp).conjugate().toRotationMatrix();
+  Matrix6d covariance = turn * estimate.T_B_N.covariance * turn.transpose();
+  const double dt = to_seconds(stamp - estimate.stamp);
+  covariance.diagonal().head<3>().array() += kCarrySpeed * kCarrySpeed * dt * dt;
+  covariance.diagonal().tail<3>().array() += kCarryTurn * kCarryTurn * dt * dt;
+  return {from, estimate.neighbor, {motion.T_B_N, covariance}, motion.v_B_N};
+}
+
+}  // namespace
+
+void Team::add(const Report& report) {
+  for (const NeighborEstimate& estimate : report.estimates) {
+    if (estimate.neighbor == report.sender) continue;
+    const auto key = std::pair(report.sender, estimate.neighbor);
+    const auto known = estimates_.find(key);
+    if (known == estimates_.end() || known->second.stamp < estimate.stamp) {
+      estimates_.insert_or_assign(key, estimate);
+    }
+  }
+}
+
+GraphProblem Team::problem(Timestamp stamp, RobotId self, const std::vector<NeighborEstimate>& own,
+                           const ImuOf& imu_of) const {
+  GraphProblem problem{.stamp = stamp, .self = self, .edges = {}};
+  for (const NeighborEstimate& estimate : own) {
+    problem.edges.push_back({self, estimate.neighbor, estimate.T_B_N, estimate.v_B_N});
+  }
+  for (const auto& [pair, estimate] : estimates_) {
+    if (std::chrono::abs(stamp - estimate.stamp) > kMaxAge) continue;
+    const ImuHistory* imu_from = imu_of(pair.first);
+    const ImuHistory* imu_to = imu_of(pair.second);
+    if (imu_from == nullptr || imu_to == nullptr) continue;
+    problem.edges.push_back(carried(pair.first, estimate, *imu_from, *imu_to, stamp));
+  }
+  return problem;
+}
+
+}  // namespace crepes
