@@ -1,0 +1,55 @@
+/// How good the poses of one ordered pair are: absolute trajectory error without alignment (Zhang
+/// and Scaramuzza 2018, "A tutorial on quantitative trajectory evaluation", IV), availability and
+/// consistency.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "estimator/core/outputs.hpp"
+
+namespace crepes {
+
+/// Of a set of errors; NaN where there are none.
+struct ErrorStatistics {
+  double rmse;
+  double mean;
+  double median;
+  double max;
+};
+[[nodiscard]] ErrorStatistics statistics_of(std::vector<double> errors);
+
+/// The middle value, or the mean of the two in the middle; NaN of nothing.
+[[nodiscard]] double median_of(std::vector<double> values);
+
+/// What is scored, on the observer's clock: both ends belong to it.
+struct ScoreWindow {
+  Timestamp begin{};
+  Timestamp end{};
+};
+
+struct PairScore {
+  std::size_t rows = 0;                     ///< inside the window
+  double availability = 0.0;                ///< share of the window's 50 Hz instants with a row
+  std::vector<double> position_errors_m;    ///< ||p_est - p_true||, one a row
+  std::vector<double> rotation_errors_rad;  ///< angle of R_est^T R_true, one a row
+  std::array<std::size_t, 3> modes{};       ///< rows by PoseMode
+  double median_nees = 0.0;                 ///< 6 degrees of freedom: 5.35 when consistent
+  std::size_t bad_covariances = 0;          ///< rows whose covariance is not positive definite
+  Duration max_age{};                       ///< greatest `published - stamp`
+  std::optional<Duration> first_row;        ///< the very first row's stamp since `start`
+};
+
+/// Truth of the pair at an instant of the observer's clock.
+using RelativeTruth = std::function<std::optional<Pose>(Timestamp)>;
+
+/// Scores `poses` (stamps increase) inside `window`; `start` is when the recording began. Rows
+/// without truth count for availability alone.
+[[nodiscard]] PairScore score_pair(std::span<const NeighborPose> poses, const RelativeTruth& truth,
+                                   Timestamp start, const ScoreWindow& window);
+
+}  // namespace crepes

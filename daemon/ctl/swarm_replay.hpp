@@ -1,0 +1,35 @@
+/// A recorded swarm lived through again: every robot runs what the daemon runs, on virtual time.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "daemon/ctl/dataset_faults.hpp"
+#include "estimator/core/config.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+struct ReplayOptions {
+  std::filesystem::path swarm_dir;
+  std::filesystem::path out_dir;
+  std::optional<Profile> profile;           ///< instead of what the configuration files say
+  bool graph = true;                        ///< false: no pose graph, whatever the files say
+  std::optional<std::uint64_t> seed;        ///< of the network, instead of swarm.yaml's
+  std::function<void(double)> on_progress;  ///< share done, 0..1, now and then
+};
+
+struct ReplaySummary {
+  std::size_t robots = 0;
+  std::uint64_t poses = 0;  ///< rows written
+  double duration_s = 0.0;  ///< of the recording
+  DatasetFaults faults;
+};
+
+/// No threads, one queue in order of true time: same input and seed, same poses to the last bit.
+/// True time orders what reaches the robots; they see only their own clocks.
+[[nodiscard]] Result<ReplaySummary> replay_swarm(const ReplayOptions& options);
+
+}  // namespace crepes

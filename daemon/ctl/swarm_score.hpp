@@ -1,0 +1,47 @@
+/// How good a whole replay is: every ordered pair, and the clocks.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/ctl/pair_score.hpp"
+#include "daemon/ctl/swarm_manifest.hpp"
+#include "daemon/ctl/truth.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+struct ScoredPair {
+  SwarmRobot observer;
+  SwarmRobot neighbor;
+  std::vector<NeighborPose> poses;
+  PairScore score;
+};
+
+/// The error of a peer's clock offset as `observer` believed it.
+struct ClockScore {
+  RobotId observer{};
+  RobotId peer{};
+  std::size_t samples = 0;
+  double max_error_s = 0.0;
+};
+
+struct SwarmScore {
+  std::vector<ScoredPair> pairs;
+  std::vector<ClockScore> clocks;  ///< empty if there is no report
+};
+
+/// Reads DIR/<observer>/<neighbor>.csv of every ordered pair and DIR/report.json, and scores what
+/// lies later than `after_s`. A pair without a file has no poses; no file at all is an error.
+[[nodiscard]] Result<SwarmScore> score_swarm(const std::filesystem::path& results,
+                                             const SwarmManifest& manifest, const SwarmTruth& truth,
+                                             double after_s);
+
+/// Scores both again over the stamps that they have in common, pair by pair; availability remains
+/// that of all rows.
+void score_common_rows(SwarmScore& a, SwarmScore& b, const SwarmManifest& manifest,
+                       const SwarmTruth& truth, double after_s);
+
+}  // namespace crepes

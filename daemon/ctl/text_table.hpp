@@ -1,0 +1,15 @@
+/// Columns that line up in a terminal.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace crepes {
+
+/// Rows of cells; the first row is the header. The first column is flush left, all others right.
+[[nodiscard]] std::string text_table(const std::vector<std::vector<std::string>>& rows);
+
+/// `value` with so many decimals; "-" if it is not finite.
+[[nodiscard]] std::string fixed(double value, int decimals);
+
+}  // namespace crepes
