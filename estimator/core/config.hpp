@@ -104,7 +104,8 @@ struct CameraConfig {
   void visit(Visitor& v) {
     v.required("name", name, "camera name");
     v.choice("camera_model", camera_model, kCameraModels, "projection model, Kalibr's name");
-    v.required("intrinsics", intrinsics, "ds: [xi, alpha, fx, fy, cx, cy]");
+    v.required("intrinsics", intrinsics,
+               "the camera's calibration, ds: [xi, alpha, fx, fy, cx, cy]");
     v.required("resolution", resolution, Bounds{16, 2048}, "[width, height] in pixels");
     v.field("rate_hz", rate_hz, Bounds{10, 1000}, "frames a second");
     v.required("T_cam_imu", T_cam_imu, "4x4, maps body coordinates to camera coordinates (Kalibr)");

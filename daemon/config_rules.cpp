@@ -1,0 +1,194 @@
+#include "daemon/config_rules.hpp"
+
+#include <arpa/inet.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <map>
+
+namespace crepes {
+namespace {
+
+using Faults = std::vector<RuleFault>;
+
+constexpr std::size_t kMinSlots = 8;
+constexpr std::size_t kMaxSlots = 32;
+constexpr double kMinDutyStep = 0.01;
+constexpr std::size_t kMaxCameras = 16;
+
+std::string item(const std::string& list, std::size_t i) {
+  return list + "[" + std::to_string(i) + "]";
+}
+
+/// Names become parts of file names and of datagrams.
+bool is_plain_name(const std::string& name) {
+  constexpr std::size_t kMaxLength = 32;
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-';
+  };
+  return !name.empty() && name.size() <= kMaxLength && std::ranges::all_of(name, is_plain);
+}
+
+void check_name(const std::string& key, const std::string& name, Faults& faults) {
+  if (!is_plain_name(name))
+    faults.push_back({key, "a name is 1 to 32 letters, digits, - or _, not \"" + name + '"'});
+}
+
+/// Tells each element whose value an earlier one has. `value_of` empty: no value to compare.
+template <class T, class ValueOf>
+void check_unique(const std::string& list, const std::string& key, const std::vector<T>& items,
+                  const ValueOf& value_of, Faults& faults) {
+  std::map<std::string, std::size_t> first;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    const std::string value = value_of(items[i]);
+    if (value.empty()) continue;
+    const auto [it, inserted] = first.emplace(value, i);
+    if (!inserted)
+      faults.push_back({item(list, i) + key, value + " is taken by " + item(list, it->second)});
+  }
+}
+
+/// The shortest word whose repetition is the pattern: all that a camera can tell.
+std::string primitive_root(const std::string& pattern) {
+  const std::size_t period = (pattern + pattern).find(pattern, 1);
+  return pattern.substr(0, period);
+}
+
+/// Whether two patterns that repeat for ever differ in phase only.
+bool are_cyclic_shifts(const std::string& a, const std::string& b) {
+  const std::string root_a = primitive_root(a);
+  const std::string root_b = primitive_root(b);
+  return root_a.size() == root_b.size() && (root_a + root_a).find(root_b) != std::string::npos;
+}
+
+std::string pattern_fault(const std::string& pattern) {
+  if (pattern.find_first_not_of("01") != std::string::npos)
+    return "a pattern is made of 0 and 1 only, not \"" + pattern + '"';
+  if (pattern.size() < kMinSlots || pattern.size() > kMaxSlots)
+    return "a pattern has 8 to 32 slots, not " + std::to_string(pattern.size());
+  if (primitive_root(pattern).size() == 1) return "a pattern has both lit and dark slots";
+  return "";
+}
+
+/// Both must be free of faults of their own.
+std::string code_conflict(const MemberConfig& a, const MemberConfig& b) {
+  if (a.pattern && b.pattern && are_cyclic_shifts(*a.pattern, *b.pattern))
+    return "the same pattern, shifted, as that of ";
+  if (a.duty && b.duty && std::abs(*a.duty - *b.duty) < kMinDutyStep)
+    return "within 0.01 of the duty of ";
+  return "";
+}
+
+void check_codes(const std::vector<MemberConfig>& members, Faults& faults) {
+  std::vector<bool> sound(members.size(), true);
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const MemberConfig& member = members[i];
+    const std::string key = item("swarm.members", i);
+    const std::size_t before = faults.size();
+    if (member.pattern.has_value() == member.duty.has_value())
+      faults.push_back({key, "give exactly one of pattern and duty"});
+    if (member.pattern) {
+      const std::string reason = pattern_fault(*member.pattern);
+      if (!reason.empty()) faults.push_back({key + ".pattern", reason});
+    }
+    sound[i] = faults.size() == before;
+    for (std::size_t j = 0; sound[i] && j < i; ++j) {
+      const std::string conflict = sound[j] ? code_conflict(members[j], member) : "";
+      if (conflict.empty()) continue;
+      faults.push_back(
+          {key + (member.pattern ? ".pattern" : ".duty"),
+           conflict + item("swarm.members", j) + ": no camera can tell the two apart"});
+      break;
+    }
+  }
+}
+
+void check_members(const Config& config, Faults& faults) {
+  const std::vector<MemberConfig>& members = config.swarm.members;
+  if (members.empty())
+    faults.push_back({"swarm.members", "is empty: list every robot, this one too"});
+  for (std::size_t i = 0; i < members.size(); ++i)
+    check_name(item("swarm.members", i) + ".name", members[i].name, faults);
+
+  const auto id_text = [](int id) { return id == 0 ? std::string() : std::to_string(id); };
+  check_unique(
+      "swarm.members", ".id", members, [&](const MemberConfig& m) { return id_text(m.id.value); },
+      faults);
+  check_unique("swarm.members", ".name", members, std::mem_fn(&MemberConfig::name), faults);
+  check_unique(
+      "swarm.members", ".uwb_id", members,
+      [&](const MemberConfig& m) { return id_text(m.uwb_id.value_or(m.id.value)); }, faults);
+  check_codes(members, faults);
+
+  const auto has_member = [&](RobotId id) {
+    return std::ranges::count(members, id, &MemberConfig::id) > 0;
+  };
+  const bool all_read = config.robot.id != RobotId{} && !has_member(RobotId{});
+  if (all_read && !has_member(config.robot.id))
+    faults.push_back(
+        {"robot.id", std::to_string(config.robot.id.value) + " is not among swarm.members"});
+}
+
+/// Usenko, Demmel, Cremers 2018: xi in (-1, 1), alpha in [0, 1], positive focal lengths.
+void check_double_sphere(const std::string& key, const CameraConfig& camera, Faults& faults) {
+  const std::vector<double>& v = camera.intrinsics;
+  if (v.size() != 6) {
+    faults.push_back(
+        {key, "ds has 6 intrinsics (xi, alpha, fx, fy, cx, cy), not " + std::to_string(v.size())});
+    return;
+  }
+  if (!(v[0] > -1 && v[0] < 1)) faults.push_back({key, "xi, the first, is outside (-1, 1)"});
+  if (!(v[1] >= 0 && v[1] <= 1)) faults.push_back({key, "alpha, the second, is outside [0, 1]"});
+  if (!(v[2] > 0 && v[3] > 0))
+    faults.push_back({key, "fx and fy, third and fourth, must be positive"});
+  const auto [width, height] = camera.resolution;
+  if (width > 0 && !(v[4] >= 0 && v[4] <= width && v[5] >= 0 && v[5] <= height))
+    faults.push_back({key, "cx, cy, the last two, lie outside the resolution"});
+}
+
+void check_cameras(const std::vector<CameraConfig>& cameras, Faults& faults) {
+  if (cameras.empty())
+    faults.push_back({"cameras", "is empty: without a camera nobody is recognized"});
+  if (cameras.size() > kMaxCameras) faults.push_back({"cameras", "more than 16"});
+  check_unique("cameras", ".name", cameras, std::mem_fn(&CameraConfig::name), faults);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const std::string key = item("cameras", i);
+    check_name(key + ".name", cameras[i].name, faults);
+    check_double_sphere(key + ".intrinsics", cameras[i], faults);
+    if (cameras[i].driver == CameraDriver::kFolder && cameras[i].folder.empty())
+      faults.push_back({key + ".folder", "driver folder needs the directory of the pictures"});
+  }
+}
+
+bool is_loopback(const std::string& address) {
+  in_addr v4{};
+  if (::inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
+  in6_addr v6{};
+  return ::inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+}
+
+void check_network(const Config& config, Faults& faults) {
+  if (config.net.port == config.subscription.port)
+    faults.push_back({"subscription.port", "is taken by net.port"});
+  for (const std::string& address : config.subscription.listen) {
+    if (!is_loopback(address))
+      faults.push_back({"subscription.listen", '"' + address + "\" is not a loopback address"});
+  }
+}
+
+}  // namespace
+
+std::vector<RuleFault> validate(const Config& config) {
+  Faults faults;
+  check_members(config, faults);
+  check_cameras(config.cameras, faults);
+  check_network(config, faults);
+  if (config.vision.min_area_px2 >= config.vision.max_area_px2)
+    faults.push_back({"vision.max_area_px2", "must be above min_area_px2"});
+  return faults;
+}
+
+}  // namespace crepes

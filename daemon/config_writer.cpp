@@ -1,0 +1,66 @@
+#include "daemon/config_writer.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+namespace crepes {
+namespace {
+
+template <class Numbers>
+std::string flow_list(const Numbers& values) {
+  std::string text = "[";
+  for (const auto& value : values) text += (text.size() > 1 ? ", " : "") + yaml_of(value);
+  return text + "]";
+}
+
+}  // namespace
+
+std::string yaml_of(bool value) { return value ? "true" : "false"; }
+
+std::string yaml_of(int value) { return std::to_string(value); }
+
+/// The shortest text that reads back as the same number, without an exponent where it is readable.
+std::string yaml_of(double value) {
+  const double size = std::abs(value);
+  const bool is_plain = size == 0 || (size >= 1e-6 && size < 1e12);
+  std::array<char, 32> buffer{};
+  const auto end = std::to_chars(buffer.begin(), buffer.end(), value,
+                                 is_plain ? std::chars_format::fixed : std::chars_format::general)
+                       .ptr;
+  return {buffer.begin(), end};
+}
+
+/// Always quoted, so that no text reads back as something else.
+std::string yaml_of(const std::string& value) {
+  std::string text = "\"";
+  for (const char c : value) {
+    if (static_cast<unsigned char>(c) < 0x20) {
+      std::array<char, 8> escaped{};
+      std::snprintf(escaped.data(), escaped.size(), "\\x%02x", static_cast<unsigned>(c));
+      text += escaped.data();
+      continue;
+    }
+    if (c == '"' || c == '\\') text += '\\';
+    text += c;
+  }
+  return text + '"';
+}
+
+std::string yaml_of(const RobotId& value) { return std::to_string(value.value); }
+std::string yaml_of(const Eigen::Vector3d& value) { return flow_list(value); }
+std::string yaml_of(const std::array<int, 2>& value) { return flow_list(value); }
+std::string yaml_of(const std::vector<double>& value) { return flow_list(value); }
+std::string yaml_of(const std::vector<std::string>& value) { return flow_list(value); }
+
+/// Rotations are rounded to 1e-12, so that quarter turns are written as such.
+std::string yaml_of(const Pose& value) {
+  constexpr double kPerUnit = 1e12;
+  Eigen::Matrix<double, 3, 4> top;
+  top << ((value.R() * kPerUnit).array().round() / kPerUnit + 0.0).matrix(), value.p;
+  std::string text = "[";
+  for (const auto& row : top.rowwise()) text += flow_list(row) + ", ";
+  return text + "[0, 0, 0, 1]]";
+}
+
+}  // namespace crepes

@@ -1,0 +1,112 @@
+/// Walks a config struct's `visit()` and writes it as YAML, each key below its meaning.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimator/core/config.hpp"
+
+namespace crepes {
+
+/// One value as YAML, in one line (a pose: four rows, each at `indent`).
+[[nodiscard]] std::string yaml_of(bool value);
+[[nodiscard]] std::string yaml_of(int value);
+[[nodiscard]] std::string yaml_of(double value);
+[[nodiscard]] std::string yaml_of(const std::string& value);
+[[nodiscard]] std::string yaml_of(const RobotId& value);
+[[nodiscard]] std::string yaml_of(const Eigen::Vector3d& value);
+[[nodiscard]] std::string yaml_of(const std::array<int, 2>& value);
+[[nodiscard]] std::string yaml_of(const std::vector<double>& value);
+[[nodiscard]] std::string yaml_of(const std::vector<std::string>& value);
+[[nodiscard]] std::string yaml_of(const Pose& value);
+
+/// The visitor for one mapping; nested ones follow with more indentation.
+class ConfigWriter {
+ public:
+  explicit ConfigWriter(std::string indent = "") : indent_(std::move(indent)) {}
+
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+  template <class T>
+  void required(std::string_view key, T& value, std::string_view help) {
+    write(key, value, std::string(help) + "; required");
+  }
+  template <class T>
+  void required(std::string_view key, T& value, Bounds bounds, std::string_view help) {
+    write(key, value, std::string(help) + range_of(bounds) + "; required");
+  }
+  template <class T>
+  void field(std::string_view key, T& value, std::string_view help) {
+    write(key, value, std::string(help));
+  }
+  template <class T>
+  void field(std::string_view key, T& value, Bounds bounds, std::string_view help) {
+    write(key, value, std::string(help) + range_of(bounds));
+  }
+
+  template <class Enum, std::size_t N>
+  void choice(std::string_view key, Enum& value, const std::array<Choice<Enum>, N>& choices,
+              std::string_view help) {
+    std::string names;
+    std::string chosen;
+    for (const Choice<Enum>& choice : choices) {
+      names += (names.empty() ? "" : " | ") + std::string(choice.name);
+      if (choice.value == value) chosen = choice.name;
+    }
+    comment(std::string(help) + " (" + names + ")");
+    line(std::string(key) + ": " + chosen);
+  }
+
+  template <class Section>
+  void section(std::string_view key, Section& section, std::string_view help) {
+    text_ += '\n';
+    comment(std::string(help));
+    line(std::string(key) + ":");
+    nest(section, indent_ + "  ");
+  }
+
+  template <class Item>
+  void list(std::string_view key, std::vector<Item>& items, std::string_view help) {
+    text_ += '\n';
+    comment(std::string(help) + "; required");
+    line(std::string(key) + ":");
+    for (Item& item : items) {
+      line("  -");
+      nest(item, indent_ + "    ");
+    }
+  }
+
+ private:
+  template <class T>
+  void write(std::string_view key, const T& value, const std::string& help) {
+    comment(help);
+    line(std::string(key) + ": " + yaml_of(value));
+  }
+  /// A value that is not there stays a comment.
+  template <class T>
+  void write(std::string_view key, const std::optional<T>& value, const std::string& help) {
+    comment(help);
+    line(value ? std::string(key) + ": " + yaml_of(*value) : "# " + std::string(key) + ":");
+  }
+
+  template <class Struct>
+  void nest(Struct& nested, const std::string& indent) {
+    ConfigWriter writer(indent);
+    nested.visit(writer);
+    text_ += writer.text();
+  }
+
+  [[nodiscard]] static std::string range_of(const Bounds& bounds) {
+    return " [" + yaml_of(bounds.min) + " .. " + yaml_of(bounds.max) + "]";
+  }
+  void comment(const std::string& text) { line("# " + text); }
+  void line(const std::string& text) { text_ += indent_ + text + '\n'; }
+
+  std::string indent_;
+  std::string text_;
+};
+
+}  // namespace crepes
