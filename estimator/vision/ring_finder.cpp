@@ -13,6 +13,7 @@ constexpr double kMaxSpacing = 60.0;  // px between LEDs: the ring at 0.3 m
 constexpr double kMinSpacing = 3.0;   // px; closer ones are one blob
 constexpr double kSimilarArea = 4.0;
 constexpr double kCenterTolerance = 0.15;  // of the ring's radius
+constexpr double kMaxCornerCosine = -0.1;
 constexpr double kSpacingTolerance = 2.2;  // longer to shorter side, as a tilted ring shows
 
 }  // namespace
@@ -73,6 +74,10 @@ void RingFinder::join(std::vector<Blob>& blobs) {
         if (near[c].distance > kSpacingTolerance * near[a].distance) continue;
         const Blob& first = blobs[near[a].blob];
         const Blob& last = blobs[near[c].blob];
+        // The corner at b is 120 degrees, less when the ring is tilted.
+        const double dot = (first.mean_u() - b.mean_u()) * (last.mean_u() - b.mean_u()) +
+                           (first.mean_v() - b.mean_v()) * (last.mean_v() - b.mean_v());
+        if (dot > kMaxCornerCosine * near[a].distance * near[c].distance) continue;
         const double u = first.mean_u() + last.mean_u() - b.mean_u();
         const double v = first.mean_v() + last.mean_v() - b.mean_v();
         votes_.push_back({u,
@@ -114,7 +119,7 @@ void RingFinder::join(std::vector<Blob>& blobs) {
         include(votes_[j - 1]);
       for (std::size_t j = i; j < votes_.size() && votes_[j].u - seed.u <= tolerance; ++j)
         include(votes_[j]);
-      if (count < least || agreeing < 2) continue;
+      if (count < least || agreeing + 2 < count) continue;
       Blob& whole = blobs[members[0]];
       for (std::size_t m = 1; m < count; ++m) absorb(whole, blobs[members[m]]);
       whole.has_center = true;

@@ -82,8 +82,8 @@ Detection SpotDetector::detect(const GrayImage& image) {
   if (!scan(image)) return {{}, threshold_, Exposure::kBright};
   link_rows();
   measure(image);
-  join_fragments();
   rings_.join(blobs_);
+  join_fragments();
   select();
   return {spots_, threshold_, runs_.empty() ? Exposure::kDark : Exposure::kGood};
 }

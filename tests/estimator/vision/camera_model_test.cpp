@@ -36,7 +36,7 @@ Eigen::Vector3d any_direction(double max_angle) {
 }
 
 TEST(CameraModel, UnprojectsWhatItProjectedForEveryParameterSet) {
-  rc::check([] {
+  EXPECT_TRUE(rc::check([] {
     const CameraModel camera = any_camera();
     const Eigen::Vector3d u = any_direction(std::numbers::pi);
     const double depth_m = uniform(0.1, 50.0);
@@ -49,7 +49,7 @@ TEST(CameraModel, UnprojectsWhatItProjectedForEveryParameterSet) {
     RC_PRE(J.norm() < 1e4 && (J * J.transpose()).determinant() > 1e2 * J.squaredNorm());
 
     RC_ASSERT((*camera.unproject(*uv) - u).norm() < 1e-10);
-  });
+  }));
 }
 
 /// A pixel within the image circle of `fisheye()`, which does not reach the sensor's corners.
@@ -61,7 +61,7 @@ Eigen::Vector2d any_pixel() {
 
 TEST(CameraModel, ProjectsWhatItUnprojectedAllOverTheImageCircle) {
   const CameraModel camera = *CameraModel::from(fisheye());
-  rc::check([&] {
+  EXPECT_TRUE(rc::check([&] {
     const Eigen::Vector2d uv = any_pixel();
 
     const auto u = camera.unproject(uv);
@@ -71,7 +71,7 @@ TEST(CameraModel, ProjectsWhatItUnprojectedAllOverTheImageCircle) {
     const auto back = camera.project(3.0 * *u);
     RC_ASSERT(back.has_value());
     RC_ASSERT((*back - uv).norm() < 1e-9);
-  });
+  }));
 }
 
 TEST(CameraModel, LooksAlongTheOpticalAxisAtThePrincipalPoint) {
@@ -92,7 +92,7 @@ TEST(CameraModel, IsAPinholeWhenBothSpheresVanish) {
 }
 
 TEST(CameraModel, ProjectionJacobianMatchesDifferences) {
-  rc::check([] {
+  EXPECT_TRUE(rc::check([] {
     const CameraModel camera = any_camera();
     const Eigen::Vector3d p_C = uniform(0.5, 5.0) * any_direction(1.4);
     CameraModel::ProjectionJacobian J;
@@ -108,12 +108,12 @@ TEST(CameraModel, ProjectionJacobianMatchesDifferences) {
       // Second differences are of order J^2 / f * step^2.
       RC_ASSERT(((*ahead - *behind) / (2.0 * kStep) - J.col(i)).norm() < 1e-5 * (1.0 + J.norm()));
     }
-  });
+  }));
 }
 
 TEST(CameraModel, UnprojectionJacobianMatchesDifferences) {
   const CameraModel camera = *CameraModel::from(fisheye());
-  rc::check([&] {
+  EXPECT_TRUE(rc::check([&] {
     const Eigen::Vector2d uv = any_pixel();
     CameraModel::UnprojectionJacobian J;
     RC_ASSERT(camera.unproject(uv, &J).has_value());
@@ -125,7 +125,7 @@ TEST(CameraModel, UnprojectionJacobianMatchesDifferences) {
           (*camera.unproject(uv + d) - *camera.unproject(uv - d)) / (2.0 * kStep);
       RC_ASSERT((slope - J.col(i)).norm() < 1e-9);
     }
-  });
+  }));
 }
 
 TEST(CameraModel, SeesNothingBehindItAtItsCenterOrOutsideTheImageCircle) {
