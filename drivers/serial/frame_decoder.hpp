@@ -1,0 +1,90 @@
+/// Finds frames in a byte stream; touches no device.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "estimator/core/contract.hpp"
+
+namespace crepes {
+
+using Bytes = std::span<const std::uint8_t>;
+
+/// What stands at the beginning of some bytes.
+enum class FrameKind : std::uint8_t {
+  kNone,         ///< nothing that this protocol sends
+  kIncomplete,   ///< a frame so far, more bytes will tell
+  kBadChecksum,  ///< a frame but for its checksum
+  kForeign,      ///< what this device sends when it is set up for something else
+  kComplete,     ///< a frame of `length` bytes
+};
+
+struct FrameCheck {
+  FrameKind kind = FrameKind::kNone;
+  std::size_t length = 0;
+};
+
+template <class Protocol>
+concept FrameProtocol = requires(Bytes bytes) {
+  /// Told from at least one byte; never kIncomplete on kMaxFrame bytes or more.
+  { Protocol::examine(bytes) } -> std::same_as<FrameCheck>;
+  { Protocol::kMaxFrame } -> std::convertible_to<std::size_t>;
+};
+
+/// Totals since the start; `..._in_a_row` since the last good frame.
+struct DecoderCounts {
+  std::uint64_t frames = 0;
+  std::uint64_t skipped_bytes = 0;
+  std::uint64_t checksum_failures = 0;
+  std::uint64_t skipped_in_a_row = 0;
+  std::uint64_t foreign_in_a_row = 0;
+};
+
+/// Frames come out whole and in order, however the stream is cut. After a false start it resumes
+/// one byte further, so that no corrupt byte costs a frame that it is not part of.
+template <FrameProtocol Protocol>
+class FrameDecoder {
+ public:
+  /// Calls `on_frame(Bytes)` for every frame that `chunk` completes.
+  template <class OnFrame>
+  void feed(Bytes chunk, OnFrame&& on_frame) {
+    pending_.insert(pending_.end(), chunk.begin(), chunk.end());
+    std::size_t start = 0;
+    while (start < pending_.size()) {
+      const Bytes rest = Bytes(pending_).subspan(start);
+      const FrameCheck check = Protocol::examine(rest);
+      if (check.kind == FrameKind::kIncomplete) {
+        CREPES_EXPECT(rest.size() < Protocol::kMaxFrame, "a protocol knows its longest frame");
+        break;
+      }
+      count(check.kind);
+      if (check.kind == FrameKind::kComplete) on_frame(rest.first(check.length));
+      start += check.kind == FrameKind::kComplete ? check.length : 1;
+    }
+    pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(start));
+  }
+
+  [[nodiscard]] const DecoderCounts& counts() const { return counts_; }
+
+ private:
+  void count(FrameKind kind) {
+    if (kind == FrameKind::kComplete) {
+      ++counts_.frames;
+      counts_.skipped_in_a_row = 0;
+      counts_.foreign_in_a_row = 0;
+      return;
+    }
+    ++counts_.skipped_bytes;
+    ++counts_.skipped_in_a_row;
+    if (kind == FrameKind::kBadChecksum) ++counts_.checksum_failures;
+    if (kind == FrameKind::kForeign) ++counts_.foreign_in_a_row;
+  }
+
+  std::vector<std::uint8_t> pending_;
+  DecoderCounts counts_;
+};
+
+}  // namespace crepes

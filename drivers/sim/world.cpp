@@ -1,0 +1,149 @@
+#include "drivers/sim/world.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "drivers/sim/seeded_noise.hpp"
+#include "estimator/core/contract.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kDegree = kPi / 180.0;
+
+/// Draws the sines of one robot: amplitudes as asked, frequencies within +-20 %, any phase.
+class WaveSource {
+ public:
+  WaveSource(int seed, RobotId robot)
+      : noise_{0x6d6f74696f6eU, static_cast<std::uint64_t>(seed), robot.value} {}
+
+  Wave::Sine sine(double amplitude, double frequency_hz) {
+    const double stretch = 0.8 + 0.4 * noise_.uniform(next_++);
+    return {amplitude, 2.0 * kPi * frequency_hz * stretch, 2.0 * kPi * noise_.uniform(next_++)};
+  }
+
+  /// Two sines about `offset`, the second smaller and faster.
+  Wave wander(double offset, double amplitude, double frequency_hz) {
+    return {.offset = offset,
+            .sines = {sine(0.75 * amplitude, frequency_hz),
+                      sine(0.25 * amplitude, 2.3 * frequency_hz)}};
+  }
+
+ private:
+  SeededNoise noise_;
+  std::uint64_t next_ = 0;
+};
+
+/// Around a place at distance `radius` from the center in direction `bearing`, looking inwards.
+Motion multirotor(WaveSource waves, double radius, double bearing, double height) {
+  return {.rule = AttitudeRule::kThrust,
+          .x = waves.wander(radius * std::cos(bearing), 0.6, 0.17),
+          .y = waves.wander(radius * std::sin(bearing), 0.6, 0.17),
+          .z = waves.wander(height, 0.35, 0.13),
+          .yaw = waves.wander(bearing + kPi, 20.0 * kDegree, 0.12),
+          .pitch = {},
+          .roll = {}};
+}
+
+/// On level ground, otherwise as a multirotor.
+Motion ground_robot(WaveSource waves, double radius, double bearing) {
+  return {.rule = AttitudeRule::kEuler,
+          .x = waves.wander(radius * std::cos(bearing), 0.5, 0.09),
+          .y = waves.wander(radius * std::sin(bearing), 0.5, 0.09),
+          .z = {.offset = 0.3},
+          .yaw = waves.wander(bearing + kPi, 20.0 * kDegree, 0.1),
+          .pitch = {},
+          .roll = {}};
+}
+
+/// Carried around a circle of 4 m across, looking inwards, swung about all axes.
+Motion hand_held(WaveSource waves, double bearing) {
+  constexpr double kRadius = 2.0;
+  constexpr double kTurn = 0.5;  // rad/s
+  Motion motion{.rule = AttitudeRule::kEuler,
+                .x = waves.wander(0.0, 0.15, 0.6),
+                .y = waves.wander(0.0, 0.15, 0.6),
+                .z = waves.wander(1.4, 0.25, 0.5),
+                .yaw = waves.wander(bearing + kPi, 45.0 * kDegree, 0.8),
+                .pitch = waves.wander(0.0, 25.0 * kDegree, 0.9),
+                .roll = waves.wander(0.0, 35.0 * kDegree, 0.7)};
+  motion.x.sines.push_back({kRadius, kTurn, bearing + kPi / 2.0});  // radius cos(bearing + turn t)
+  motion.y.sines.push_back({kRadius, kTurn, bearing});
+  motion.yaw.slope_ps = kTurn;
+  return motion;
+}
+
+/// 5 m to 27.5 m along x and back within a minute.
+Wave excursion() { return {.offset = 16.25, .sines = {{11.25, 2.0 * kPi / 60.0, -kPi / 2.0}}}; }
+
+std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
+  const auto waves = [seed](std::uint16_t id) { return WaveSource(seed, RobotId{id}); };
+  switch (scenario) {
+    case SimScenario::kTwo:
+      return {{RobotId{1}, multirotor(waves(1), 2.0, 0.0, 1.4)},
+              {RobotId{2}, multirotor(waves(2), 2.0, kPi, 1.4)}};
+    case SimScenario::kFour:
+      return {{RobotId{1}, multirotor(waves(1), 3.5, 0.0, 1.4)},
+              {RobotId{2}, ground_robot(waves(2), 3.5, kPi / 2.0)},
+              {RobotId{3}, multirotor(waves(3), 3.5, kPi, 1.4)},
+              {RobotId{4}, ground_robot(waves(4), 3.5, -kPi / 2.0)}};
+    case SimScenario::kLongRange: {
+      Motion near = multirotor(waves(1), 0.0, kPi, 1.4);
+      Motion far = multirotor(waves(2), 0.0, 0.0, 1.4);
+      near.x = {};
+      far.x = excursion();
+      return {{RobotId{1}, near}, {RobotId{2}, far}};
+    }
+    case SimScenario::kAggressive:
+      return {{RobotId{1}, hand_held(waves(1), 0.0)}, {RobotId{2}, hand_held(waves(2), kPi)}};
+    case SimScenario::kOccluded: {
+      std::map<RobotId, Motion> motions;
+      for (std::uint16_t id = 1; id <= 5; ++id) {
+        const double bearing = 2.0 * kPi * (id - 1) / 5.0;
+        motions.emplace(RobotId{id}, id % 2 == 1 ? multirotor(waves(id), 3.5, bearing, 1.4)
+                                                 : ground_robot(waves(id), 3.5, bearing));
+      }
+      return motions;
+    }
+  }
+  CREPES_EXPECT(false, "every scenario has its motions");
+}
+
+}  // namespace
+
+SimWorld::SimWorld(const SimConfig& config)
+    : seed_(config.seed), motions_(motions_of(config.scenario, config.seed)) {
+  // Neighbors next to each other on the circle always see past it, the others now and then.
+  if (config.scenario == SimScenario::kOccluded) pillar_ = Pillar{.radius_m = 1.0};
+}
+
+std::vector<RobotId> SimWorld::robots() const {
+  std::vector<RobotId> ids;
+  for (const auto& [id, motion] : motions_) ids.push_back(id);
+  return ids;
+}
+
+BodyState SimWorld::state(RobotId robot, double t_s) const {
+  const auto it = motions_.find(robot);
+  CREPES_EXPECT(it != motions_.end(), "the robot is part of the scenario");
+  return it->second.at(t_s);
+}
+
+Pose SimWorld::T_B_N(RobotId observer, RobotId neighbor, double t_s) const {
+  return T_W_B(observer, t_s).inverse() * T_W_B(neighbor, t_s);
+}
+
+bool SimWorld::is_occluded(const Eigen::Vector3d& p_W_from, const Eigen::Vector3d& p_W_to) const {
+  if (!pillar_) return false;
+  const Eigen::Vector2d start = p_W_from.head<2>() - pillar_->center_W;
+  const Eigen::Vector2d along = (p_W_to - p_W_from).head<2>();
+  const double length_sq = along.squaredNorm();
+  const double nearest =
+      length_sq > 0.0 ? std::clamp(-start.dot(along) / length_sq, 0.0, 1.0) : 0.0;
+  return (start + nearest * along).norm() < pillar_->radius_m;
+}
+
+}  // namespace crepes

@@ -1,0 +1,47 @@
+/// A world that is a function of seed and time, so that separate processes agree on it.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "drivers/sim/motion.hpp"
+#include "estimator/core/config.hpp"
+#include "estimator/core/measurements.hpp"
+
+namespace crepes {
+
+/// A vertical cylinder without end that hides robots from each other.
+struct Pillar {
+  Eigen::Vector2d center_W = Eigen::Vector2d::Zero();
+  double radius_m = 0.0;
+};
+
+/// The robots of a scenario, ids 1..n, in a z-up world W. Immutable: may be shared by threads.
+class SimWorld {
+ public:
+  /// Uses `scenario` and `seed` only.
+  explicit SimWorld(const SimConfig& config);
+
+  [[nodiscard]] std::vector<RobotId> robots() const;
+  [[nodiscard]] bool contains(RobotId robot) const { return motions_.contains(robot); }
+  [[nodiscard]] int seed() const { return seed_; }
+
+  /// Truth at world time `t_s`; the robot must exist.
+  [[nodiscard]] BodyState state(RobotId robot, double t_s) const;
+  [[nodiscard]] Pose T_W_B(RobotId robot, double t_s) const { return state(robot, t_s).T_W_B; }
+  /// The pose of `neighbor` as seen by `observer`.
+  [[nodiscard]] Pose T_B_N(RobotId observer, RobotId neighbor, double t_s) const;
+
+  /// Whether something stands between two points.
+  [[nodiscard]] bool is_occluded(const Eigen::Vector3d& p_W_from,
+                                 const Eigen::Vector3d& p_W_to) const;
+
+ private:
+  int seed_;
+  std::map<RobotId, Motion> motions_;
+  std::optional<Pillar> pillar_;
+};
+
+}  // namespace crepes
