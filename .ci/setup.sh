@@ -1,0 +1,27 @@
+# Sourced by test.sh, demo.sh and .ci/run: what all three begin with.
+
+step() { printf '\n== %s  (%s s)\n' "$*" "$SECONDS"; }
+
+# Installs what packages.txt lists and is not there.
+install_packages() {
+  local wanted missing=() as_root=()
+  mapfile -t wanted < <(grep -v -e '^#' -e '^$' packages.txt)
+  for package in "${wanted[@]}"; do
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
+      missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return
+  step "install ${missing[*]}"
+  [ "$(id -u)" -eq 0 ] || as_root=(sudo)
+  "${as_root[@]}" apt-get update -qq
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get install -y -qq --no-install-recommends "${missing[@]}"
+}
+
+# build PRESET: configures and builds all targets.
+build() {
+  step "build $1"
+  mkdir -p build
+  cmake --preset "$1" >build/"$1".log 2>&1 || { cat build/"$1".log; return 1; }
+  cmake --build --preset "$1"
+}

@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# Four crepesd processes localize each other live.  ./demo.sh [--for SECONDS] [...]
+set -euo pipefail
+cd "$(dirname "$0")"
+. .ci/setup.sh
+
+install_packages
+build release
+exec build/release/daemon/crepesctl demo "$@"
