@@ -1,0 +1,224 @@
+#include "estimator/vision/blink_tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Boards and lamps in front of one camera at 200 Hz; positions in a world whose axes are the
+/// body's at rest, origin at the body.
+class BlinkTrackerTest : public testing::Test {
+ protected:
+  struct Board {
+    std::size_t code;  ///< index into the library
+    std::function<Eigen::Vector3d(double)> p_W;
+  };
+
+  static SwarmConfig swarm() {
+    SwarmConfig swarm;
+    for (const char* pattern : {"001001011111111111", "001010101111111111", "001011110011111111"}) {
+      MemberConfig member;
+      member.id = RobotId{static_cast<std::uint16_t>(swarm.members.size() + 1)};
+      member.pattern = pattern;
+      swarm.members.push_back(member);
+    }
+    return swarm;
+  }
+  static CameraConfig camera() {
+    CameraConfig config;
+    config.name = "cam0";
+    config.intrinsics = {-0.1723, 0.5931, 316.9, 316.8, 638.2, 512.5};
+    config.resolution = {1280, 1024};
+    Eigen::Matrix3d R_C_B;
+    R_C_B << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+    config.T_cam_imu = {Eigen::Vector3d(0.0, 0.01, -0.06), Eigen::Quaterniond(R_C_B)};
+    config.timeshift_cam_imu = 0.002;
+    return config;
+  }
+
+  std::vector<Bearing> step() {
+    now_ += 5ms;
+    const Timestamp body = now_ + 2ms;
+    const double t = to_seconds(body.time_since_epoch()) - 100.0;
+    q_W_B_ = Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rate_radps_ * t, Eigen::Vector3d::UnitZ()));
+    ImuSample imu;
+    imu.stamp = body;
+    imu.gyro_radps = {0.0, 0.0, yaw_rate_radps_};
+    tracker_.add_imu(imu);
+
+    SpotFrame frame;
+    frame.stamp = now_;
+    std::normal_distribution<double> noise(0.0, 0.2);
+    for (std::size_t i = 0; i < boards_.size(); ++i) {
+      const Board& board = boards_[i];
+      if (board.code < 3 && !library_.entries()[board.code].code.is_lit(body.time_since_epoch() +
+                                                                        Duration{i * 37'000'000}))
+        continue;
+      const Eigen::Vector3d p_B = q_W_B_.conjugate() * board.p_W(t);
+      const auto uv = model_.project(camera_.T_cam_imu * p_B);
+      if (uv && model_.contains(*uv))
+        frame.spots.push_back({uv->x() + noise(random_), uv->y() + noise(random_), 12.0, 255.0});
+    }
+    // Two boards within a few pixels are one spot.
+    for (std::size_t i = 0; i + 1 < frame.spots.size(); ++i)
+      for (std::size_t j = i + 1; j < frame.spots.size(); ++j)
+        if (std::hypot(frame.spots[i].u_px - frame.spots[j].u_px,
+                       frame.spots[i].v_px - frame.spots[j].v_px) < 4.0) {
+          frame.spots[i].u_px = 0.5 * (frame.spots[i].u_px + frame.spots[j].u_px);
+          frame.spots[i].v_px = 0.5 * (frame.spots[i].v_px + frame.spots[j].v_px);
+          frame.spots.erase(frame.spots.begin() + static_cast<std::ptrdiff_t>(j--));
+        }
+    std::shuffle(frame.spots.begin(), frame.spots.end(), random_);
+    frame_ = frame;
+    return tracker_.step(frame);
+  }
+
+  /// Angle between a bearing and the board it names [rad].
+  double error_of(const Bearing& bearing, std::size_t board) const {
+    const double t = to_seconds(bearing.stamp.time_since_epoch()) - 100.0;
+    const Eigen::Vector3d p_B = q_W_B_.conjugate() * boards_[board].p_W(t);
+    return std::acos(std::min(1.0, (p_B - bearing.p_B_C).normalized().dot(bearing.u_B)));
+  }
+
+  CameraConfig camera_ = camera();
+  CameraModel model_ = *CameraModel::from(camera_);
+  IdLibrary library_ = *IdLibrary::from(swarm());
+  BlinkTracker tracker_{camera_, model_, VisionConfig{}, library_};
+  std::vector<Board> boards_;
+  double yaw_rate_radps_ = 0.0;
+  Eigen::Quaterniond q_W_B_ = Eigen::Quaterniond::Identity();
+  Timestamp now_{100s};
+  SpotFrame frame_;
+  std::mt19937 random_{5};
+};
+
+TEST_F(BlinkTrackerTest, GivesBearingsInBodyAxesAndBodyTime) {
+  boards_ = {{0, [](double) { return Eigen::Vector3d(5.0, 1.0, 0.3); }}};
+  for (int i = 0; i < 100; ++i) (void)step();
+
+  std::vector<Bearing> bearings;
+  while (bearings.empty()) bearings = step();
+
+  ASSERT_EQ(bearings.size(), 1U);
+  EXPECT_EQ(bearings[0].neighbor, RobotId{1});
+  EXPECT_EQ(bearings[0].stamp, now_ + 2ms);
+  EXPECT_LT((bearings[0].p_B_C - Eigen::Vector3d(0.06, 0.0, 0.01)).norm(), 1e-12);
+  EXPECT_LT(error_of(bearings[0], 0), 5.0 * bearings[0].sigma_rad);
+  EXPECT_NEAR(bearings[0].sigma_rad, 0.3 / 317.0, 0.4 / 317.0);
+}
+
+TEST_F(BlinkTrackerTest, KeepsItsBoardsWhileItTurnsFiveHundredDegreesASecond) {
+  yaw_rate_radps_ = 500.0 / 57.29578;
+  boards_ = {{0, [](double t) {  // an orbiting board stays in view
+                const double a = 500.0 / 57.29578 * t;
+                return Eigen::Vector3d(5.0 * std::cos(a), 5.0 * std::sin(a), 0.0);
+              }}};
+  for (int i = 0; i < 200; ++i) (void)step();
+  // The same turn with boards that stand: in view for a sixth of a second or so at a time.
+  boards_ = {{0, [](double) { return Eigen::Vector3d(5.0, 0.0, 0.0); }},
+             {1, [](double) { return Eigen::Vector3d(0.0, 5.0, 1.0); }},
+             {2, [](double) { return Eigen::Vector3d(-5.0, 0.0, -1.0); }}};
+
+  int right = 0;
+  for (int i = 0; i < 1200; ++i)
+    for (const Bearing& bearing : step()) {
+      const double error = error_of(bearing, bearing.neighbor.value - 1U);
+      ASSERT_LT(error, 0.01);
+      ++right;
+    }
+
+  EXPECT_GT(right, 100);
+}
+
+TEST_F(BlinkTrackerTest, TellsCrossingBoardsApart) {
+  boards_ = {{0, [](double t) { return Eigen::Vector3d(5.0, -2.0 + 0.8 * t, 0.0); }},
+             {1, [](double t) { return Eigen::Vector3d(5.0, 2.0 - 0.8 * t, 0.02); }}};
+  int right = 0;
+  for (int i = 0; i < 1000; ++i)
+    for (const Bearing& bearing : step()) {
+      ASSERT_LT(error_of(bearing, bearing.neighbor.value - 1U), 0.015) << "frame " << i;
+      ++right;
+    }
+
+  EXPECT_GT(right, 1000);
+  EXPECT_GT(tracker_.status().merged_spots, 0U);
+}
+
+TEST_F(BlinkTrackerTest, DeliversAMirrorImageBesideTheBoardItself) {
+  boards_ = {{0, [](double) { return Eigen::Vector3d(5.0, 0.0, 0.5); }},
+             {0, [](double) { return Eigen::Vector3d(5.0, 0.0, -2.0); }}};
+  for (int i = 0; i < 200; ++i) (void)step();
+
+  int both = 0;
+  for (int i = 0; i < 100; ++i) both += step().size() == 2U ? 1 : 0;
+
+  EXPECT_GT(both, 30);
+}
+
+TEST_F(BlinkTrackerTest, FindsRobotsAmongTwoHundredLamps) {
+  boards_ = {{0, [](double t) { return Eigen::Vector3d(4.0, std::sin(t), 0.4); }},
+             {1, [](double t) { return Eigen::Vector3d(3.0, 2.0, 0.3 * std::cos(t)); }}};
+  for (int i = 0; i < 190; ++i) {
+    const Eigen::Vector3d p(4.0, -4.5 + 0.5 * (i % 19), -2.5 + 0.6 * (i / 19));
+    boards_.push_back({3, [p](double) { return p; }});
+  }
+  int right = 0;
+  for (int i = 0; i < 400; ++i)
+    for (const Bearing& bearing : step()) {
+      ASSERT_LE(bearing.neighbor.value, 2);
+      ASSERT_LT(error_of(bearing, bearing.neighbor.value - 1U), 0.02);
+      ++right;
+    }
+
+  EXPECT_GT(right, 300);
+  EXPECT_LE(tracker_.status().tracks, 512U);
+}
+
+TEST_F(BlinkTrackerTest, DoesNotCareForTheOrderOfSpots) {
+  BlinkTracker twin(camera_, model_, VisionConfig{}, library_);
+  boards_ = {{0, [](double t) { return Eigen::Vector3d(5.0, -1.0 + t, 0.0); }},
+             {1, [](double t) { return Eigen::Vector3d(5.0, 1.0 - t, 0.1); }},
+             {2, [](double) { return Eigen::Vector3d(5.0, 0.0, 0.5); }}};
+  for (int i = 0; i < 500; ++i) {
+    const std::vector<Bearing> bearings = step();
+    std::reverse(frame_.spots.begin(), frame_.spots.end());
+    ImuSample imu;
+    imu.stamp = now_ + 2ms;
+    twin.add_imu(imu);
+    const std::vector<Bearing> mirrored = twin.step(frame_);
+
+    ASSERT_EQ(bearings.size(), mirrored.size());
+    for (std::size_t k = 0; k < bearings.size(); ++k) {
+      ASSERT_EQ(bearings[k].neighbor, mirrored[k].neighbor);
+      ASSERT_EQ(bearings[k].u_B, mirrored[k].u_B);
+    }
+  }
+}
+
+TEST_F(BlinkTrackerTest, RefusesAndCountsWhatMakesNoSense) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  SpotFrame frame;
+  frame.stamp = now_;
+  frame.spots = {{kNan, 10.0, 5.0, 255.0}, {640.0, 512.0, kNan, 255.0}, {1e9, 0.0, 5.0, 255.0}};
+  ImuSample imu;
+  imu.stamp = now_;
+  imu.gyro_radps.x() = kNan;
+
+  (void)tracker_.step(frame);
+  (void)tracker_.step(frame);
+  tracker_.add_imu(imu);
+
+  const TrackerStatus status = tracker_.status();
+  EXPECT_EQ(status.refused_spots, 3U);
+  EXPECT_EQ(status.refused_frames, 1U);
+  EXPECT_EQ(status.refused_imu, 1U);
+  EXPECT_EQ(status.tracks, 0U);
+}
+
+}  // namespace
+}  // namespace crepes

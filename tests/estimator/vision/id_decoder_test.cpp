@@ -1,0 +1,210 @@
+#include "estimator/vision/id_decoder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+#include <set>
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+
+SwarmConfig swarm_of(const std::vector<std::string>& patterns) {
+  SwarmConfig swarm;
+  for (const std::string& pattern : patterns) {
+    MemberConfig member;
+    member.id = RobotId{static_cast<std::uint16_t>(swarm.members.size() + 1)};
+    member.pattern = pattern;
+    swarm.members.push_back(member);
+  }
+  return swarm;
+}
+
+SwarmConfig four() {
+  return swarm_of(
+      {"011111111111111111", "001001011111111111", "001010101111111111", "001011110011111111"});
+}
+
+struct Camera {
+  double rate_hz = 200.0;
+  double flip_rate = 0.0;
+  double drop_rate = 0.0;
+  unsigned seed = 1;
+};
+
+using Light = std::function<bool(Duration)>;
+
+struct Outcome {
+  std::optional<Duration> first_id;  ///< since the first frame
+  std::set<int> ids;                 ///< ever given
+  int identified_frames = 0;
+  int lit_frames = 0;
+  std::optional<RobotId> last;
+};
+
+/// Shows `light` to an unsynchronized camera; lit frames are asked for the ID.
+Outcome watch(const IdDecoder& decoder, const Light& light, Duration duration, const Camera& camera,
+              Duration start = 17s, BlinkEvidence* kept = nullptr) {
+  std::mt19937 random(camera.seed);
+  std::uniform_real_distribution<double> chance(0.0, 1.0);
+  BlinkEvidence own;
+  BlinkEvidence& evidence = kept != nullptr ? *kept : own;
+  Outcome outcome;
+  const Duration frame = from_seconds(1.0 / camera.rate_hz);
+  for (Duration t{}; t < duration; t += frame) {
+    if (chance(random) < camera.drop_rate) continue;
+    const bool lit = light(t) != (chance(random) < camera.flip_rate);
+    const Timestamp stamp{start + t};
+    if (!lit) {
+      decoder.observe_dark(evidence, stamp);
+      continue;
+    }
+    decoder.observe_lit(evidence, stamp);
+    ++outcome.lit_frames;
+    outcome.last = decoder.id_of(evidence);
+    if (!outcome.last) continue;
+    ++outcome.identified_frames;
+    outcome.ids.insert(outcome.last->value);
+    if (!outcome.first_id) outcome.first_id = t;
+  }
+  return outcome;
+}
+
+/// A board with its own phase and an oscillator that is off.
+Light board(const BlinkCode& code, Duration phase, double ppm) {
+  return [&code, phase, ppm](Duration t) {
+    return code.is_lit(
+        phase + t +
+        Duration{static_cast<std::int64_t>(static_cast<double>(t.count()) * ppm * 1e-6)});
+  };
+}
+
+TEST(IdDecoder, NamesEveryBoardAtEveryPhaseAndRateAndNeverAnother) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, 0.02, 0.99);
+  std::mt19937 random(3);
+  std::vector<double> delays_ms;
+
+  for (int trial = 0; trial < 400; ++trial) {
+    const auto& [id, code] = library.entries()[static_cast<std::size_t>(trial) % 4];
+    const Duration phase{static_cast<std::int64_t>(random() % 180'000'000U)};
+    const double ppm = static_cast<double>(random() % 201U) - 100.0;
+    const double rate_hz = 120.0 + static_cast<double>(random() % 131U);
+    const Outcome seen = watch(decoder, board(code, phase, ppm), 3s, {.rate_hz = rate_hz});
+
+    ASSERT_EQ(seen.ids, std::set<int>{id.value})
+        << "rate " << rate_hz << " phase " << phase.count();
+    if (id != RobotId{1} && rate_hz >= 160.0) delays_ms.push_back(to_seconds(*seen.first_id) * 1e3);
+  }
+  std::sort(delays_ms.begin(), delays_ms.end());
+  // One pattern is 180 ms. Board 1 blinks so rarely that it takes more to tell it from a lamp, and
+  // slower cameras see some slots only once.
+  EXPECT_LT(delays_ms[delays_ms.size() / 2], 200.0);
+  EXPECT_LT(delays_ms[delays_ms.size() * 99 / 100], 360.0);
+}
+
+TEST(IdDecoder, IsNeverWrongWithFlippedAndDroppedFrames) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, 0.02, 0.99);
+  int wrong = 0;
+  int identified = 0;
+  int lit = 0;
+
+  for (unsigned trial = 0; trial < 100; ++trial) {
+    const auto& [id, code] = library.entries()[trial % 4];
+    const Outcome seen = watch(decoder, board(code, Duration{trial * 1'777'777}, 50.0), 10s,
+                               {.flip_rate = 0.02, .drop_rate = 0.05, .seed = trial});
+    for (const int given : seen.ids) wrong += given != id.value ? 1 : 0;
+    identified += seen.identified_frames;
+    lit += seen.lit_frames;
+  }
+
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GT(identified, 0.9 * lit);
+}
+
+TEST(IdDecoder, TakesNoLampForARobot) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, 0.02, 0.99);
+  const auto mains = [](double hz, double part) {
+    return [hz, part](Duration t) {
+      const double cycles = to_seconds(t) * hz;
+      return cycles - std::floor(cycles) < part;
+    };
+  };
+
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    const Camera camera{.flip_rate = 0.03, .seed = seed};
+    EXPECT_TRUE(watch(
+                    decoder, [](Duration) { return true; }, 20s, camera)
+                    .ids.empty());
+    for (const double part : {0.3, 0.6, 0.9}) {
+      EXPECT_TRUE(watch(decoder, mains(100.03, part), 10s, camera).ids.empty());
+      EXPECT_TRUE(watch(decoder, mains(119.96, part), 10s, camera).ids.empty());
+    }
+    std::mt19937 random(seed);
+    EXPECT_TRUE(watch(
+                    decoder, [&](Duration) { return random() % 3U > 0; }, 10s, camera)
+                    .ids.empty());
+  }
+}
+
+TEST(IdDecoder, TellsDutiesApart) {
+  SwarmConfig swarm = four();
+  swarm.members.pop_back();
+  double duty = 0.2;
+  for (MemberConfig& member : swarm.members) {
+    member.pattern.reset();
+    member.duty = duty;
+    duty += 0.2;
+  }
+  const IdLibrary library = *IdLibrary::from(swarm);
+  const IdDecoder decoder(library, 0.02, 0.99);
+
+  for (int trial = 0; trial < 60; ++trial) {
+    const auto& [id, code] = library.entries()[static_cast<std::size_t>(trial) % 3];
+    const Outcome seen = watch(decoder, board(code, Duration{trial * 1'234'567}, 30.0), 2s, {});
+
+    ASSERT_EQ(seen.ids, std::set<int>{id.value});
+    EXPECT_LT(*seen.first_id, Duration{400ms});
+  }
+}
+
+TEST(IdDecoder, TakesTheIdBackWhenTheTrackChangesHands) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, 0.02, 0.99);
+  for (std::size_t from = 0; from < 4; ++from)
+    for (std::size_t to = 0; to < 4; ++to) {
+      if (from == to) continue;
+      BlinkEvidence evidence;
+      const auto& first = library.entries()[from];
+      const auto& second = library.entries()[to];
+      ASSERT_EQ(watch(decoder, board(first.code, 3ms, 0.0), 2s, {}, 10s, &evidence).last, first.id);
+
+      const Light other = board(second.code, 47ms, 0.0);
+      const Outcome soon = watch(decoder, other, 200ms, {}, 12s, &evidence);
+      const Outcome later = watch(
+          decoder, [&](Duration t) { return other(t + 200ms); }, 2s, {}, 12200ms, &evidence);
+
+      EXPECT_NE(soon.last, first.id) << "a pattern and 20 ms later, " << from << " to " << to;
+      EXPECT_EQ(later.last, second.id);
+      EXPECT_EQ(later.ids.count(first.id.value), 0U);
+    }
+}
+
+TEST(IdDecoder, KeepsTheIdThroughAShortAbsence) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, 0.02, 0.99);
+  const Light light = board(library.entries()[1].code, 3ms, 20.0);
+
+  const Outcome seen =
+      watch(decoder, [&](Duration t) { return (t < 1s || t > 1120ms) && light(t); }, 1400ms, {});
+
+  EXPECT_EQ(seen.ids, std::set<int>{2});
+  EXPECT_EQ(seen.last, RobotId{2});
+}
+
+}  // namespace
+}  // namespace crepes
