@@ -1,0 +1,58 @@
+/// The tightest bounds on a clock's offset, one for every tenth of a second of a sliding window.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace crepes {
+
+/// "At time t the offset is at least (or at most) `offset`", in seconds.
+struct OffsetBound {
+  double t = 0.0;
+  double offset = 0.0;
+};
+
+class BoundEnvelope {
+ public:
+  static constexpr double kBucket = 0.1;  ///< s
+  static constexpr std::int64_t kBuckets = 300;
+  static constexpr double kWindow = kBucket * static_cast<double>(kBuckets);  ///< s
+
+  /// `sign` +1 keeps lower bounds (the largest are tight), -1 upper ones.
+  explicit BoundEnvelope(int sign) : sign_(sign), slots_(kBuckets) {}
+
+  /// Bounds of one bucket are compared along a line of slope `skew`. False: it is not tighter.
+  bool offer(const OffsetBound& bound, double skew) {
+    const std::int64_t bucket = bucket_of(bound.t);
+    Slot& slot = slots_[static_cast<std::size_t>(((bucket % kBuckets) + kBuckets) % kBuckets)];
+    const double gain =
+        sign_ * (bound.offset - slot.bound.offset - skew * (bound.t - slot.bound.t));
+    if (slot.used && (slot.bucket > bucket || (slot.bucket == bucket && gain <= 0))) return false;
+    slot = {true, bucket, bound};
+    return true;
+  }
+
+  /// All bounds of the window that ends at `now`, in no order.
+  [[nodiscard]] std::vector<OffsetBound> bounds(double now) const {
+    std::vector<OffsetBound> found;
+    found.reserve(slots_.size());
+    for (const Slot& slot : slots_)
+      if (slot.used && slot.bucket > bucket_of(now) - kBuckets) found.push_back(slot.bound);
+    return found;
+  }
+
+ private:
+  struct Slot {
+    bool used = false;
+    std::int64_t bucket = 0;
+    OffsetBound bound;
+  };
+
+  static std::int64_t bucket_of(double t) { return std::llround(std::floor(t / kBucket)); }
+
+  int sign_;
+  std::vector<Slot> slots_;
+};
+
+}  // namespace crepes

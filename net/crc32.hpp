@@ -1,0 +1,11 @@
+/// CRC-32 as in Ethernet and zlib (reflected polynomial 0xEDB88320).
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+namespace crepes {
+
+[[nodiscard]] std::uint32_t crc32(std::span<const std::uint8_t> bytes);
+
+}  // namespace crepes

@@ -1,0 +1,29 @@
+/// Where a datagram came from: an IPv4 or IPv6 address and a UDP port.
+#pragma once
+
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <string>
+
+namespace crepes {
+
+/// IPv4 addresses are kept as IPv4-mapped IPv6 (::ffff:a.b.c.d), so one form orders and compares.
+struct Endpoint {
+  std::array<std::uint8_t, 16> address{};
+  std::uint32_t scope = 0;  ///< interface of a link-local IPv6 address, 0 for others
+  std::uint16_t port = 0;
+
+  auto operator<=>(const Endpoint&) const = default;
+
+  [[nodiscard]] bool is_ipv4() const;
+  /// From this machine: 127.0.0.0/8 or ::1.
+  [[nodiscard]] bool is_loopback() const;
+  /// "127.0.0.1:47475" or "[::1]:47475".
+  [[nodiscard]] std::string to_string() const;
+
+  [[nodiscard]] static Endpoint ipv4(const std::array<std::uint8_t, 4>& address,
+                                     std::uint16_t port);
+};
+
+}  // namespace crepes

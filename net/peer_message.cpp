@@ -1,0 +1,572 @@
+#include "net/peer_message.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "estimator/core/contract.hpp"
+#include "net/byte_reader.hpp"
+#include "net/byte_writer.hpp"
+#include "net/crc32.hpp"
+#include "net/wire_codes.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr std::array<std::uint8_t, 3> kMagic{'C', 'R', 'P'};
+constexpr std::uint8_t kVersion = 1;
+constexpr std::size_t kHeader = 26;
+constexpr std::size_t kChecksum = 4;
+constexpr std::int64_t kTick = 10'000;  // ns
+constexpr std::int64_t kMaxStamp = 4'000'000'000'000'000'000;
+
+constexpr std::size_t kMaxEchoes = 10;
+constexpr std::size_t kMaxImu = 16;  // 160 ms at 100 Hz: one datagram in three may be lost
+constexpr std::size_t kEstimateBudget = 450;
+
+constexpr std::size_t kEchoSize = 14;
+constexpr std::size_t kImuSize = 14;
+constexpr std::size_t kCameraSize = 12;
+constexpr std::size_t kSourceSize = 3;
+constexpr std::size_t kBearingSize = 8;
+constexpr std::size_t kRangeSize = 10;
+constexpr std::size_t kEstimateSize = 78;
+constexpr std::size_t kMaxCount = 255;
+
+constexpr LogScale kBearingSigma{1e-5, 1.0, 255};
+constexpr double kMaxRange = 1e4;          // m
+constexpr double kMaxCoordinate = 1e6;     // m, m/s
+constexpr double kUnknownTiltSigma = 3.2;  // rad: half a turn, nothing is known
+constexpr int kMinExponent = -30;
+constexpr int kMaxExponent = 20;
+constexpr double kMaxCode = 32767.0;
+
+std::int64_t floor_to_ticks(std::int64_t ns) { return ns / kTick - (ns % kTick < 0 ? 1 : 0); }
+std::int64_t round_to_ticks(std::int64_t ns) { return floor_to_ticks(ns + kTick / 2); }
+
+/// Ticks from the datagram's own, where the wire's integer has room for them.
+template <class Integer>
+std::optional<Integer> ticks_from(std::int64_t base_tick, Timestamp stamp) {
+  const std::int64_t ticks = round_to_ticks(to_ns(stamp)) - base_tick;
+  if (!std::in_range<Integer>(ticks)) return std::nullopt;
+  return static_cast<Integer>(ticks);
+}
+
+bool is_robot(RobotId id) { return id.value >= 1 && id.value <= 65534; }
+
+bool is_writable(const ImuSample& sample) {
+  const double limit = std::ldexp(kMaxCode, kMaxExponent);
+  return sample.gyro_radps.cwiseAbs().maxCoeff() < limit &&
+         sample.accel_mps2.cwiseAbs().maxCoeff() < limit && sample.gyro_radps.allFinite() &&
+         sample.accel_mps2.allFinite();
+}
+
+bool is_unit(const Eigen::Vector3d& u) { return std::abs(u.norm() - 1) < 1e-3; }
+
+bool is_writable(const Bearing& bearing) {
+  return is_robot(bearing.neighbor) && is_unit(bearing.u_B) && bearing.p_B_C.allFinite() &&
+         bearing.p_B_C.cwiseAbs().maxCoeff() < kMaxCoordinate && bearing.sigma_rad > 0 &&
+         std::isfinite(bearing.sigma_rad);
+}
+
+bool is_writable(const UwbRange& range) {
+  return is_robot(range.neighbor) && range.range_m > 0 && range.range_m < kMaxRange &&
+         std::isfinite(range.first_path_dbm) && std::isfinite(range.received_dbm);
+}
+
+bool is_writable(const NeighborEstimate& estimate) {
+  const Pose& pose = estimate.T_B_N.pose;
+  return is_robot(estimate.neighbor) && pose.p.allFinite() && estimate.v_B_N.allFinite() &&
+         pose.p.cwiseAbs().maxCoeff() < kMaxCoordinate &&
+         estimate.v_B_N.cwiseAbs().maxCoeff() < kMaxCoordinate &&
+         std::abs(pose.q.norm() - 1) < 1e-3 &&
+         encode_covariance(estimate.T_B_N.covariance).has_value();
+}
+
+/// A bearing with its row in the table of sources.
+struct SourcedBearing {
+  const Bearing* bearing;
+  std::uint8_t source;
+};
+
+struct Source {
+  RobotId neighbor;
+  std::uint8_t camera;
+  bool operator==(const Source&) const = default;
+};
+
+/// Index of `item`, appended if new; `cost` grows by `size` then. Empty when the table is full.
+template <class Item>
+std::optional<std::uint8_t> index_in(std::vector<Item>& table, const Item& item, std::size_t size,
+                                     std::size_t& cost) {
+  const auto found = std::find(table.begin(), table.end(), item);
+  const auto index = static_cast<std::size_t>(found - table.begin());
+  if (index >= kMaxCount) return std::nullopt;
+  if (found == table.end()) {
+    table.push_back(item);
+    cost += size;
+  }
+  return static_cast<std::uint8_t>(index);
+}
+
+/// What goes into one datagram, chosen before anything is written.
+class Selection {
+ public:
+  explicit Selection(const OutgoingPeerMessage& message)
+      : base_tick_(floor_to_ticks(to_ns(message.sent))) {
+    choose_echoes(message);
+    choose_imu(message.report.imu);
+    choose_estimates(message.report.estimates, message.sequence);
+    choose_bearings_and_ranges(message.report);
+  }
+
+  std::vector<ClockEcho> echoes;
+  std::vector<const ImuSample*> imu;
+  std::vector<Eigen::Vector3d> cameras;
+  std::vector<Source> sources;
+  std::vector<SourcedBearing> bearings;
+  std::vector<const UwbRange*> ranges;
+  std::vector<const NeighborEstimate*> estimates;
+  std::size_t left_out = 0;
+  std::size_t refused = 0;
+
+ private:
+  template <class Item>
+  std::vector<const Item*> newest_first(const std::vector<Item>& items) {
+    std::vector<const Item*> chosen;
+    for (const Item& item : items) {
+      if (!is_writable(item))
+        ++refused;
+      else if (!ticks_from<std::int16_t>(base_tick_, item.stamp))
+        ++left_out;
+      else
+        chosen.push_back(&item);
+    }
+    std::stable_sort(chosen.begin(), chosen.end(),
+                     [](const Item* a, const Item* b) { return a->stamp > b->stamp; });
+    return chosen;
+  }
+
+  [[nodiscard]] bool take(std::size_t bytes) {
+    if (bytes > room_) return false;
+    room_ -= bytes;
+    return true;
+  }
+
+  /// In turn where there are more peers than room.
+  void choose_echoes(const OutgoingPeerMessage& message) {
+    const std::size_t count = std::min(message.echoes.size(), kMaxEchoes);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t turn = std::size_t{message.sequence} * kMaxEchoes + i;
+      echoes.push_back(message.echoes[turn % message.echoes.size()]);
+      room_ -= kEchoSize;
+    }
+  }
+
+  void choose_imu(const std::vector<ImuSample>& samples) {
+    imu = newest_first(samples);
+    if (imu.size() > kMaxImu) {
+      left_out += imu.size() - kMaxImu;
+      imu.resize(kMaxImu);
+    }
+    room_ -= imu.size() * kImuSize;
+  }
+
+  void choose_estimates(const std::vector<NeighborEstimate>& all, std::uint32_t sequence) {
+    estimates = newest_first(all);
+    constexpr std::size_t kAtOnce = kEstimateBudget / kEstimateSize;
+    if (estimates.size() > kAtOnce) {
+      left_out += estimates.size() - kAtOnce;
+      std::sort(estimates.begin(), estimates.end(),
+                [](const auto* a, const auto* b) { return a->neighbor < b->neighbor; });
+      std::rotate(estimates.begin(),
+                  estimates.begin() + static_cast<std::ptrdiff_t>(std::size_t{sequence} * kAtOnce %
+                                                                  estimates.size()),
+                  estimates.end());
+      estimates.resize(kAtOnce);
+    }
+    room_ -= estimates.size() * kEstimateSize;
+  }
+
+  /// From the newest back, whichever kind it is.
+  void choose_bearings_and_ranges(const Report& report) {
+    const auto all_bearings = newest_first(report.bearings);
+    const auto all_ranges = newest_first(report.ranges);
+    auto bearing = all_bearings.begin();
+    auto range = all_ranges.begin();
+    while (bearing != all_bearings.end() || range != all_ranges.end()) {
+      const bool take_range = range != all_ranges.end() && (bearing == all_bearings.end() ||
+                                                            (*range)->stamp >= (*bearing)->stamp);
+      if (!(take_range ? choose(**range++) : choose(**bearing++))) ++left_out;
+    }
+  }
+
+  bool choose(const UwbRange& range) {
+    if (ranges.size() >= kMaxCount || !take(kRangeSize)) return false;
+    ranges.push_back(&range);
+    return true;
+  }
+
+  bool choose(const Bearing& bearing) {
+    if (bearings.size() >= kMaxCount || room_ < kBearingSize + kSourceSize + kCameraSize)
+      return false;
+    std::size_t cost = kBearingSize;
+    const auto camera = index_in(cameras, bearing.p_B_C, kCameraSize, cost);
+    if (!camera) return false;
+    const auto source = index_in(sources, Source{bearing.neighbor, *camera}, kSourceSize, cost);
+    if (!source) return false;
+    bearings.push_back({&bearing, *source});
+    return take(cost);
+  }
+
+  static constexpr std::size_t kTilt = 12;
+  static constexpr std::size_t kCounts = 7 + 2;  // of lists, and the IMU's exponents
+  std::int64_t base_tick_;
+  std::size_t room_ = kMaxPeerMessage - kHeader - kTilt - kCounts - kChecksum;
+};
+
+/// Least e with which |v| <= 32767 * 2^e for all v.
+template <class Member>
+int exponent_for(const std::vector<const ImuSample*>& samples, Member member) {
+  double largest = 0.0;
+  for (const ImuSample* sample : samples)
+    largest = std::max(largest, (sample->*member).cwiseAbs().maxCoeff());
+  int exponent = kMinExponent;
+  while (std::ldexp(kMaxCode, exponent) < largest) ++exponent;
+  return exponent;
+}
+
+class Encoder {
+ public:
+  explicit Encoder(std::int64_t base_tick) : base_tick_(base_tick) {}
+
+  void header(const OutgoingPeerMessage& message) {
+    for (const std::uint8_t byte : kMagic) out_.write<std::uint8_t>(byte);
+    out_.write<std::uint8_t>(kVersion);
+    out_.write<std::uint16_t>(message.report.sender.value);
+    out_.write<std::uint32_t>(message.session);
+    out_.write<std::uint32_t>(message.sequence);
+    out_.write<std::int64_t>(to_ns(message.sent));
+    const auto age = ticks_from<std::int32_t>(base_tick_, message.report.stamp);
+    CREPES_EXPECT(age, "a report leaves within hours of its stamp");
+    out_.write<std::int32_t>(*age);
+  }
+
+  void tilt(const Tilt& tilt) {
+    const auto age = ticks_from<std::int32_t>(base_tick_, tilt.stamp);
+    const bool known =
+        age && is_unit(tilt.up_B) && tilt.sigma_rad > 0 && tilt.sigma_rad < kUnknownTiltSigma;
+    out_.write<std::int32_t>(age.value_or(0));
+    direction(known ? tilt.up_B : Eigen::Vector3d::UnitZ());
+    out_.write_float(known ? tilt.sigma_rad : kUnknownTiltSigma);
+  }
+
+  void echoes(const std::vector<ClockEcho>& echoes, Timestamp sent) {
+    count(echoes.size());
+    for (const ClockEcho& echo : echoes) {
+      out_.write<std::uint16_t>(echo.peer.value);
+      out_.write<std::int64_t>(echo.sent_ns);
+      const std::int64_t age_us = (to_ns(sent) - echo.received_ns + 500) / 1000;
+      CREPES_EXPECT(std::in_range<std::uint32_t>(age_us), "an echo is of the recent past");
+      out_.write<std::uint32_t>(static_cast<std::uint32_t>(age_us));
+    }
+  }
+
+  void imu(const std::vector<const ImuSample*>& samples) {
+    const int gyro = exponent_for(samples, &ImuSample::gyro_radps);
+    const int accel = exponent_for(samples, &ImuSample::accel_mps2);
+    count(samples.size());
+    out_.write<std::int8_t>(static_cast<std::int8_t>(gyro));
+    out_.write<std::int8_t>(static_cast<std::int8_t>(accel));
+    for (const ImuSample* sample : samples) {
+      stamp(sample->stamp);
+      for (const double v : sample->gyro_radps) code16(std::ldexp(v, -gyro));
+      for (const double v : sample->accel_mps2) code16(std::ldexp(v, -accel));
+    }
+  }
+
+  void bearings(const Selection& selection) {
+    count(selection.cameras.size());
+    for (const Eigen::Vector3d& camera : selection.cameras) vector(camera);
+    count(selection.sources.size());
+    for (const Source& source : selection.sources) {
+      out_.write<std::uint16_t>(source.neighbor.value);
+      out_.write<std::uint8_t>(source.camera);
+    }
+    count(selection.bearings.size());
+    for (const auto& [bearing, source] : selection.bearings) {
+      stamp(bearing->stamp);
+      out_.write<std::uint8_t>(source);
+      direction(bearing->u_B);
+      out_.write<std::uint8_t>(static_cast<std::uint8_t>(kBearingSigma.encode(bearing->sigma_rad)));
+    }
+  }
+
+  void ranges(const std::vector<const UwbRange*>& ranges) {
+    count(ranges.size());
+    for (const UwbRange* range : ranges) {
+      out_.write<std::uint16_t>(range->neighbor.value);
+      stamp(range->stamp);
+      out_.write_float(range->range_m);
+      power(range->first_path_dbm);
+      power(range->received_dbm);
+    }
+  }
+
+  void estimates(const std::vector<const NeighborEstimate*>& estimates) {
+    count(estimates.size());
+    for (const NeighborEstimate* estimate : estimates) {
+      const Eigen::Quaterniond q = estimate->T_B_N.pose.q.normalized();
+      const auto covariance = encode_covariance(estimate->T_B_N.covariance);
+      out_.write<std::uint16_t>(estimate->neighbor.value);
+      stamp(estimate->stamp);
+      vector(estimate->T_B_N.pose.p);
+      for (const double v : {q.w(), q.x(), q.y(), q.z()}) code16(v * kMaxCode);
+      vector(estimate->v_B_N);
+      for (const std::uint16_t sigma : covariance->sigmas) out_.write<std::uint16_t>(sigma);
+      for (const std::int16_t entry : covariance->factor) out_.write<std::int16_t>(entry);
+    }
+  }
+
+  [[nodiscard]] std::vector<std::uint8_t> sealed() && {
+    out_.write<std::uint32_t>(crc32(out_.bytes()));
+    CREPES_EXPECT(out_.ok(), "the selection fits");
+    return std::move(out_).take();
+  }
+
+ private:
+  void count(std::size_t n) { out_.write<std::uint8_t>(static_cast<std::uint8_t>(n)); }
+  void stamp(Timestamp t) { out_.write<std::int16_t>(*ticks_from<std::int16_t>(base_tick_, t)); }
+  void code16(double v) { out_.write<std::int16_t>(static_cast<std::int16_t>(std::lround(v))); }
+  void vector(const Eigen::Vector3d& v) {
+    for (const double x : v) out_.write_float(x);
+  }
+  void direction(const Eigen::Vector3d& u) {
+    for (const std::int16_t code : encode_direction(u)) out_.write<std::int16_t>(code);
+  }
+  void power(double dbm) {
+    const double code = std::clamp(-2 * dbm, 0.0, 255.0);
+    out_.write<std::uint8_t>(static_cast<std::uint8_t>(std::lround(code)));
+  }
+
+  std::int64_t base_tick_;
+  ByteWriter out_{kMaxPeerMessage};
+};
+
+/// Reads field by field and remembers the first fault; what is read after it is not used.
+class Decoder {
+ public:
+  explicit Decoder(std::span<const std::uint8_t> body) : in_(body) {}
+
+  [[nodiscard]] std::optional<PeerMessageFault> fault() const {
+    if (!in_.ok()) return PeerMessageFault::kTruncated;
+    if (fault_) return fault_;
+    if (!in_.at_end()) return PeerMessageFault::kTrailingBytes;
+    return std::nullopt;
+  }
+
+  PeerMessage read() {
+    PeerMessage message;
+    message.report.sender = robot();
+    message.session = in_.read<std::uint32_t>();
+    message.sequence = in_.read<std::uint32_t>();
+    message.sent = PeerTimestamp{Duration{bounded_stamp(in_.read<std::int64_t>())}};
+    base_tick_ = floor_to_ticks(to_ns(message.sent));
+    message.report.stamp = time(in_.read<std::int32_t>());
+    message.report.tilt = tilt();
+    each(kEchoSize, [&] { message.echoes.push_back(echo(message.sent)); });
+    imu(message.report.imu);
+    bearings(message.report.bearings);
+    each(kRangeSize, [&] { message.report.ranges.push_back(range()); });
+    each(kEstimateSize, [&] { message.report.estimates.push_back(estimate()); });
+    return message;
+  }
+
+ private:
+  void expect(bool condition, PeerMessageFault fault) {
+    if (!condition && !fault_ && in_.ok()) fault_ = fault;
+  }
+
+  /// Calls `read_one` as often as the next byte says, if that many items can follow.
+  template <class ReadOne>
+  void each(std::size_t item_size, ReadOne read_one) {
+    repeat(in_.read<std::uint8_t>(), item_size, read_one);
+  }
+  template <class ReadOne>
+  void repeat(std::size_t n, std::size_t item_size, ReadOne read_one) {
+    expect(n * item_size <= in_.remaining(), PeerMessageFault::kTruncated);
+    for (std::size_t i = 0; i < n && !fault_; ++i) read_one();
+  }
+
+  PeerTimestamp time(std::int64_t ticks) const {
+    return PeerTimestamp{Duration{(base_tick_ + ticks) * kTick}};
+  }
+  PeerTimestamp stamp() { return time(in_.read<std::int16_t>()); }
+
+  std::int64_t bounded_stamp(std::int64_t ns) {
+    const bool bounded = ns >= -kMaxStamp && ns <= kMaxStamp;
+    expect(bounded, PeerMessageFault::kBadStamp);
+    return bounded ? ns : 0;
+  }
+
+  RobotId robot() {
+    const RobotId id{in_.read<std::uint16_t>()};
+    expect(is_robot(id), PeerMessageFault::kBadId);
+    return id;
+  }
+
+  double number(double limit) {
+    const double value = in_.read_float();
+    expect(std::isfinite(value), PeerMessageFault::kNotFinite);
+    expect(std::abs(value) <= limit, PeerMessageFault::kOutOfRange);
+    return value;
+  }
+
+  Eigen::Vector3d vector() {
+    Eigen::Vector3d v;
+    for (double& x : v) x = number(kMaxCoordinate);
+    return v;
+  }
+
+  Eigen::Vector3d direction() {
+    const auto a = in_.read<std::int16_t>();
+    const auto b = in_.read<std::int16_t>();
+    const auto u = decode_direction({a, b});
+    expect(u.has_value(), PeerMessageFault::kNotUnit);
+    return u.value_or(Eigen::Vector3d::UnitZ());
+  }
+
+  BasicTilt<PeerTimestamp> tilt() {
+    BasicTilt<PeerTimestamp> tilt;
+    tilt.stamp = time(in_.read<std::int32_t>());
+    tilt.up_B = direction();
+    tilt.sigma_rad = number(kUnknownTiltSigma + 1e-6);
+    expect(tilt.sigma_rad > 0, PeerMessageFault::kOutOfRange);
+    return tilt;
+  }
+
+  ClockEcho echo(PeerTimestamp sent) {
+    ClockEcho echo;
+    echo.peer = robot();
+    echo.sent_ns = bounded_stamp(in_.read<std::int64_t>());
+    echo.received_ns = to_ns(sent) - std::int64_t{in_.read<std::uint32_t>()} * 1000;
+    return echo;
+  }
+
+  int exponent() {
+    const int exponent = in_.read<std::int8_t>();
+    expect(exponent >= kMinExponent && exponent <= kMaxExponent, PeerMessageFault::kOutOfRange);
+    return exponent;
+  }
+
+  void imu(std::vector<BasicImuSample<PeerTimestamp>>& samples) {
+    const std::size_t n = in_.read<std::uint8_t>();
+    const int gyro = exponent();
+    const int accel = exponent();
+    repeat(n, kImuSize, [&] {
+      auto& sample = samples.emplace_back();
+      sample.stamp = stamp();
+      for (double& v : sample.gyro_radps) v = std::ldexp(in_.read<std::int16_t>(), gyro);
+      for (double& v : sample.accel_mps2) v = std::ldexp(in_.read<std::int16_t>(), accel);
+    });
+  }
+
+  void bearings(std::vector<BasicBearing<PeerTimestamp>>& bearings) {
+    std::vector<Eigen::Vector3d> cameras;
+    each(kCameraSize, [&] { cameras.push_back(vector()); });
+    std::vector<Source> sources;
+    each(kSourceSize, [&] {
+      const RobotId neighbor = robot();
+      sources.push_back({neighbor, in_.read<std::uint8_t>()});
+      expect(sources.back().camera < cameras.size(), PeerMessageFault::kBadIndex);
+    });
+    each(kBearingSize, [&] {
+      auto& bearing = bearings.emplace_back();
+      bearing.stamp = stamp();
+      const std::size_t source = in_.read<std::uint8_t>();
+      bearing.u_B = direction();
+      bearing.sigma_rad = kBearingSigma.decode(in_.read<std::uint8_t>());
+      expect(source < sources.size(), PeerMessageFault::kBadIndex);
+      if (fault_ || source >= sources.size()) return;
+      bearing.neighbor = sources[source].neighbor;
+      bearing.p_B_C = cameras[sources[source].camera];
+    });
+  }
+
+  BasicUwbRange<PeerTimestamp> range() {
+    BasicUwbRange<PeerTimestamp> range;
+    range.neighbor = robot();
+    range.stamp = stamp();
+    range.range_m = number(kMaxRange);
+    expect(range.range_m > 0, PeerMessageFault::kOutOfRange);
+    range.first_path_dbm = -0.5 * in_.read<std::uint8_t>();
+    range.received_dbm = -0.5 * in_.read<std::uint8_t>();
+    return range;
+  }
+
+  BasicNeighborEstimate<PeerTimestamp> estimate() {
+    BasicNeighborEstimate<PeerTimestamp> estimate;
+    estimate.neighbor = robot();
+    estimate.stamp = stamp();
+    estimate.T_B_N.pose.p = vector();
+    Eigen::Vector4d q;
+    for (double& v : q) v = in_.read<std::int16_t>() / kMaxCode;
+    expect(std::abs(q.norm() - 1) < 1e-3, PeerMessageFault::kNotUnit);
+    estimate.T_B_N.pose.q = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
+    estimate.v_B_N = vector();
+    CovarianceCode code;
+    for (std::uint16_t& sigma : code.sigmas) sigma = in_.read<std::uint16_t>();
+    for (std::int16_t& entry : code.factor) entry = in_.read<std::int16_t>();
+    const auto covariance = decode_covariance(code);
+    expect(covariance.has_value(), PeerMessageFault::kBadCovariance);
+    estimate.T_B_N.covariance = covariance.value_or(Matrix6d::Identity());
+    return estimate;
+  }
+
+  ByteReader in_;
+  std::int64_t base_tick_ = 0;
+  std::optional<PeerMessageFault> fault_;
+};
+
+std::uint32_t checksum_of(std::span<const std::uint8_t> datagram) {
+  ByteReader in(datagram.last(kChecksum));
+  return in.read<std::uint32_t>();
+}
+
+}  // namespace
+
+EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message) {
+  CREPES_EXPECT(is_robot(message.report.sender), "a sender has an id");
+  CREPES_EXPECT(std::abs(to_ns(message.sent)) <= kMaxStamp, "a clock counts from its epoch");
+  const Selection selection(message);
+  Encoder encoder(floor_to_ticks(to_ns(message.sent)));
+  encoder.header(message);
+  encoder.tilt(message.report.tilt);
+  encoder.echoes(selection.echoes, message.sent);
+  encoder.imu(selection.imu);
+  encoder.bearings(selection);
+  encoder.ranges(selection.ranges);
+  encoder.estimates(selection.estimates);
+  return {std::move(encoder).sealed(), selection.left_out, selection.refused};
+}
+
+tl::expected<PeerMessage, PeerMessageFault> decode_peer_message(
+    std::span<const std::uint8_t> datagram) {
+  using Fault = PeerMessageFault;
+  constexpr std::size_t kPreamble = kMagic.size() + 1;
+  if (datagram.size() > kMaxPeerMessage) return tl::unexpected(Fault::kTooLong);
+  if (datagram.size() < kPreamble + kChecksum) return tl::unexpected(Fault::kTooShort);
+  if (!std::equal(kMagic.begin(), kMagic.end(), datagram.begin()))
+    return tl::unexpected(Fault::kForeign);
+  if (datagram[kMagic.size()] != kVersion) return tl::unexpected(Fault::kOtherVersion);
+  if (crc32(datagram.first(datagram.size() - kChecksum)) != checksum_of(datagram))
+    return tl::unexpected(Fault::kDamaged);
+
+  Decoder decoder(datagram.subspan(kPreamble, datagram.size() - kPreamble - kChecksum));
+  PeerMessage message = decoder.read();
+  if (const auto fault = decoder.fault()) return tl::unexpected(*fault);
+  return message;
+}
+
+}  // namespace crepes

@@ -1,0 +1,28 @@
+/// Senders repeat recent measurements because datagrams get lost; this passes each one once.
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <tuple>
+
+#include "estimator/core/measurements.hpp"
+
+namespace crepes {
+
+class RedundancyFilter {
+ public:
+  /// Removes from `report` what was passed before. Stamps must be the sender's own: they are the
+  /// same in every copy.
+  void apply(PeerReport& report);
+
+ private:
+  using Time = std::int64_t;
+  using BearingKey = std::tuple<Time, RobotId, double, double, double>;  ///< camera by its position
+
+  std::set<std::tuple<Time>> imu_;
+  std::set<BearingKey> bearings_;
+  std::set<std::tuple<Time, RobotId>> ranges_;
+  std::set<std::tuple<Time, RobotId>> estimates_;
+};
+
+}  // namespace crepes

@@ -1,0 +1,223 @@
+#include "net/udp_socket.hpp"
+
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <string_view>
+#include <utility>
+
+#include "estimator/core/contract.hpp"
+
+namespace crepes {
+namespace {
+
+/// The sockets interface's own pun between address families.
+const sockaddr* as_sockaddr(const void* address) { return static_cast<const sockaddr*>(address); }
+
+sockaddr_in to_ipv4(const Endpoint& endpoint) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(endpoint.port);
+  std::memcpy(&address.sin_addr, &endpoint.address[12], sizeof(address.sin_addr));
+  return address;
+}
+
+sockaddr_in6 to_ipv6(const Endpoint& endpoint) {
+  sockaddr_in6 address{};
+  address.sin6_family = AF_INET6;
+  address.sin6_port = htons(endpoint.port);
+  address.sin6_scope_id = endpoint.scope;
+  std::memcpy(&address.sin6_addr, endpoint.address.data(), endpoint.address.size());
+  return address;
+}
+
+Endpoint to_endpoint(const sockaddr_storage& storage) {
+  if (storage.ss_family == AF_INET) {
+    sockaddr_in address{};
+    std::memcpy(&address, &storage, sizeof(address));
+    return Endpoint::ipv4(std::bit_cast<std::array<std::uint8_t, 4>>(address.sin_addr.s_addr),
+                          ntohs(address.sin_port));
+  }
+  sockaddr_in6 address{};
+  std::memcpy(&address, &storage, sizeof(address));
+  Endpoint endpoint;
+  std::memcpy(endpoint.address.data(), &address.sin6_addr, endpoint.address.size());
+  endpoint.scope = address.sin6_scope_id;
+  endpoint.port = ntohs(address.sin6_port);
+  return endpoint;
+}
+
+/// Calls `use(address, length)` with the endpoint in the form of its family.
+template <class Use>
+auto with_sockaddr(const Endpoint& endpoint, Use use) {
+  if (endpoint.is_ipv4()) {
+    const sockaddr_in address = to_ipv4(endpoint);
+    return use(as_sockaddr(&address), socklen_t{sizeof(address)});
+  }
+  const sockaddr_in6 address = to_ipv6(endpoint);
+  return use(as_sockaddr(&address), socklen_t{sizeof(address)});
+}
+
+std::string_view advice_for(int error) {
+  switch (error) {
+    case EADDRINUSE:
+      return "; another program holds the port: stop it or choose another port";
+    case EADDRNOTAVAIL:
+      return "; this machine does not have the address: check the interface and the config";
+    case EACCES:
+      return "; ports below 1024 need privileges: choose a higher one";
+    case ENETUNREACH:
+    case ENETDOWN:
+    case ENODEV:
+      return "; the interface is down or has lost its address: see `ip address`";
+    default:
+      return "";
+  }
+}
+
+tl::unexpected<Error> fail_errno(const std::string& what, int error) {
+  return fail(ErrorCode::kIo, what + ": " + std::strerror(error) + std::string(advice_for(error)));
+}
+
+struct FreeInterfaces {
+  void operator()(ifaddrs* list) const { ::freeifaddrs(list); }
+};
+
+Result<Endpoint> broadcast_address(const std::string& interface, std::uint16_t port) {
+  ifaddrs* list = nullptr;
+  if (::getifaddrs(&list) != 0) return fail_errno("interfaces", errno);
+  const std::unique_ptr<ifaddrs, FreeInterfaces> owner(list);
+
+  bool exists = false;
+  for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
+    if (interface != entry->ifa_name) continue;
+    exists = true;
+    if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET) continue;
+    if ((entry->ifa_flags & IFF_UP) == 0)
+      return fail(ErrorCode::kIo, interface + ": interface is down; see `ip link`");
+    if ((entry->ifa_flags & IFF_LOOPBACK) != 0) return Endpoint::ipv4({127, 255, 255, 255}, port);
+    if ((entry->ifa_flags & IFF_BROADCAST) == 0 || entry->ifa_broadaddr == nullptr)
+      return fail(ErrorCode::kIo, interface + ": interface cannot broadcast; name another");
+    sockaddr_storage storage{};
+    std::memcpy(&storage, entry->ifa_broadaddr, sizeof(sockaddr_in));
+    Endpoint endpoint = to_endpoint(storage);
+    endpoint.port = port;
+    return endpoint;
+  }
+  if (!exists)
+    return fail(ErrorCode::kNotFound, interface + ": no such interface; `ip link` lists them");
+  return fail(ErrorCode::kIo,
+              interface + ": interface has no IPv4 address; give it one, see `ip address`");
+}
+
+Result<Endpoint> parse_address(const std::string& text, std::uint16_t port) {
+  if (std::array<std::uint8_t, 4> v4{}; ::inet_pton(AF_INET, text.c_str(), v4.data()) == 1)
+    return Endpoint::ipv4(v4, port);
+  Endpoint endpoint;
+  endpoint.port = port;
+  if (::inet_pton(AF_INET6, text.c_str(), endpoint.address.data()) == 1) return endpoint;
+  return fail(ErrorCode::kConfig, text + ": not a numeric IPv4 or IPv6 address");
+}
+
+int set_option(int fd, int level, int option) {
+  const int on = 1;
+  return ::setsockopt(fd, level, option, &on, sizeof(on));
+}
+
+}  // namespace
+
+UdpSocket::UdpSocket(UdpSocket&& other) noexcept
+    : fd_(std::exchange(other.fd_, -1)), name_(std::move(other.name_)), local_(other.local_) {}
+
+UdpSocket& UdpSocket::operator=(UdpSocket&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  std::swap(name_, other.name_);
+  std::swap(local_, other.local_);
+  return *this;
+}
+
+UdpSocket::~UdpSocket() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+Result<UdpSocket> UdpSocket::open(const Endpoint& address, std::string name, bool broadcast) {
+  const int family = address.is_ipv4() ? AF_INET : AF_INET6;
+  UdpSocket socket(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), std::move(name));
+  if (socket.fd_ < 0) return fail_errno(socket.name_, errno);
+  const bool ready =
+      (!broadcast || (set_option(socket.fd_, SOL_SOCKET, SO_REUSEADDR) == 0 &&
+                      set_option(socket.fd_, SOL_SOCKET, SO_BROADCAST) == 0)) &&
+      (family == AF_INET || set_option(socket.fd_, IPPROTO_IPV6, IPV6_V6ONLY) == 0) &&
+      with_sockaddr(address, [&](const sockaddr* to, socklen_t length) {
+        return ::bind(socket.fd_, to, length) == 0;
+      });
+  if (!ready) return fail_errno(socket.name_, errno);
+
+  sockaddr_storage bound{};
+  socklen_t length = sizeof(bound);
+  if (::getsockname(socket.fd_, static_cast<sockaddr*>(static_cast<void*>(&bound)), &length) != 0)
+    return fail_errno(socket.name_, errno);
+  socket.local_ = to_endpoint(bound);
+  return socket;
+}
+
+Result<UdpSocket> UdpSocket::open_broadcast(const std::string& interface, std::uint16_t port) {
+  // Bound to the broadcast address itself it hears nothing else, and on this interface only.
+  return broadcast_address(interface, port).and_then([&](const Endpoint& address) {
+    return open(address, interface + " (" + address.to_string() + ")", true);
+  });
+}
+
+Result<UdpSocket> UdpSocket::bind(const std::string& address, std::uint16_t port) {
+  return parse_address(address, port).and_then([](const Endpoint& endpoint) {
+    return open(endpoint, endpoint.to_string(), false);
+  });
+}
+
+Result<void> UdpSocket::broadcast(std::span<const std::uint8_t> bytes) {
+  return send_to(bytes, local_);
+}
+
+Result<void> UdpSocket::send_to(std::span<const std::uint8_t> bytes, const Endpoint& to) {
+  CREPES_EXPECT(fd_ >= 0, "the socket was moved away");
+  const ssize_t sent = with_sockaddr(to, [&](const sockaddr* address, socklen_t length) {
+    return ::sendto(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL, address, length);
+  });
+  if (sent < 0) return fail_errno(name_ + ": send to " + to.to_string(), errno);
+  return {};
+}
+
+Result<std::optional<Datagram>> UdpSocket::receive(std::chrono::milliseconds timeout) {
+  CREPES_EXPECT(fd_ >= 0, "the socket was moved away");
+  pollfd ready{.fd = fd_, .events = POLLIN, .revents = 0};
+  const int count = ::poll(&ready, 1, static_cast<int>(timeout.count()));
+  if (count < 0 && errno != EINTR) return fail_errno(name_, errno);
+  if (count <= 0) return std::nullopt;
+
+  Datagram datagram;
+  datagram.bytes.resize(kMaxDatagram);
+  sockaddr_storage from{};
+  socklen_t length = sizeof(from);
+  const ssize_t received = ::recvfrom(fd_, datagram.bytes.data(), datagram.bytes.size(), 0,
+                                      static_cast<sockaddr*>(static_cast<void*>(&from)), &length);
+  if (received < 0) {
+    if (errno == EAGAIN || errno == EINTR) return std::nullopt;
+    return fail_errno(name_ + ": receive", errno);
+  }
+  datagram.bytes.resize(static_cast<std::size_t>(received));
+  datagram.from = to_endpoint(from);
+  return datagram;
+}
+
+}  // namespace crepes
