@@ -66,14 +66,15 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
       continue;
     }
     observe(track, sighting, stamp);
-    if (const auto id = decoder_.id_of(track.evidence))
+    if (const auto id = decoder_.id_of(track.evidence)) {
       bearings.push_back({.stamp = stamp,
                           .neighbor = *id,
                           .u_B = sighting.u_B,
                           .p_B_C = T_B_C_.p,
                           .sigma_rad = config_.bearing_sigma_px * sighting.px_rad});
+    }
   }
-  for (std::size_t t = 0; t < is_paired.size(); ++t)
+  for (std::size_t t = 0; t < is_paired.size(); ++t) {
     if (!is_paired[t]) {
       const bool is_hidden = std::any_of(pairings.begin(), pairings.end(), [&](const Pairing& p) {
         return is_unclear[p.track] &&
@@ -82,6 +83,7 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
       });
       if (!is_hidden) observe_absence(tracks_[t], stamp);
     }
+  }
   retire(stamp);
 
   for (std::size_t s = 0; s < sightings.size(); ++s) {

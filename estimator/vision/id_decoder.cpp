@@ -29,12 +29,13 @@ constexpr double kLostPosterior = 0.01;
 double tolerated(double frames) { return 1.0 + 0.06 * frames; }
 
 void add_scaled(std::span<std::int16_t> sum, const std::int16_t* weight, int sign) {
-  if (sign > 0)
+  if (sign > 0) {
     for (std::size_t i = 0; i < sum.size(); ++i)
       sum[i] = static_cast<std::int16_t>(sum[i] + weight[i]);
-  else
+  } else {
     for (std::size_t i = 0; i < sum.size(); ++i)
       sum[i] = static_cast<std::int16_t>(sum[i] - weight[i]);
+  }
 }
 
 std::int16_t highest(std::span<const std::int16_t> scores) {
@@ -79,13 +80,15 @@ IdDecoder::IdDecoder(const IdLibrary& library, double flip_rate, double min_conf
       const double lit = blink.lit_fraction(t - spread, t + spread);
       code.p_lit.push_back(flip_rate_ + (1.0 - 2.0 * flip_rate_) * lit);
     }
-    for (const std::size_t lit : {0U, 1U})
-      for (std::size_t offset = 0; offset < kFine; ++offset)
+    for (const std::size_t lit : {0U, 1U}) {
+      for (std::size_t offset = 0; offset < kFine; ++offset) {
         for (std::size_t k = 0; k < 2 * code.phases; ++k) {
           const double p = code.p_lit[(k * kFine + offset) % steps];
           code.weight[lit][offset].push_back(static_cast<std::int16_t>(
               std::lround(kTemper * kUnitsPerNat * std::log(lit != 0 ? p : 1.0 - p))));
         }
+      }
+    }
     window_ = std::max(window_, std::max(kWindowPeriods * code.period, 2 * code.check_span));
     longest_dark_ = std::max(longest_dark_, longest_dark_of(blink) + kDarkSlack);
     codes_.push_back(std::move(code));

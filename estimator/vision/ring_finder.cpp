@@ -69,7 +69,7 @@ void RingFinder::join(std::vector<Blob>& blobs) {
     }
     for (std::size_t j = i; j > 0 && consider(j - 1); --j) {
     }
-    for (std::size_t a = 0; a < kNeighbors; ++a)
+    for (std::size_t a = 0; a < kNeighbors; ++a) {
       for (std::size_t c = a + 1; c < kNeighbors; ++c) {
         if (near[c].distance > kSpacingTolerance * near[a].distance) continue;
         const Blob& first = blobs[near[a].blob];
@@ -85,11 +85,12 @@ void RingFinder::join(std::vector<Blob>& blobs) {
                           std::hypot(u - b.mean_u(), v - b.mean_v()),
                           {near[a].blob, order_[i], near[c].blob}});
       }
+    }
   }
   std::sort(votes_.begin(), votes_.end(), [](const Vote& a, const Vote& b) { return a.u < b.u; });
 
   // The ring that most blobs agree on first; a blob belongs to one ring.
-  for (std::size_t least = 6; least >= 4; --least)
+  for (std::size_t least = 6; least >= 4; --least) {
     for (std::size_t i = 0; i < votes_.size(); ++i) {
       const Vote& seed = votes_[i];
       const double tolerance = kCenterTolerance * seed.radius;
@@ -106,11 +107,12 @@ void RingFinder::join(std::vector<Blob>& blobs) {
         if (std::any_of(std::begin(vote.members), std::end(vote.members),
                         [&](std::uint32_t m) { return blobs[m].is_part || blobs[m].has_center; }))
           return;
-        for (const std::uint32_t m : vote.members)
+        for (const std::uint32_t m : vote.members) {
           if (std::find(members.begin(), members.begin() + count, m) == members.begin() + count) {
             if (count == members.size()) return;
             members[count++] = m;
           }
+        }
         u += vote.u;
         v += vote.v;
         ++agreeing;
@@ -126,6 +128,7 @@ void RingFinder::join(std::vector<Blob>& blobs) {
       whole.center_u = u / static_cast<double>(agreeing);
       whole.center_v = v / static_cast<double>(agreeing);
     }
+  }
 }
 
 }  // namespace crepes

@@ -1,6 +1,7 @@
 /// Blobs of one image, and the boards that several of them make up.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -44,7 +45,7 @@ class RingFinder {
   struct Vote {
     double u = 0.0, v = 0.0;
     double radius = 0.0;
-    std::uint32_t members[3] = {};
+    std::array<std::uint32_t, 3> members{};
   };
 
   std::vector<std::uint32_t> order_;

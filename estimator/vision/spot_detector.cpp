@@ -23,11 +23,12 @@ constexpr int kMaxGap = 3;             // px between the LEDs of one board that 
 template <int kCount>
 std::uint8_t highest(const std::uint8_t* pixels) {
   std::array<std::uint8_t, 16> best{};
-  for (int i = 0; i < kCount; i += 16)
+  for (int i = 0; i < kCount; i += 16) {
     for (int k = 0; k < 16; ++k) {
       const auto at = static_cast<std::size_t>(k);
       best[at] = std::max(best[at], pixels[i + k]);
     }
+  }
   std::uint8_t top = 0;
   for (const std::uint8_t b : best) top = std::max(top, b);
   return top;
@@ -52,11 +53,12 @@ int automatic_threshold(const GrayImage& image) {
   std::array<int, 256> histogram{};
   int count = 0;
   const int row_step = std::max(1, image.height / 32);
-  for (int v = row_step / 2; v < image.height; v += row_step)
+  for (int v = row_step / 2; v < image.height; v += row_step) {
     for (int u = 0; u < image.width; u += 4) {
       ++histogram[image.pixels[v * image.stride + u]];
       ++count;
     }
+  }
   const auto quantile = [&](double part) {
     int below = 0;
     int level = 0;
@@ -111,18 +113,22 @@ void SpotDetector::find_runs(const std::uint8_t* row, int v, int width) {
   bool is_open = false;
   const auto visit = [&](int u) {
     if ((row[u] >= threshold) == is_open) return;
-    if (!is_open)
+    if (!is_open) {
       runs_.push_back({v, u, width, static_cast<std::uint32_t>(runs_.size())});
-    else
+    } else {
       runs_.back().end = u;
+    }
     is_open = !is_open;
   };
   int u = 0;
-  for (; u + kBlock <= width; u += kBlock)
-    if (is_open || highest<kBlock>(row + u) >= threshold)
-      for (int part = u; part < u + kBlock; part += kPart)
+  for (; u + kBlock <= width; u += kBlock) {
+    if (is_open || highest<kBlock>(row + u) >= threshold) {
+      for (int part = u; part < u + kBlock; part += kPart) {
         if (is_open || highest<kPart>(row + part) >= threshold)
           for (int i = part; i < part + kPart; ++i) visit(i);
+      }
+    }
+  }
   for (; u < width; ++u) visit(u);
 }
 
