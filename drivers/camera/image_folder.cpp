@@ -1,0 +1,109 @@
+#include "drivers/camera/image_folder.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+#include <opencv2/core/mat.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string_view>
+#include <utility>
+
+#include "drivers/sleep.hpp"
+
+namespace crepes {
+namespace {
+
+/// `t_ns,name`.
+std::optional<std::pair<Timestamp, std::string>> parse_row(std::string_view row) {
+  if (row.ends_with('\r')) row.remove_suffix(1);
+  const std::size_t comma = row.find(',');
+  if (comma == std::string_view::npos) return std::nullopt;
+  std::int64_t ns = 0;
+  const char* const end = row.data() + comma;
+  const auto [stop, status] = std::from_chars(row.data(), end, ns);
+  const std::string_view name = row.substr(comma + 1);
+  if (status != std::errc{} || stop != end || name.empty() ||
+      name.find(',') != std::string_view::npos) {
+    return std::nullopt;
+  }
+  return std::pair(Timestamp{Duration{ns}}, std::string(name));
+}
+
+}  // namespace
+
+Result<Frame> read_gray_image(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) {
+    return fail(ErrorCode::kNotFound, file.string() + ": no such picture");
+  }
+  try {
+    const cv::Mat image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
+    if (image.empty()) {
+      return fail(ErrorCode::kFormat, file.string() + ": not a picture that can be read");
+    }
+    Frame frame{.width = image.cols, .height = image.rows, .pixels = {}};
+    frame.pixels.reserve(image.total());
+    for (int row = 0; row < image.rows; ++row) {
+      frame.pixels.insert(frame.pixels.end(), image.ptr(row), image.ptr(row) + image.cols);
+    }
+    return frame;
+  } catch (const cv::Exception& e) {
+    return fail(ErrorCode::kFormat, file.string() + ": " + e.what());
+  }
+}
+
+Result<std::vector<RecordedPicture>> read_picture_list(const std::filesystem::path& csv,
+                                                       const std::filesystem::path& pictures) {
+  std::ifstream in(csv);
+  if (!in) return fail(ErrorCode::kNotFound, csv.string() + ": cannot be read");
+  std::vector<RecordedPicture> list;
+  std::string row;
+  for (int line = 1; std::getline(in, row); ++line) {
+    if (row.starts_with('#')) continue;
+    const auto refuse = [&](const std::string& why) {
+      return fail(ErrorCode::kFormat, csv.string() + ":" + std::to_string(line) + ": " + why);
+    };
+    const auto parsed = parse_row(row);
+    if (!parsed) return refuse("expected `t_ns,file name`");
+    if (!list.empty() && parsed->first <= list.back().stamp) return refuse("time goes back");
+    std::filesystem::path file = pictures / parsed->second;
+    std::error_code ignored;
+    if (!std::filesystem::exists(file, ignored)) return refuse(file.string() + " is missing");
+    list.push_back({parsed->first, std::move(file)});
+  }
+  if (list.empty()) return fail(ErrorCode::kFormat, csv.string() + ": names no pictures");
+  return list;
+}
+
+Result<std::unique_ptr<Camera>> FolderCamera::open(const std::filesystem::path& folder,
+                                                   std::uint8_t camera, const Clock& clock) {
+  // "cam0/data/" and "cam0/data" are the same folder, beside "cam0/data.csv".
+  const std::filesystem::path pictures = (folder / "").lexically_normal().parent_path();
+  return read_picture_list(pictures.parent_path() / "data.csv", pictures)
+      .map([&](std::vector<RecordedPicture> list) {
+        return std::unique_ptr<Camera>(new FolderCamera(std::move(list), camera, clock));
+      });
+}
+
+Result<std::optional<Frame>> FolderCamera::read_once(std::chrono::milliseconds timeout) {
+  if (next_ == pictures_.size()) {
+    return fail(ErrorCode::kNotFound,
+                pictures_.back().file.parent_path().string() + ": no more pictures");
+  }
+  const RecordedPicture& picture = pictures_[next_];
+  const Timestamp due = begin_ + (picture.stamp - pictures_.front().stamp);
+  sleep_for(std::min<Duration>(due - clock_.now(), timeout));
+  if (clock_.now() < due) return std::optional<Frame>{};
+  ++next_;
+  return read_gray_image(picture.file).map([&](Frame frame) {
+    frame.stamp = due;
+    frame.camera = camera_;
+    return std::optional(std::move(frame));
+  });
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> FolderCamera::counters() const {
+  return {{"frames", next_}};
+}
+
+}  // namespace crepes

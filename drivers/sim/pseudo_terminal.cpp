@@ -1,0 +1,34 @@
+#include "drivers/sim/pseudo_terminal.hpp"
+
+#include <fcntl.h>
+#include <termios.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <system_error>
+
+namespace crepes {
+
+Result<PseudoTerminal> PseudoTerminal::open() {
+  const auto give_up = [] {
+    return fail(ErrorCode::kIo, "pseudo-terminal: " + std::generic_category().message(errno));
+  };
+  UniqueFd master{::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)};
+  if (!master || ::grantpt(master.get()) != 0 || ::unlockpt(master.get()) != 0) return give_up();
+  std::array<char, 128> path{};
+  if (::ptsname_r(master.get(), path.data(), path.size()) != 0) return give_up();
+  // Raw from the start: what comes before the other end is opened must not be echoed.
+  termios settings{};
+  if (::tcgetattr(master.get(), &settings) != 0) return give_up();
+  ::cfmakeraw(&settings);
+  if (::tcsetattr(master.get(), TCSANOW, &settings) != 0) return give_up();
+  return PseudoTerminal(std::move(master), path.data());
+}
+
+std::size_t PseudoTerminal::write(std::span<const std::uint8_t> bytes) {
+  const ssize_t count = ::write(master_.get(), bytes.data(), bytes.size());
+  return count > 0 ? static_cast<std::size_t>(count) : 0;
+}
+
+}  // namespace crepes

@@ -1,0 +1,33 @@
+/// A simulated camera.
+#pragma once
+
+#include <cstdint>
+
+#include "drivers/camera/camera.hpp"
+#include "drivers/sim/ring_renderer.hpp"
+#include "drivers/sim/sim_clock.hpp"
+
+namespace crepes {
+
+/// Takes a picture of the world at a steady rate, stamped with the shutter's time on the robot's
+/// clock. When the reader falls behind, frames are missed, not queued.
+class SimCamera final : public Camera {
+ public:
+  /// `clock` must outlive this.
+  SimCamera(RingRenderer renderer, const CameraConfig& config, const SimClock& clock);
+
+  [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override;
+  void recycle(Frame frame) override { renderer_.recycle(std::move(frame)); }
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const override;
+
+ private:
+  RingRenderer renderer_;
+  const SimClock& clock_;
+  double rate_hz_;
+  Duration timeshift_;
+  std::int64_t next_;  ///< counts frames since the world's epoch
+  std::uint64_t frames_ = 0;
+  std::uint64_t missed_ = 0;
+};
+
+}  // namespace crepes

@@ -1,0 +1,52 @@
+/// A simulated inertial sensor.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "drivers/sim/seeded_noise.hpp"
+#include "drivers/sim/world.hpp"
+#include "estimator/core/config.hpp"
+
+namespace crepes {
+
+/// The errors of one sensor triad:  measured = (1 + scale) true + bias(t) + noise.
+class SimTriad {
+ public:
+  struct Sigmas {
+    double bias;
+    double random_walk;  ///< of the bias [unit/s/sqrt(Hz)]
+    double noise;        ///< of one sample
+    double scale;
+  };
+
+  SimTriad(SeededNoise source, const Sigmas& sigmas);
+  [[nodiscard]] Eigen::Vector3d measure(const Eigen::Vector3d& truth, double dt_s);
+
+ private:
+  SeededNoise source_;
+  Sigmas sigmas_;
+  Eigen::Vector3d scale_;
+  Eigen::Vector3d bias_;
+  std::uint64_t drawn_ = 0;
+};
+
+/// One robot's sensor: WitMotion bytes with the errors that `config` says it has.
+class SimImu {
+ public:
+  /// `world` must outlive this.
+  SimImu(const SimWorld& world, RobotId robot, const ImuConfig& config);
+
+  /// The bytes of one sample at world time `t_s`; times must not go back.
+  [[nodiscard]] std::vector<std::uint8_t> sample(double t_s);
+
+ private:
+  const SimWorld& world_;
+  RobotId robot_;
+  double period_s_;
+  SimTriad gyro_;
+  SimTriad accel_;
+};
+
+}  // namespace crepes

@@ -1,0 +1,42 @@
+/// A simulated ranging module.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "drivers/sim/world.hpp"
+#include "drivers/uwb/nlink.hpp"
+#include "estimator/core/config.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+/// One robot's module: NodeFrame3 bytes with ranges to all other robots. Both modules of a pair
+/// share its bias; ranges through something are long and arrive on a weak first path.
+class SimUwb {
+ public:
+  /// Refuses members without a robot in the world and module ids that the frame cannot carry.
+  /// `world` must outlive this.
+  [[nodiscard]] static Result<SimUwb> make(const SimWorld& world, RobotId robot,
+                                           const SwarmConfig& swarm, const UwbConfig& config);
+
+  /// The bytes of one frame at world time `t_s`.
+  [[nodiscard]] std::vector<std::uint8_t> sample(double t_s) const;
+
+ private:
+  struct Module {
+    RobotId robot{};
+    std::uint8_t id = 0;
+    Eigen::Vector3d p_body_uwb = Eigen::Vector3d::Zero();
+  };
+
+  SimUwb(const SimWorld& world, const UwbConfig& config) : world_(world), config_(config) {}
+  [[nodiscard]] NlinkNode measure(const Module& other, double t_s) const;
+
+  const SimWorld& world_;
+  UwbConfig config_;
+  Module self_;
+  std::vector<Module> others_;
+};
+
+}  // namespace crepes
