@@ -18,6 +18,7 @@ constexpr double kTolerance = 5e-3;    // s: bounds that cross by more contradic
 constexpr double kMaxDelay = 10.0;     // s: no packet is older
 constexpr int kContradictions = 3;     // in a row are no accident
 constexpr double kSettling = 1.0;      // s after the first use during which corrections are steps
+constexpr double kDependence = 1.5;    // echoes are of windows that overlap: fewer tell than come
 constexpr double kMaxSlew = 1e-3;      // s/s
 constexpr double kSlewTime = 1.0;      // s
 constexpr double kMaxCorrection = 20e-3;  // s: more is stepped, for slewing would take too long
@@ -166,7 +167,7 @@ void ClockOffset::refit() {
   if (high - low < -kTolerance) return begin_anew();  // the bounds are of two different clocks
 
   const auto [lower_sigma, upper_sigma] = sigmas(skew);
-  const double offset_sigma = std::hypot(lower_sigma, upper_sigma) / 2;
+  const double offset_sigma = kDependence * std::hypot(lower_sigma, upper_sigma) / 2;
   const double span = std::max(end - begin, 0.0);
   const double slope_information = span / (4 * std::max(lower_sigma + upper_sigma, 1e-7));
   const Line line{.offset = (low + high) / 2,

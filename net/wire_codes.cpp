@@ -11,6 +11,8 @@ namespace {
 constexpr double kUnit = 32767.0;
 constexpr LogScale kSigmas{1e-6, 1e4, 65535};
 
+std::int16_t to_code(double v) { return static_cast<std::int16_t>(std::clamp(v, -kUnit, kUnit)); }
+
 double sign_of(double x) { return std::signbit(x) ? -1.0 : 1.0; }
 
 }  // namespace
@@ -23,8 +25,19 @@ std::array<std::int16_t, 2> encode_direction(const Eigen::Vector3d& u) {
     a = (1 - std::abs(n.y())) * sign_of(n.x());
     b = (1 - std::abs(n.x())) * sign_of(n.y());
   }
-  return {static_cast<std::int16_t>(std::lround(a * kUnit)),
-          static_cast<std::int16_t>(std::lround(b * kUnit))};
+  // Of the four codes around the point, not the nearest in the plane but the nearest on the sphere.
+  std::array<std::int16_t, 2> best{};
+  double least = std::numeric_limits<double>::infinity();
+  for (const double column : {std::floor(a * kUnit), std::ceil(a * kUnit)})
+    for (const double row : {std::floor(b * kUnit), std::ceil(b * kUnit)}) {
+      const std::array code{to_code(column), to_code(row)};
+      const double error = (*decode_direction(code) - u).squaredNorm();
+      if (error < least) {
+        least = error;
+        best = code;
+      }
+    }
+  return best;
 }
 
 std::optional<Eigen::Vector3d> decode_direction(const std::array<std::int16_t, 2>& code) {
@@ -46,7 +59,7 @@ unsigned LogScale::encode(double value) const {
 }
 
 double LogScale::decode(unsigned code) const {
-  return min * std::pow(max / min, code / double(steps));
+  return min * std::pow(max / min, code / static_cast<double>(steps));
 }
 
 std::optional<CovarianceCode> encode_covariance(const Matrix6d& covariance) {

@@ -1,0 +1,102 @@
+#include "net/udp_socket.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+
+namespace crepes {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr std::array<std::uint8_t, 3> kBytes{1, 2, 3};
+
+/// A port that other runs of this test are unlikely to use.
+std::uint16_t some_port() { return static_cast<std::uint16_t>(20000 + ::getpid() % 20000); }
+
+std::vector<std::uint8_t> received_by(UdpSocket& socket) {
+  const auto datagram = socket.receive(milliseconds{1000});
+  return datagram && *datagram ? (*datagram)->bytes : std::vector<std::uint8_t>{};
+}
+
+TEST(UdpSocket, IsHeardByAllWhoShareTheBroadcastPort) {
+  auto first = UdpSocket::open_broadcast("lo", some_port());
+  auto second = UdpSocket::open_broadcast("lo", some_port());
+  auto third = UdpSocket::open_broadcast("lo", some_port());
+  ASSERT_TRUE(first && second && third) << (first ? "" : first.error().message);
+
+  ASSERT_TRUE(second->broadcast(kBytes));
+
+  for (UdpSocket* socket : {&*first, &*second, &*third})
+    EXPECT_EQ(received_by(*socket), std::vector<std::uint8_t>(kBytes.begin(), kBytes.end()));
+}
+
+class Unicast : public testing::TestWithParam<const char*> {};
+
+TEST_P(Unicast, AnswersTheSenderOfADatagram) {
+  auto server = UdpSocket::bind(GetParam(), 0);
+  auto guest = UdpSocket::bind(GetParam(), 0);
+  if (!server) GTEST_SKIP() << server.error().message;
+  ASSERT_TRUE(guest->send_to(kBytes, server->local()));
+
+  const auto request = server->receive(milliseconds{1000});
+  ASSERT_TRUE(request && *request);
+  ASSERT_TRUE(server->send_to((*request)->bytes, (*request)->from));
+
+  EXPECT_TRUE((*request)->from.is_loopback());
+  EXPECT_EQ((*request)->from, guest->local());
+  EXPECT_EQ(received_by(*guest).size(), kBytes.size());
+}
+
+INSTANTIATE_TEST_SUITE_P(Families, Unicast, testing::Values("127.0.0.1", "::1"));
+
+TEST(UdpSocket, GivesNothingWhenNothingComes) {
+  auto socket = UdpSocket::bind("127.0.0.1", 0);
+  ASSERT_TRUE(socket);
+
+  const auto datagram = socket->receive(milliseconds{1});
+
+  ASSERT_TRUE(datagram);
+  EXPECT_FALSE(datagram->has_value());
+}
+
+TEST(UdpSocket, CutsHugeDatagrams) {
+  auto socket = UdpSocket::bind("127.0.0.1", 0);
+  ASSERT_TRUE(socket);
+  ASSERT_TRUE(socket->send_to(std::vector<std::uint8_t>(60000), socket->local()));
+
+  EXPECT_EQ(received_by(*socket).size(), UdpSocket::kMaxDatagram);
+}
+
+TEST(UdpSocket, SaysWhatIsWrongAndWhatToDo) {
+  auto holder = UdpSocket::bind("127.0.0.1", 0);
+  ASSERT_TRUE(holder);
+
+  const auto taken = UdpSocket::bind("127.0.0.1", holder->local().port);
+  const auto missing = UdpSocket::open_broadcast("nosuch0", 47474);
+  const auto foreign = UdpSocket::bind("192.0.2.1", 47475);
+  const auto name = UdpSocket::bind("localhost", 47475);
+
+  ASSERT_TRUE(!taken && !missing && !foreign && !name);
+  EXPECT_NE(taken.error().message.find("another program"), std::string::npos);
+  EXPECT_NE(taken.error().message.find("127.0.0.1:"), std::string::npos);
+  EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
+  EXPECT_NE(missing.error().message.find("nosuch0: no such interface"), std::string::npos);
+  EXPECT_NE(foreign.error().message.find("does not have the address"), std::string::npos);
+  EXPECT_NE(name.error().message.find("not a numeric"), std::string::npos);
+}
+
+TEST(UdpSocket, ReportsWhatItCannotSend) {
+  auto socket = UdpSocket::bind("127.0.0.1", 0);
+  ASSERT_TRUE(socket);
+
+  const auto sent = socket->send_to(std::vector<std::uint8_t>(70000), socket->local());
+
+  ASSERT_FALSE(sent);
+  EXPECT_NE(sent.error().message.find("send to 127.0.0.1:"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace crepes
