@@ -71,8 +71,10 @@ PropagationJacobian propagation_jacobian(const RelativeMotion& before, const Rel
 
   // da, in B's axes before the step, by theta and by the rates; the last two through Exp(w dt/2).
   const Eigen::Matrix3d a_by_theta = -R * hat(half_N * neighbor.a);
-  const Eigen::Matrix3d a_by_w_B = 0.5 * dt * half_B * hat(body.a);
-  const Eigen::Matrix3d a_by_w_N = -0.5 * dt * R * half_N * hat(neighbor.a);
+  const Eigen::Matrix3d a_by_w_B =
+      0.5 * dt * half_B * hat(body.a) * so3_right_jacobian(0.5 * dt * body.w);
+  const Eigen::Matrix3d a_by_w_N =
+      -0.5 * dt * R * half_N * hat(neighbor.a) * so3_right_jacobian(0.5 * dt * neighbor.w);
   const Eigen::Matrix3d a_by_a_N = R * half_N;
 
   const double half_dt2 = 0.5 * dt * dt;
