@@ -157,9 +157,9 @@ struct ImuConfig {
 
 struct UwbConfig {
   double noise_m = 0.05;
-  double bias_sigma_m = 0.10;
-  double bias_drift_m = 0.03;
-  double bias_time_s = 3.0;
+  double bias_sigma_m = 0.06;
+  double bias_drift_m = 0.01;
+  double bias_time_s = 10.0;
   double max_range_m = 200.0;
   double late_path_db = 8.0;
   std::string port;
@@ -170,8 +170,8 @@ struct UwbConfig {
     v.field("noise_m", noise_m, Bounds{0.001, 2}, "one sigma of a single range");
     v.field("bias_sigma_m", bias_sigma_m, Bounds{0, 2}, "constant bias of a pair, one sigma");
     v.field("bias_drift_m", bias_drift_m, Bounds{0, 2},
-            "part of the bias that changes with antenna orientation, one sigma");
-    v.field("bias_time_s", bias_time_s, Bounds{0.1, 1000}, "correlation time of the changing part");
+            "how far the bias wanders within bias_time_s, as antennas turn");
+    v.field("bias_time_s", bias_time_s, Bounds{0.1, 1000}, "see bias_drift_m [s]");
     v.field("max_range_m", max_range_m, Bounds{1, 1000}, "ranges above are refused");
     v.field(
         "late_path_db", late_path_db, Bounds{1, 40},

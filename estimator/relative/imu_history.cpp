@@ -1,6 +1,7 @@
 #include "estimator/relative/imu_history.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "estimator/core/contract.hpp"
 #include "estimator/core/so3.hpp"
@@ -8,26 +9,14 @@
 namespace crepes {
 namespace {
 
+constexpr double kNoiseShare =
+    0.02;  // of one sample in the smoothed noise: half a second at 100 Hz
 constexpr Duration kRotationStep = std::chrono::milliseconds{5};
 
-// Adds the integral of a linear signal from `a` to `b`, cut to [from, to].
-void add_linear(const ImuSample& a, const ImuSample& b, Timestamp from, Timestamp to,
-                ImuMean& sum) {
-  const Timestamp begin = std::max(from, a.stamp);
-  const Timestamp end = std::min(to, b.stamp);
-  if (begin >= end) return;
-  const double width = to_seconds(b.stamp - a.stamp);
-  const double middle = 0.5 * (to_seconds(begin - a.stamp) + to_seconds(end - a.stamp)) / width;
-  const double dt = to_seconds(end - begin);
-  sum.gyro_radps += dt * ((1.0 - middle) * a.gyro_radps + middle * b.gyro_radps);
-  sum.accel_mps2 += dt * ((1.0 - middle) * a.accel_mps2 + middle * b.accel_mps2);
-  if (b.stamp - a.stamp > ImuHistory::kMaxGap) sum.guessed += dt;
-}
-
-void add_held(const ImuSample& sample, double dt, ImuMean& sum) {
+void add(const ImuSample& sample, double dt, bool guessed, ImuMean& sum) {
   sum.gyro_radps += dt * sample.gyro_radps;
   sum.accel_mps2 += dt * sample.accel_mps2;
-  sum.guessed += dt;
+  if (guessed) sum.guessed += dt;
 }
 
 }  // namespace
@@ -59,23 +48,44 @@ bool ImuHistory::push(const ImuSample& sample) {
   ++size_;
   for (std::size_t i = size_ - 1; i > place; --i) slot(i) = (*this)[i - 1];
   slot(place) = sample;
+  if (place + 1 == size_) observe_noise();
   return true;
+}
+
+// White noise of variance s^2 has second differences of variance 6 s^2, on each of three axes.
+void ImuHistory::observe_noise() {
+  if (size_ < 3) return;
+  const ImuSample& a = (*this)[size_ - 3];
+  const ImuSample& b = (*this)[size_ - 2];
+  const ImuSample& c = newest();
+  if (c.stamp - a.stamp > kMaxGap) return;
+  const double scale = 0.5 * to_seconds(c.stamp - a.stamp) / 18.0;
+  const auto observe = [&](const auto& second_difference, double& density2) {
+    density2 += kNoiseShare * (scale * second_difference.squaredNorm() - density2);
+  };
+  observe(c.gyro_radps - 2.0 * b.gyro_radps + a.gyro_radps, gyro_density2_);
+  observe(c.accel_mps2 - 2.0 * b.accel_mps2 + a.accel_mps2, accel_density2_);
 }
 
 ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
   CREPES_EXPECT(size_ > 0 && from < to, "mean over an interval with samples");
   ImuMean sum;
-  if (from < (*this)[0].stamp) {
-    add_held((*this)[0], to_seconds(std::min(to, (*this)[0].stamp) - from), sum);
+  Timestamp t = from;
+  for (std::size_t i = first_after(from); i < size_ && t < to; ++i) {
+    const ImuSample& sample = (*this)[i];
+    const bool covered = i > 0 && sample.stamp - (*this)[i - 1].stamp <= kMaxGap;
+    const Timestamp end = std::min(to, sample.stamp);
+    add(sample, to_seconds(end - t), !covered, sum);
+    t = end;
   }
-  for (std::size_t i = std::max<std::size_t>(first_after(from), 1); i < size_; ++i) {
-    if ((*this)[i - 1].stamp >= to) break;
-    add_linear((*this)[i - 1], (*this)[i], from, to, sum);
-  }
-  if (to > newest().stamp) add_held(newest(), to_seconds(to - std::max(from, newest().stamp)), sum);
+  if (t < to) add(newest(), to_seconds(to - t), true, sum);
 
   const double width = to_seconds(to - from);
-  return {sum.gyro_radps / width, sum.accel_mps2 / width, sum.guessed / width};
+  return {.gyro_radps = sum.gyro_radps / width,
+          .accel_mps2 = sum.accel_mps2 / width,
+          .guessed = sum.guessed / width,
+          .gyro_density = std::sqrt(gyro_density2_),
+          .accel_density = std::sqrt(accel_density2_)};
 }
 
 Eigen::Quaterniond ImuHistory::rotation(Timestamp from, Timestamp to) const {

@@ -16,10 +16,16 @@ struct ImuMean {
   Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
   double guessed = 0.0;  ///< share of the interval, 0..1, that no sample covers
+  /// White noise that the samples themselves show, vibration included.
+  double gyro_density = 0.0;   ///< [rad/s/sqrt(Hz)]
+  double accel_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
 };
 
-/// Bounded: keeps the newest `kCapacity` samples in order of their stamps. Between samples the
-/// signal is linear; outside and across gaps longer than `kMaxGap` it is held and called guessed.
+/// Bounded: keeps the newest `kCapacity` samples in order of their stamps. A sample is the mean
+/// since the one before, stamped at the end, as an IMU that integrates inside gives it: so sums
+/// over samples are exact. Outside and across gaps longer than `kMaxGap` the nearest is held and
+/// called guessed. The noise is read off the second differences of successive samples, in which
+/// motion cancels: no data sheet knows how an airframe vibrates.
 class ImuHistory {
  public:
   static constexpr std::size_t kCapacity = 256;
@@ -45,10 +51,14 @@ class ImuHistory {
  private:
   ImuSample& slot(std::size_t i) { return samples_[(first_ + i) % kCapacity]; }
   [[nodiscard]] std::size_t first_after(Timestamp t) const;
+  void observe_noise();
 
   std::array<ImuSample, kCapacity> samples_{};
   std::size_t first_ = 0;
   std::size_t size_ = 0;
+  // Smoothed variance of a sample's noise times the sample period.
+  double gyro_density2_ = 0.0;
+  double accel_density2_ = 0.0;
 };
 
 }  // namespace crepes

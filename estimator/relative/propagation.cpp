@@ -104,18 +104,19 @@ PropagationJacobian propagation_jacobian(const RelativeMotion& before, const Rel
 Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body, const ImuMean& neighbor,
                                            const ProcessNoise& noise, double dt) {
   const auto square = [](double x) { return x * x; };
-  const auto density2 = [&](double white, double guess, double guessed, double size) {
-    return square(white) + guessed * square(guess) +
-           square(noise.scale_sigma) * size * size * kScaleTime;
+  const auto density2 = [&](double white, double shown, double guess, double guessed, double size) {
+    return square(std::max(white, shown)) + guessed * square(guess) +
+           square(noise.scale_sigma * size) * kScaleTime;
   };
   Eigen::Matrix<double, 12, 1> variance;
   int row = 0;
   for (const ImuMean* imu : {&body, &neighbor}) {
-    variance.segment<3>(row).setConstant(density2(noise.gyro_density, noise.gyro_guess_density,
-                                                  imu->guessed, imu->gyro_radps.norm()));
-    variance.segment<3>(row + 3).setConstant(density2(noise.accel_density,
+    variance.segment<3>(row).setConstant(density2(noise.gyro_density, imu->gyro_density,
+                                                  noise.gyro_guess_density, imu->guessed,
+                                                  imu->gyro_radps.norm()));
+    variance.segment<3>(row + 3).setConstant(density2(noise.accel_density, imu->accel_density,
                                                       noise.accel_guess_density, imu->guessed,
-                                                      imu->accel_mps2.norm() - 9.81));
+                                                      imu->accel_mps2.norm()));
     row += 6;
   }
   return variance / dt;

@@ -53,7 +53,7 @@ bool TiltFilter::add(const ImuSample& sample) {
 }
 
 void TiltFilter::predict(const ImuSample& sample, double dt) {
-  const Eigen::Vector3d w = 0.5 * (sample.gyro_radps + last_->gyro_radps) - gyro_bias_;
+  const Eigen::Vector3d w = sample.gyro_radps - gyro_bias_;  // the mean since the last sample
   q_L_B_ = (q_L_B_ * so3_exp(w * dt)).normalized();
 
   Eigen::Matrix<double, 6, 6> F = Eigen::Matrix<double, 6, 6>::Identity();

@@ -6,6 +6,11 @@
 #include "estimator/relative/chi_square.hpp"
 
 namespace crepes {
+namespace {
+
+constexpr double kBiasTime = 2.0;  // s
+
+}  // namespace
 
 FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig& imu,
                                const UwbConfig& uwb) {
@@ -21,6 +26,14 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig
   s.noise.scale_sigma = imu.scale_sigma;
   // A random walk that reaches bias_drift_m within bias_time_s.
   s.noise.range_bias_walk = uwb.bias_drift_m / std::sqrt(uwb.bias_time_s);
+
+  if (s.profile == Profile::kPaper) {
+    // The paper's filter has no bias states: what a bias does within kBiasTime must pass as noise.
+    s.noise.accel_density =
+        std::hypot(s.noise.accel_density, imu.accelerometer_bias_sigma * std::sqrt(kBiasTime));
+    s.noise.gyro_density =
+        std::hypot(s.noise.gyro_density, imu.gyroscope_bias_sigma * std::sqrt(kBiasTime));
+  }
 
   s.priors.gyro_bias_radps = imu.gyroscope_bias_sigma;
   s.priors.accel_bias_mps2 = imu.accelerometer_bias_sigma;
