@@ -1,7 +1,9 @@
 #include "estimator/swarm/estimator.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 #include <variant>
 
@@ -42,6 +44,13 @@ class Metronome {
   Duration period_;
   std::optional<Timestamp> next_;
 };
+
+// Two robots alone have nothing to adjust: both their estimates rest on the same readings.
+bool is_a_team(const GraphProblem& problem) {
+  std::set<RobotId> robots;
+  for (const RelativePoseEdge& edge : problem.edges) robots.insert({edge.from, edge.to});
+  return robots.size() > 2;
+}
 
 Duration period_of(double rate_hz) { return from_seconds(1.0 / rate_hz); }
 
@@ -191,7 +200,7 @@ Outputs Estimator::State::on(const Tick& tick) {
   }
   if (graph_enabled && !self.imu.empty() && graph_clock.is_due(tick.stamp)) {
     GraphProblem problem = graph_problem(estimates);
-    if (!problem.edges.empty()) outputs.graph_problem = std::move(problem);
+    if (is_a_team(problem)) outputs.graph_problem = std::move(problem);
   }
   return outputs;
 }
