@@ -72,8 +72,7 @@ Result<SerialPort> SerialPort::open(const std::string& path, int baud) {
       .map([&] {
         ::tcflush(fd.get(), TCIFLUSH);
         return SerialPort(std::move(fd), path);
-      })
-      .map_error([](Error e) { return std::move(e).with_context("serial port"); });
+      });
 }
 
 Result<Bytes> SerialPort::read_some(std::chrono::milliseconds timeout) {

@@ -25,6 +25,7 @@ constexpr std::uint8_t kHeader = 0x55;
 constexpr Layout kNodeFrame2{0x04, 6, 119, 13, 7};
 constexpr Layout kNodeFrame3{0x05, 10, 21, 7, std::nullopt};
 constexpr std::size_t kMostNodes = 255;
+constexpr std::uint8_t kLastRole = 6;
 constexpr double kOldestRangeMs = 1000.0;
 
 const Layout* layout_of(std::uint8_t function) {
@@ -52,6 +53,14 @@ void append(std::vector<std::uint8_t>& out, std::uint32_t value, std::size_t cou
   for (std::size_t i = 0; i < count; ++i) {
     out.push_back(static_cast<std::uint8_t>(value >> 8U * i & 0xffU));
   }
+}
+
+/// A frame cut short and the beginning of the next can have the right sum, but not the roles.
+bool has_known_roles(Bytes frame, const Layout& layout) {
+  for (std::size_t at = layout.fixed; at + 1 < frame.size(); at += layout.per_node) {
+    if (frame[at] > kLastRole) return false;
+  }
+  return true;
 }
 
 std::uint32_t power_code(double dbm) {
@@ -83,6 +92,7 @@ FrameCheck NlinkParser::examine(Bytes bytes) {
   if (length != layout->length(bytes[layout->fixed - 1])) return {};
   if (bytes.size() < length) return {FrameKind::kIncomplete};
   if (checksum_of(bytes.first(length - 1)) != bytes[length - 1]) return {FrameKind::kBadChecksum};
+  if (!has_known_roles(bytes.first(length), *layout)) return {};
   return {FrameKind::kComplete, length};
 }
 
