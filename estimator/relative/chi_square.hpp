@@ -13,8 +13,11 @@ namespace crepes {
                  (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
 }
 
-/// Quantile of the chi-square distribution (Wilson and Hilferty 1931, within 2 % for p >= 0.9).
+/// Quantile of the chi-square distribution: from the normal and the exponential distribution for
+/// one and two degrees of freedom, above by Wilson and Hilferty 1931, within 2 % for p >= 0.9.
 [[nodiscard]] inline double chi_square_quantile(double p, int degrees_of_freedom) {
+  if (degrees_of_freedom == 1) return std::pow(normal_quantile(0.5 + 0.5 * p), 2);
+  if (degrees_of_freedom == 2) return -2.0 * std::log(1.0 - p);
   const double k = 2.0 / (9.0 * degrees_of_freedom);
   const double root = 1.0 - k + normal_quantile(p) * std::sqrt(k);
   return degrees_of_freedom * root * root * root;
