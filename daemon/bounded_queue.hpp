@@ -81,4 +81,10 @@ class BoundedQueue {
   std::uint64_t dropped_ = 0;
 };
 
+/// Waits for `timeout`, or less once `stop` is requested.
+inline void wait_for(Duration timeout, const std::stop_token& stop) {
+  BoundedQueue<int> silent{1, Overflow::kDropOldest};
+  static_cast<void>(silent.pop_for(timeout, stop));
+}
+
 }  // namespace crepes

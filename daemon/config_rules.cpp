@@ -15,7 +15,7 @@ using Faults = std::vector<RuleFault>;
 
 constexpr std::size_t kMinSlots = 8;
 constexpr std::size_t kMaxSlots = 32;
-constexpr double kMinDutyStep = 0.01;
+constexpr double kMinDutyStep = 0.02;
 constexpr std::size_t kMaxCameras = 16;
 
 std::string item(const std::string& list, std::size_t i) {
@@ -78,7 +78,7 @@ std::string code_conflict(const MemberConfig& a, const MemberConfig& b) {
   if (a.pattern && b.pattern && are_cyclic_shifts(*a.pattern, *b.pattern))
     return "the same pattern, shifted, as that of ";
   if (a.duty && b.duty && std::abs(*a.duty - *b.duty) < kMinDutyStep)
-    return "within 0.01 of the duty of ";
+    return "within 0.02 of the duty of ";
   return "";
 }
 

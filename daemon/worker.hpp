@@ -24,6 +24,9 @@ class Worker {
           run(stop);
         }) {}
 
+  /// To stop several at once before joining each.
+  void request_stop() { thread_.request_stop(); }
+
  private:
   std::jthread thread_;
 };

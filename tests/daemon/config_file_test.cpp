@@ -168,7 +168,7 @@ TEST(ConfigFile, RefusesCodesThatNoCameraCanTellApart) {
             "f:5: swarm.members[1].pattern: the same pattern, shifted, as that of "
             "swarm.members[0]: no camera can tell the two apart");
   EXPECT_EQ(faults_of(replaced("pattern: \"011111111111111111\"", "duty: 0.3")),
-            "f:5: swarm.members[1].duty: within 0.01 of the duty of swarm.members[0]: no camera "
+            "f:5: swarm.members[1].duty: within 0.02 of the duty of swarm.members[0]: no camera "
             "can tell the two apart");
 }
 

@@ -1,0 +1,45 @@
+#include "daemon/estimator_stage.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace crepes {
+namespace {
+
+constexpr Duration kStatusPeriod = std::chrono::milliseconds{250};
+
+void hand_on(Outputs outputs, const EstimatorSinks& sinks) {
+  if (outputs.graph_problem) sinks.solve(std::move(*std::exchange(outputs.graph_problem, {})));
+  if (!outputs.poses.empty() || outputs.report) sinks.publish(std::move(outputs));
+}
+
+}  // namespace
+
+void run_estimator(const Config& config, EventQueue& events, const EstimatorSinks& sinks,
+                   const Clock& clock, Counter& turns, const std::stop_token& stop) {
+  const Duration period = from_seconds(1.0 / config.estimator.output_rate_hz);
+  Estimator estimator(config);
+  Timestamp next_tick = clock.now() + period;
+  Timestamp next_status = next_tick;
+  while (!stop.stop_requested()) {
+    turns.add();
+    // Waiting events go first: a Tick says that what came before it is known.
+    std::optional<Event> event = events.try_pop();
+    const Timestamp now = clock.now();
+    if (!event && now < next_tick)
+      event =
+          events.pop_for(std::min(next_tick - now, Duration{std::chrono::milliseconds{100}}), stop);
+    if (event) hand_on(estimator.step(*event), sinks);
+    if (clock.now() < next_tick) continue;
+    const Timestamp tick = clock.now();
+    hand_on(estimator.step(Tick{tick}), sinks);
+    // A late loop skips ticks rather than running after them.
+    next_tick = std::max(next_tick + period, tick);
+    if (tick < next_status) continue;
+    sinks.inform(estimator.status());
+    next_status = tick + kStatusPeriod;
+  }
+}
+
+}  // namespace crepes

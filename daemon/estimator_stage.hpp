@@ -1,0 +1,29 @@
+/// The loop that owns the Estimator: events in, outputs out, time as Ticks.
+#pragma once
+
+#include <functional>
+#include <stop_token>
+
+#include "daemon/bounded_queue.hpp"
+#include "daemon/counters.hpp"
+#include "estimator/core/clock.hpp"
+#include "estimator/core/config.hpp"
+#include "estimator/core/event.hpp"
+#include "estimator/swarm/estimator.hpp"
+
+namespace crepes {
+
+using EventQueue = BoundedQueue<Event>;
+
+/// Where the results go. Called from the estimator's thread; must not wait.
+struct EstimatorSinks {
+  std::function<void(Outputs)> publish;         ///< poses and the report
+  std::function<void(GraphProblem)> solve;      ///< the answer comes back as an event
+  std::function<void(EstimatorStatus)> inform;  ///< four times a second
+};
+
+/// Steps the estimator until `stop`, with a Tick `estimator.output_rate_hz` times a second.
+void run_estimator(const Config& config, EventQueue& events, const EstimatorSinks& sinks,
+                   const Clock& clock, Counter& turns, const std::stop_token& stop);
+
+}  // namespace crepes

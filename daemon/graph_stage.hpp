@@ -1,0 +1,21 @@
+/// The loop that solves the pose graph, apart from the estimator because it takes its time.
+#pragma once
+
+#include <functional>
+#include <stop_token>
+
+#include "daemon/bounded_queue.hpp"
+#include "daemon/counters.hpp"
+#include "estimator/core/config.hpp"
+#include "estimator/core/measurements.hpp"
+
+namespace crepes {
+
+using GraphQueue = BoundedQueue<GraphProblem>;
+
+/// Solves what comes until `stop`.
+void run_graph(const GraphConfig& config, GraphQueue& problems,
+               const std::function<void(GraphSolution)>& answer, Counter& turns,
+               const std::stop_token& stop);
+
+}  // namespace crepes

@@ -1,0 +1,183 @@
+#include "daemon/net_stage.hpp"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "daemon/logging.hpp"
+#include "daemon/subscription_server.hpp"
+#include "net/peer_link.hpp"
+#include "net/udp_socket.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr int kMaxDatagramsAtOnce = 256;
+constexpr int kPollTimeoutMs = 100;
+constexpr Duration kFirstRetry = std::chrono::milliseconds{100};
+constexpr Duration kLastRetry = std::chrono::seconds{5};
+
+std::vector<RobotId> ids_of(const SwarmConfig& swarm) {
+  std::vector<RobotId> ids;
+  for (const MemberConfig& member : swarm.members) ids.push_back(member.id);
+  return ids;
+}
+
+/// The socket on the mesh, opened again when the interface comes and goes.
+class MeshSocket {
+ public:
+  explicit MeshSocket(const NetConfig& config) : config_(config) {}
+
+  [[nodiscard]] UdpSocket* get(Timestamp now) {
+    if (socket_ || now < retry_at_) return socket_ ? &*socket_ : nullptr;
+    Result<UdpSocket> opened =
+        UdpSocket::open_broadcast(config_.interface, static_cast<std::uint16_t>(config_.port));
+    if (!opened) {
+      failed(opened.error(), now);
+      return nullptr;
+    }
+    if (!fault_.empty()) log_message(LogLevel::kInfo, "mesh: works again");
+    fault_.clear();
+    retry_ = kFirstRetry;
+    socket_ = std::move(*opened);
+    return &*socket_;
+  }
+
+  void failed(const Error& error, Timestamp now) {
+    socket_.reset();
+    if (error.message != fault_) log_message(LogLevel::kWarning, "mesh: " + error.message);
+    fault_ = error.message;
+    retry_at_ = now + retry_;
+    retry_ = std::min(2 * retry_, kLastRetry);
+  }
+
+  /// Empty when all is well.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+  [[nodiscard]] int descriptor() const { return socket_ ? socket_->descriptor() : -1; }
+
+ private:
+  NetConfig config_;
+  std::optional<UdpSocket> socket_;
+  std::string fault_;
+  Timestamp retry_at_{};
+  Duration retry_ = kFirstRetry;
+};
+
+/// The net thread's state.
+class NetLoop {
+ public:
+  NetLoop(const NetStage& stage, const Clock& clock)
+      : stage_(stage),
+        clock_(clock),
+        start_(clock.now()),
+        link_(stage.config.robot.id, ids_of(stage.config.swarm)),
+        mesh_(stage.config.net),
+        server_(stage.config, [this] { return status(); }) {
+    for (const std::string& fault : server_.faults()) log_message(LogLevel::kWarning, fault);
+  }
+
+  void turn() {
+    wait();
+    receive();
+    stage_.inbox.clear_wake();
+    while (auto input = stage_.inbox.try_pop())
+      std::visit([this](auto& what) { on(what); }, *input);
+    server_.serve(clock_.now());
+  }
+
+ private:
+  void wait() {
+    std::vector<pollfd> watched;
+    const auto watch = [&](int fd) { watched.push_back({fd, POLLIN, 0}); };
+    watch(stage_.inbox.descriptor());
+    watch(mesh_.descriptor());  // -1 is passed over
+    for (const int fd : server_.descriptors()) watch(fd);
+    ::poll(watched.data(), watched.size(), kPollTimeoutMs);
+  }
+
+  void receive() {
+    for (int i = 0; i < kMaxDatagramsAtOnce; ++i) {
+      UdpSocket* socket = mesh_.get(clock_.now());
+      if (socket == nullptr) return;
+      Result<std::optional<Datagram>> datagram = socket->receive(std::chrono::milliseconds{0});
+      const Timestamp arrival = clock_.now();
+      if (!datagram) return mesh_.failed(datagram.error(), arrival);
+      if (!*datagram) return;
+      if (auto report = link_.receive((*datagram)->bytes, arrival))
+        stage_.on_report(std::move(*report));
+    }
+  }
+
+  void on(const Outputs& outputs) {
+    const Timestamp now = clock_.now();
+    if (outputs.report) broadcast(*outputs.report, now);
+    for (const NeighborPose& pose : outputs.poses) server_.publish(pose, now);
+  }
+  void on(EstimatorStatus& status) { estimator_ = std::move(status); }
+  void on(SensorStatus& status) { sensors_[status.name] = std::move(status); }
+
+  void broadcast(const Report& report, Timestamp now) {
+    UdpSocket* socket = mesh_.get(now);
+    if (socket == nullptr) return;
+    if (const Result<void> sent = socket->broadcast(link_.compose(report, now)); !sent)
+      mesh_.failed(sent.error(), now);
+  }
+
+  [[nodiscard]] SystemStatus status() const {
+    SystemStatus status;
+    status.self = stage_.config.robot.id;
+    for (const MemberConfig& member : stage_.config.swarm.members) {
+      if (member.id == status.self) status.name = member.name;
+    }
+    status.uptime_s = to_seconds(clock_.now() - start_);
+    for (const auto& [name, sensor] : sensors_) status.sensors.push_back(sensor);
+    status.sensors.push_back({"mesh", 0.0, mesh_.fault().empty(), mesh_.fault(), {}});
+    status.estimator = estimator_;
+    status.clocks = link_.clocks();
+    status.queues = stage_.queues();
+    status.network = link_.counters();
+    for (auto& counter : server_.counters()) status.network.push_back(std::move(counter));
+    return status;
+  }
+
+  const NetStage& stage_;
+  const Clock& clock_;
+  Timestamp start_;
+  PeerLink link_;
+  MeshSocket mesh_;
+  SubscriptionServer server_;
+  EstimatorStatus estimator_;
+  std::map<std::string, SensorStatus> sensors_;
+};
+
+}  // namespace
+
+NetInbox::NetInbox(std::size_t capacity)
+    : inputs_(capacity, Overflow::kDropOldest), wake_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+
+// Without an eventfd, or with its counter full, the reader still looks every 100 ms.
+void NetInbox::push(NetInput input) {
+  inputs_.push(std::move(input));
+  ::eventfd_write(wake_.get(), 1);
+}
+
+void NetInbox::clear_wake() {
+  eventfd_t ignored = 0;
+  ::eventfd_read(wake_.get(), &ignored);
+}
+
+void run_net(const NetStage& stage, const Clock& clock, Counter& turns,
+             const std::stop_token& stop) {
+  NetLoop loop(stage, clock);
+  while (!stop.stop_requested()) {
+    turns.add();
+    loop.turn();
+  }
+}
+
+}  // namespace crepes
