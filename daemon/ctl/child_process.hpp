@@ -1,0 +1,44 @@
+/// A program that this one starts and is sure to stop.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+/// Runs in its own process group with its output in a file; the destructor ends it, and the kernel
+/// does if this program dies first.
+class ChildProcess {
+ public:
+  /// `arguments` without the program's own name.
+  [[nodiscard]] static Result<ChildProcess> start(const std::filesystem::path& program,
+                                                  const std::vector<std::string>& arguments,
+                                                  const std::filesystem::path& log);
+
+  ChildProcess(ChildProcess&& other) noexcept;
+  ChildProcess& operator=(ChildProcess&&) = delete;
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
+  /// SIGTERM; SIGKILL if it is still there a second later.
+  ~ChildProcess();
+
+  /// How it ended, as "exit code 1" or "killed by signal 11"; empty while it runs.
+  [[nodiscard]] const std::optional<std::string>& ending();
+
+  /// Asks it to end, without waiting.
+  void ask_to_stop() const;
+
+ private:
+  explicit ChildProcess(pid_t pid) : pid_(pid) {}
+
+  pid_t pid_;
+  std::optional<std::string> ending_;
+};
+
+}  // namespace crepes

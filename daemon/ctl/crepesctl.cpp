@@ -1,0 +1,174 @@
+/// The tool around the daemon: replays, scores, watches, shows. Exit codes: 0 done, 1 the input is
+/// wrong (what and where on stderr), 2 wrong usage.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "daemon/ctl/demo.hpp"
+#include "daemon/ctl/evaluate.hpp"
+#include "daemon/ctl/live_screen.hpp"
+#include "daemon/ctl/swarm_replay.hpp"
+#include "daemon/ctl/text_table.hpp"
+#include "daemon/ctl/watch.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr int kInputWrong = 1;
+constexpr int kUsageWrong = 2;
+
+/// What was asked for; runs after all options have been read.
+using Command = std::function<Result<void>()>;
+
+/// An option that takes one of the names of an enumeration.
+template <class Enum, std::size_t N, class Set>
+void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<Enum>, N>& choices,
+                const Set& set, const std::string& help) {
+  std::vector<std::string> names;
+  for (const Choice<Enum>& choice : choices) names.emplace_back(choice.name);
+  app->add_option_function<std::string>(
+         flag,
+         [choices, set](const std::string& name) {
+           for (const Choice<Enum>& choice : choices)
+             if (choice.name == name) set(choice.value);
+         },
+         help)
+      ->check(CLI::IsMember(names));
+}
+
+Result<void> run_replay(ReplayOptions options) {
+  if (::isatty(STDERR_FILENO) == 1)
+    options.on_progress = [](double share) { std::fprintf(stderr, "\r%3.0f %% ", 100.0 * share); };
+  const Result<ReplaySummary> summary = replay_swarm(options);
+  if (options.on_progress) std::fputs("\r", stderr);
+  if (!summary) return tl::unexpected(summary.error());
+  for (const std::string& fault : summary->faults.list())
+    std::fprintf(stderr, "refused: %s\n", fault.c_str());
+  print(std::to_string(summary->robots) + " robots, " + fixed(summary->duration_s, 1) + " s, " +
+        std::to_string(summary->poses) + " poses in " + options.out_dir.string() + "\n");
+  return {};
+}
+
+void add_replay(CLI::App& app, ReplayOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "replay", "Run all robots of a recorded swarm on virtual time and write their poses");
+  sub->add_option("SWARM_DIR", options.swarm_dir, "the data set")->required();
+  sub->add_option("--out", options.out_dir,
+                  "directory for <observer>/<neighbor>.csv, .tum and report.json")
+      ->required();
+  add_choice(
+      sub, "--profile", kProfiles, [&options](Profile profile) { options.profile = profile; },
+      "filter, instead of what the configuration files say");
+  sub->add_flag("--no-graph{false},--graph{true}", options.graph, "no pose graph");
+  sub->add_option_function<std::uint64_t>(
+      "--seed", [&options](std::uint64_t seed) { options.seed = seed; },
+      "of the simulated network, instead of swarm.yaml's");
+  sub->callback([&] { command = [&options] { return run_replay(options); }; });
+}
+
+void add_evaluate(CLI::App& app, EvaluateOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "evaluate",
+      "Compare the poses of a replay with ground truth: errors without alignment "
+      "(ATE), availability, consistency, clocks");
+  sub->add_option("DIR", options.results, "what replay wrote")->required();
+  sub->add_option("--truth", options.swarm, "the data set, with its truth/")->required();
+  sub->add_option("--after", options.after_s, "seconds at the start that are not scored")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  sub->add_option("--against", options.against,
+                  "other results of the same data set; both are scored over common rows");
+  sub->add_flag("--json", options.json, "JSON instead of a table");
+  sub->callback([&] {
+    command = [&options] { return evaluate(options).map([](const auto& text) { print(text); }); };
+  });
+}
+
+void add_address(CLI::App* sub, WatchOptions& options) {
+  sub->add_option("--address", options.address, "where the daemon serves poses")
+      ->capture_default_str();
+  sub->add_option("--port", options.port, "its UDP port")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 65535));
+  sub->add_flag("--json", options.json, "the daemon's own JSON, one object a line");
+}
+
+void add_watch(CLI::App& app, WatchOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "watch", "A live table of the neighbors' poses, and why there is none where there is none");
+  add_address(sub, options);
+  sub->add_option_function<double>(
+         "--for", [&options](double seconds) { options.for_s = seconds; },
+         "stop after so many seconds")
+      ->check(CLI::Range(0.1, 1e6));
+  sub->add_flag("--once", options.once, "one table, then stop");
+  sub->callback([&] { command = [&options] { return watch(options); }; });
+}
+
+void add_status(CLI::App& app, WatchOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand("status", "One look at a daemon: sensors, neighbors, clocks");
+  add_address(sub, options);
+  sub->callback([&] { command = [&options] { return print_status(options); }; });
+}
+
+void add_demo(CLI::App& app, DemoOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "demo", "Start real daemons in a simulated world and compare their poses with its truth");
+  sub->add_option("--for", options.for_s, "seconds")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 600.0));
+  add_choice(
+      sub, "--scenario", kSimScenarios,
+      [&options](SimScenario scenario) { options.scenario = scenario; },
+      "what the robots do; four if left out");
+  sub->add_option("--seed", options.seed, "of the world")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  sub->add_option("--port", options.port, "the first robot's subscription; the others follow")
+      ->capture_default_str()
+      ->check(CLI::Range(1024, 65000));
+  sub->add_option("--keep", options.keep, "directory in which configurations and logs stay");
+  sub->callback([&] { command = [&options] { return demo(options); }; });
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("crepesctl: replay, score and watch relative localization of robot swarms");
+  app.require_subcommand(1);
+  ReplayOptions replay_options;
+  EvaluateOptions evaluate_options;
+  WatchOptions watch_options;
+  DemoOptions demo_options;
+  Command command;
+  add_replay(app, replay_options, command);
+  add_evaluate(app, evaluate_options, command);
+  add_watch(app, watch_options, command);
+  add_status(app, watch_options, command);
+  add_demo(app, demo_options, command);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : kUsageWrong;
+  }
+  const Result<void> done = command();
+  if (done) return 0;
+  std::fprintf(stderr, "crepesctl: %s\n", done.error().message.c_str());
+  return done.error().code == ErrorCode::kUsage ? kUsageWrong : kInputWrong;
+}
+
+}  // namespace
+}  // namespace crepes
+
+int main(int argc, char** argv) {
+  try {
+    return crepes::run(argc, argv);
+  } catch (const std::exception& e) {  // out of memory; nothing else gets here
+    std::fprintf(stderr, "crepesctl: %s\n", e.what());
+    return 1;
+  }
+}

@@ -1,0 +1,97 @@
+#include <nlohmann/json.hpp>
+
+#include "daemon/ctl/csv_file.hpp"
+#include "daemon/ctl/daemon_client.hpp"
+
+namespace crepes {
+namespace {
+
+using Json = nlohmann::json;
+
+RobotId id_from(const Json& json) { return RobotId{json.get<std::uint16_t>()}; }
+
+PoseMode mode_from(const std::string& name) {
+  for (const PoseMode mode : {PoseMode::kDirect, PoseMode::kGraph})
+    if (name == name_of(mode)) return mode;
+  return PoseMode::kPredicted;
+}
+
+Eigen::Vector3d vector_from(const Json& json) {
+  return {json.at("x").get<double>(), json.at("y").get<double>(), json.at("z").get<double>()};
+}
+
+Matrix6d covariance_from(const Json& json) {
+  Matrix6d covariance;
+  std::size_t next = 0;
+  for (Eigen::Index row = 0; row < 6; ++row)
+    for (Eigen::Index column = row; column < 6; ++column)
+      covariance(row, column) = covariance(column, row) = json.at(next++).get<double>();
+  return covariance;
+}
+
+PoseMessage pose_from(const Json& json) {
+  PoseMessage message;
+  message.self = id_from(json.at("self"));
+  message.name = json.value("name", "");
+  NeighborPose& pose = message.pose;
+  pose.neighbor = id_from(json.at("peer"));
+  std::int64_t t_ns = 0;
+  if (!parse_number(json.at("t_ns").get<std::string>(), t_ns).empty())
+    throw nlohmann::json::other_error::create(0, "t_ns is not a number", nullptr);
+  pose.stamp = Timestamp{Duration{t_ns}};
+  pose.mode = mode_from(json.value("mode", ""));
+  pose.T_B_N.pose.p = vector_from(json.at("position"));
+  const Eigen::Vector3d xyz = vector_from(json.at("orientation"));
+  const double w = json.at("orientation").at("w").get<double>();
+  pose.T_B_N.pose.q = Eigen::Quaterniond(w, xyz.x(), xyz.y(), xyz.z()).normalized();
+  if (json.contains("covariance")) pose.T_B_N.covariance = covariance_from(json["covariance"]);
+  if (json.contains("velocity")) pose.v_B_N = vector_from(json["velocity"]);
+  pose.age_s = json.value("age_s", 0.0);
+  pose.reset_counter = json.value("reset_counter", 0U);
+  return message;
+}
+
+StatusMessage status_from(const Json& json) {
+  StatusMessage status;
+  status.self = id_from(json.at("self"));
+  status.name = json.value("name", "");
+  status.uptime_s = json.value("uptime_s", 0.0);
+  for (const Json& neighbor : json.value("neighbors", Json::array()))
+    status.neighbors.push_back({.neighbor = id_from(neighbor.at("peer")),
+                                .name = neighbor.value("name", ""),
+                                .state = neighbor.value("state", "none"),
+                                .reason = neighbor.value("reason", "")});
+  for (const Json& sensor : json.value("sensors", Json::array()))
+    status.sensors.push_back({.name = sensor.at("name").get<std::string>(),
+                              .rate_hz = sensor.value("rate_hz", 0.0),
+                              .ok = sensor.value("ok", false),
+                              .message = sensor.value("message", "")});
+  for (const Json& clock : json.value("clocks", Json::array()))
+    status.clocks.push_back({.peer = id_from(clock.at("peer")),
+                             .offset_s = clock.value("offset_s", 0.0),
+                             .skew_ppm = clock.value("skew_ppm", 0.0),
+                             .sigma_s = clock.value("sigma_s", 0.0)});
+  return status;
+}
+
+DaemonMessage message_from(const Json& json) {
+  const std::string name = json.at("class").get<std::string>();
+  if (name == "POSE") return pose_from(json);
+  if (name == "STATUS") return status_from(json);
+  if (name == "VERSION")
+    return VersionMessage{json.value("release", ""), json.value("lease_s", 0.0)};
+  if (name == "ERROR") return ErrorMessage{json.value("message", "")};
+  throw nlohmann::json::other_error::create(0, "unknown class " + name, nullptr);
+}
+
+}  // namespace
+
+Result<DaemonMessage> parse_message(std::string_view datagram) {
+  try {
+    return message_from(Json::parse(datagram));
+  } catch (const Json::exception& e) {
+    return fail(ErrorCode::kFormat, e.what());
+  }
+}
+
+}  // namespace crepes

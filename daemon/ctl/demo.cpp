@@ -1,0 +1,315 @@
+#include "daemon/ctl/demo.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/config_file.hpp"
+#include "daemon/ctl/child_process.hpp"
+#include "daemon/ctl/csv_file.hpp"
+#include "daemon/ctl/daemon_client.hpp"
+#include "daemon/ctl/demo_swarm.hpp"
+#include "daemon/ctl/live_screen.hpp"
+#include "daemon/ctl/neighbor_view.hpp"
+#include "daemon/ctl/pair_score.hpp"
+#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/ctl/text_table.hpp"
+#include "drivers/monotonic_clock.hpp"
+#include "drivers/sim/world.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using Row = std::vector<std::string>;
+
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+constexpr double kOnTheWay = 0.1;  // s; the last poses have not arrived when the time is over
+
+/// One robot and the line to its daemon.
+struct Live {
+  DemoRobot robot;
+  fs::path log;
+  DaemonClient client;
+};
+
+/// One ordered pair: all its poses, and when the first of them came.
+struct Pair {
+  std::size_t observer;
+  RobotId neighbor;
+  NeighborView view;
+  std::vector<NeighborPose> poses;
+  std::optional<Duration> first_pose;  ///< after the daemons' start
+};
+
+std::string name_of_robot(RobotId id) { return "r" + std::to_string(id.value); }
+
+/// The last lines of a log.
+std::string tail_of(const fs::path& log) {
+  constexpr std::size_t kMaxBytes = 2000;
+  std::string text = read_text_file(log).value_or("");
+  if (text.size() <= kMaxBytes) return text;
+  text.erase(0, text.size() - kMaxBytes);
+  return text.substr(std::min(text.find('\n') + 1, text.size()));
+}
+
+/// Ports that nobody uses now: the subscriptions', checked, and one for the mesh, found.
+Result<std::uint16_t> free_mesh_port(std::uint16_t first, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto port = static_cast<std::uint16_t>(first + i);
+    if (const auto socket = UdpSocket::bind("127.0.0.1", port); !socket)
+      return tl::unexpected(Error(socket.error()).with_context("choose another --port"));
+  }
+  return UdpSocket::bind("127.0.0.1", 0).map([](const UdpSocket& socket) {
+    return socket.local().port;
+  });
+}
+
+class Demo {
+ public:
+  explicit Demo(const DemoOptions& options)
+      : options_(options), world_(sim_config(options)), start_(clock_.now()) {}
+
+  Result<void> start(const fs::path& dir) {
+    const std::vector<RobotId> ids = world_.robots();
+    const Result<std::uint16_t> mesh_port = free_mesh_port(options_.port, ids.size());
+    if (!mesh_port) return tl::unexpected(mesh_port.error());
+    std::error_code status;
+    const fs::path daemon = fs::read_symlink("/proc/self/exe", status).parent_path() / "crepesd";
+    start_ = clock_.now();
+    for (DemoRobot& robot :
+         demo_swarm(sim_config(options_), ids, epoch_s(), options_.port, *mesh_port)) {
+      if (auto done = start_robot(dir, daemon, std::move(robot)); !done) return done;
+    }
+    return {};
+  }
+
+  /// Until the time is over, a daemon dies, or somebody says stop.
+  Result<void> run(StopSignals& stop) {
+    LiveScreen screen;
+    const Duration redraw_period = screen.is_terminal() ? Duration{200ms} : Duration{5s};
+    Timestamp redraw = start_;
+    Timestamp renewal = start_;
+    while (world_s() < options_.for_s && !stop.requested()) {
+      if (auto alive = check_daemons(); !alive) return alive;
+      if (clock_.now() >= renewal) {
+        ask_all();
+        // Often at first: the daemons are only just opening their sockets.
+        renewal = clock_.now() + (has_all_poses() ? Duration{1s} : Duration{50ms});
+      }
+      if (auto done = listen(); !done) return done;
+      if (clock_.now() < redraw) continue;
+      redraw = clock_.now() + redraw_period;
+      screen.show(table());
+    }
+    return {};
+  }
+
+  void stop() {
+    end_s_ = world_s();
+    for (const ChildProcess& daemon : daemons_) daemon.ask_to_stop();
+    daemons_.clear();
+  }
+
+  /// Of each pair the whole run; an error names the pairs without a pose.
+  Result<void> sum_up() const {
+    std::vector<Row> rows{{"pair", "first pose s", "avail %", "median m", "max m", "median deg",
+                           "max deg", "direct", "graph", "predicted"}};
+    std::string missing;
+    for (const Pair& pair : pairs_) {
+      rows.push_back(summary_row(pair));
+      if (!pair.first_pose) missing += " " + name_of(pair);
+    }
+    print(text_table(rows) + "availability and errors from second " + fixed(scored_from_s(), 1) +
+          " to " + fixed(end_s_, 1) + "\n");
+    if (missing.empty()) return {};
+    return fail(ErrorCode::kNotFound, "never a pose of:" + missing);
+  }
+
+ private:
+  static SimConfig sim_config(const DemoOptions& options) {
+    SimConfig sim;
+    sim.enabled = true;
+    sim.scenario = options.scenario;
+    sim.seed = options.seed;
+    return sim;
+  }
+
+  [[nodiscard]] double epoch_s() const { return to_seconds(start_.time_since_epoch()); }
+  [[nodiscard]] double world_s() const { return to_seconds(clock_.now() - start_); }
+
+  /// The start is told by itself, as the time to the first pose.
+  [[nodiscard]] double scored_from_s() const { return std::min(5.0, end_s_ / 2.0); }
+
+  [[nodiscard]] std::string name_of(const Pair& pair) const {
+    return name_of_robot(robots_.at(pair.observer).robot.config.robot.id) + "->" +
+           name_of_robot(pair.neighbor);
+  }
+
+  [[nodiscard]] Pose truth(const Pair& pair, Timestamp local) const {
+    const DemoRobot& observer = robots_.at(pair.observer).robot;
+    return world_.T_B_N(observer.config.robot.id, pair.neighbor, observer.clock.true_s(local));
+  }
+
+  Result<void> start_robot(const fs::path& dir, const fs::path& daemon, DemoRobot robot) {
+    const RobotId id = robot.config.robot.id;
+    const fs::path file = dir / (name_of_robot(id) + ".yaml");
+    const fs::path log = dir / (name_of_robot(id) + ".log");
+    std::ofstream out(file);
+    out << write_config(robot.config);
+    out.close();
+    if (!out) return fail(ErrorCode::kIo, file.string() + ": cannot be written");
+    auto client =
+        DaemonClient::open("127.0.0.1", static_cast<std::uint16_t>(robot.config.subscription.port));
+    if (!client) return tl::unexpected(client.error());
+    auto process = ChildProcess::start(daemon, {"--config", file.string()}, log);
+    if (!process) return tl::unexpected(process.error());
+    for (const RobotId other : world_.robots()) {
+      if (other == id) continue;
+      pair_index_[{id, other}] = pairs_.size();
+      pairs_.push_back({.observer = robots_.size(),
+                        .neighbor = other,
+                        .view = {},
+                        .poses = {},
+                        .first_pose = {}});
+    }
+    robots_.push_back({std::move(robot), log, std::move(*client)});
+    daemons_.push_back(std::move(*process));
+    return {};
+  }
+
+  Result<void> check_daemons() {
+    for (std::size_t i = 0; i < daemons_.size(); ++i) {
+      const std::optional<std::string>& ending = daemons_[i].ending();
+      if (!ending) continue;
+      const Live& robot = robots_[i];
+      return fail(ErrorCode::kIo, "crepesd of " + name_of_robot(robot.robot.config.robot.id) +
+                                      " ended: " + *ending + "\n" + tail_of(robot.log));
+    }
+    return {};
+  }
+
+  /// A daemon that is not there yet does not mind.
+  void ask_all() {
+    for (Live& robot : robots_)
+      (void)robot.client.watch().and_then([&] { return robot.client.poll(); });
+  }
+
+  /// Everything that has come, after waiting for a moment.
+  Result<void> listen() {
+    std::chrono::milliseconds patience = 5ms;
+    for (std::size_t i = 0; i < robots_.size(); ++i) {
+      for (;;) {
+        auto answer = robots_[i].client.receive(patience);
+        if (!answer) return tl::unexpected(answer.error());
+        patience = 0ms;
+        if (!*answer) break;
+        take(robots_[i], (*answer)->message);
+      }
+    }
+    return {};
+  }
+
+  void take(const Live& robot, const DaemonMessage& message) {
+    const RobotId self = robot.robot.config.robot.id;
+    if (const auto* heard = std::get_if<PoseMessage>(&message)) {
+      const auto index = pair_index_.find({self, heard->pose.neighbor});
+      if (index != pair_index_.end()) take_pose(pairs_[index->second], robot, heard->pose);
+    } else if (const auto* status = std::get_if<StatusMessage>(&message)) {
+      for (const StatusMessage::Neighbor& neighbor : status->neighbors) {
+        const auto index = pair_index_.find({self, neighbor.neighbor});
+        if (index != pair_index_.end()) pairs_[index->second].view.on_reason(neighbor.reason);
+      }
+    }
+  }
+
+  void take_pose(Pair& pair, const Live& robot, NeighborPose pose) {
+    pose.published = robot.robot.clock.local(world_s());
+    pair.view.on_pose(pose, clock_.now());
+    if (!pair.first_pose) pair.first_pose = clock_.now() - start_;
+    if (pair.poses.empty() || pose.stamp > pair.poses.back().stamp) pair.poses.push_back(pose);
+  }
+
+  [[nodiscard]] bool has_all_poses() const {
+    return std::all_of(pairs_.begin(), pairs_.end(),
+                       [](const Pair& pair) { return pair.first_pose.has_value(); });
+  }
+
+  [[nodiscard]] std::string table() const {
+    std::vector<Row> rows{{"pair", "mode", "range m", "error m", "error deg", "sigma m", "deg",
+                           "age ms", "first pose s", "why not"}};
+    for (const Pair& pair : pairs_) rows.push_back(live_row(pair));
+    return "world time " + fixed(world_s(), 1) + " s of " + fixed(options_.for_s, 0) + "\n\n" +
+           text_table(rows);
+  }
+
+  [[nodiscard]] Row live_row(const Pair& pair) const {
+    const std::string first = pair.first_pose ? fixed(to_seconds(*pair.first_pose), 2) : "";
+    const NeighborPose* pose = pair.view.pose(clock_.now());
+    if (pose == nullptr) {
+      return {name_of(pair), "-", "", "", "", "", "", "", first, pair.view.reason()};
+    }
+    const Pose T_B_N = truth(pair, pose->stamp);
+    const Vector6d d = pose_difference(pose->T_B_N.pose, T_B_N);
+    const PoseSigma sigma = sigma_of(pose->T_B_N.covariance);
+    return {name_of(pair),
+            std::string(crepes::name_of(pose->mode)),
+            fixed(T_B_N.p.norm(), 2),
+            fixed(d.head<3>().norm(), 3),
+            fixed(kDegPerRad * d.tail<3>().norm(), 2),
+            fixed(sigma.position_m, 3),
+            fixed(kDegPerRad * sigma.rotation_rad, 2),
+            fixed(1e3 * to_seconds(pose->published - pose->stamp), 1),
+            first,
+            ""};
+  }
+
+  [[nodiscard]] Row summary_row(const Pair& pair) const {
+    const RobotClock& clock = robots_.at(pair.observer).robot.clock;
+    const PairScore score =
+        score_pair(pair.poses, [&](Timestamp t) { return truth(pair, t); }, clock.local(0.0),
+                   {.begin = clock.local(scored_from_s()), .end = clock.local(end_s_ - kOnTheWay)});
+    const ErrorStatistics p = statistics_of(score.position_errors_m);
+    const ErrorStatistics r = statistics_of(score.rotation_errors_rad);
+    Row row{name_of(pair),
+            pair.first_pose ? fixed(to_seconds(*pair.first_pose), 2) : "never",
+            fixed(100.0 * score.availability, 1),
+            fixed(p.median, 3),
+            fixed(p.max, 3),
+            fixed(kDegPerRad * r.median, 2),
+            fixed(kDegPerRad * r.max, 2)};
+    for (const std::size_t count : score.modes) row.push_back(std::to_string(count));
+    return row;
+  }
+
+  DemoOptions options_;
+  MonotonicClock clock_;
+  SimWorld world_;
+  Timestamp start_;
+  std::vector<Live> robots_;
+  std::vector<ChildProcess> daemons_;  ///< one for each of robots_, while they run
+  std::vector<Pair> pairs_;
+  std::map<std::pair<RobotId, RobotId>, std::size_t> pair_index_;
+  double end_s_ = 0.0;  ///< world time when it was over
+};
+
+}  // namespace
+
+Result<void> demo(const DemoOptions& options) {
+  const Result<ScratchDirectory> directory = ScratchDirectory::create(options.keep);
+  if (!directory) return tl::unexpected(directory.error());
+  StopSignals stop;
+  Demo demo(options);
+  const Result<void> ran = demo.start(directory->path()).and_then([&] { return demo.run(stop); });
+  demo.stop();
+  if (!ran) return ran;
+  return demo.sum_up();
+}
+
+}  // namespace crepes
