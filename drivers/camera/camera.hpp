@@ -38,7 +38,7 @@ class Camera {
 
   /// Takes back a frame of this camera that has been used, pixels unchanged, to save the next its
   /// memory. Optional.
-  virtual void recycle(Frame frame) { static_cast<void>(std::move(frame)); }
+  virtual void recycle(Frame /*frame*/) {}
 
   /// Totals by reason: frames missed, late, broken.
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::uint64_t>> counters() const = 0;

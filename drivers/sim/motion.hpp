@@ -33,7 +33,7 @@ struct BodyState {
   Eigen::Vector3d w_W_B_B = Eigen::Vector3d::Zero();  ///< angular rate [rad/s], body axes
 
   /// What an ideal accelerometer feels: +9.81 up at rest [m/s^2], body axes.
-  [[nodiscard]] Eigen::Vector3d specific_force_B() const {
+  [[nodiscard]] Eigen::Vector3d specific_force() const {
     return T_W_B.q.conjugate() * (a_W_B + kGravityMps2 * Eigen::Vector3d::UnitZ());
   }
 };

@@ -60,7 +60,7 @@ Result<RingRenderer> RingRenderer::make(const SimWorld& world, RobotId robot,
   return renderer;
 }
 
-RingRenderer::RingRenderer(const SimWorld& world, RobotId robot, CameraModel model,
+RingRenderer::RingRenderer(const SimWorld& world, RobotId robot, const CameraModel& model,
                            const CameraConfig& camera, std::uint8_t index)
     : world_(world),
       robot_(robot),

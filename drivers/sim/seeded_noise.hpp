@@ -13,7 +13,7 @@ namespace crepes {
 /// SplitMix64 (Steele, Lea, Flood 2014).
 class SeededNoise {
  public:
-  explicit SeededNoise(std::initializer_list<std::uint64_t> key) {
+  SeededNoise(std::initializer_list<std::uint64_t> key) {
     for (const std::uint64_t part : key) state_ = mix(state_ ^ mix(part));
   }
 

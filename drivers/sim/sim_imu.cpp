@@ -43,7 +43,7 @@ SimImu::SimImu(const SimWorld& world, RobotId robot, const ImuConfig& config)
 std::vector<std::uint8_t> SimImu::sample(double t_s) {
   const BodyState body = world_.state(robot_, t_s);
   const auto bytes = encode_witmotion(gyro_.measure(body.w_W_B_B, period_s_),
-                                      accel_.measure(body.specific_force_B(), period_s_));
+                                      accel_.measure(body.specific_force(), period_s_));
   return {bytes.begin(), bytes.end()};
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "drivers/sim/world.hpp"
@@ -30,7 +31,7 @@ class SimUwb {
     Eigen::Vector3d p_body_uwb = Eigen::Vector3d::Zero();
   };
 
-  SimUwb(const SimWorld& world, const UwbConfig& config) : world_(world), config_(config) {}
+  SimUwb(const SimWorld& world, UwbConfig config) : world_(world), config_(std::move(config)) {}
   [[nodiscard]] NlinkNode measure(const Module& other, double t_s) const;
 
   const SimWorld& world_;

@@ -12,10 +12,10 @@ namespace {
 
 /// One kind of frame: a fixed part that ends with the number of nodes, the nodes, a checksum.
 struct Layout {
-  std::uint8_t function;
-  std::size_t system_time_at;
-  std::size_t fixed;
-  std::size_t per_node;
+  std::uint8_t function = 0;
+  std::size_t system_time_at = 0;
+  std::size_t fixed = 0;
+  std::size_t per_node = 0;
   std::optional<std::size_t> node_time_at;
 
   [[nodiscard]] std::size_t length(std::size_t nodes) const { return fixed + nodes * per_node + 1; }

@@ -120,7 +120,7 @@ TEST(SimImu, ReadsWhatTheBodyFeelsWithinItsErrors) {
       const BodyState body = world.state(RobotId{1}, t);
       const Eigen::Vector3d error = sample.gyro_radps - body.w_W_B_B;
       gyro_error += error / kSamples;
-      accel_error += (sample.accel_mps2 - body.specific_force_B()) / kSamples;
+      accel_error += (sample.accel_mps2 - body.specific_force()) / kSamples;
       gyro_spread += (error - last).squaredNorm() / (6.0 * kSamples);
       last = error;
     };

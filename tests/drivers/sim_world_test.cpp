@@ -119,7 +119,7 @@ TEST(SimWorld, OccludesOnlyBetweenTheEnds) {
 
 TEST(SimWorld, RobotsAtRestFeelGravityUpwards) {
   BodyState rest;
-  EXPECT_DOUBLE_EQ(rest.specific_force_B().z(), 9.81);
+  EXPECT_DOUBLE_EQ(rest.specific_force().z(), 9.81);
 }
 
 TEST(SimClock, RunsAsItsConfigurationSays) {
