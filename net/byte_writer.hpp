@@ -22,7 +22,7 @@ class ByteWriter {
       ok_ = false;
       return;
     }
-    const std::uint64_t bits = static_cast<Unsigned>(value);
+    const std::uint64_t bits{static_cast<Unsigned>(value)};
     for (std::size_t i = 0; i < sizeof(Integer); ++i)
       bytes_.push_back(static_cast<std::uint8_t>(bits >> (8 * i)));
   }

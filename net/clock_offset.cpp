@@ -46,15 +46,21 @@ double envelope_sigma(const Bounds& bounds, double skew, double center, double t
   return excess / (n * n);
 }
 
+ClockOffset::Verdict contradicted(int& in_a_row) {
+  using Verdict = ClockOffset::Verdict;
+  return ++in_a_row < kContradictions ? Verdict::kImplausible : Verdict::kRestarted;
+}
+
 /// Maximum of a concave function in [low, high].
 template <class Function>
 double maximizer(double low, double high, Function f) {
   for (int i = 0; i < 32; ++i) {
     const double third = (high - low) / 3;
-    if (f(low + third) < f(high - third))
+    if (f(low + third) < f(high - third)) {
       low += third;
-    else
+    } else {
       high -= third;
+    }
   }
   return (low + high) / 2;
 }
@@ -81,10 +87,6 @@ bool ClockOffset::is_plausible(double t, double low, double high) const {
   const double tolerance = kTolerance + 4 * sigma;
   return low < fit_->at(t) + tolerance && low > fit_->at(t) - kMaxDelay &&
          high > fit_->at(t) - tolerance && high < fit_->at(t) + kMaxDelay;
-}
-
-ClockOffset::Verdict ClockOffset::contradicted(int& in_a_row) {
-  return ++in_a_row < kContradictions ? Verdict::kImplausible : Verdict::kRestarted;
 }
 
 ClockOffset::Verdict ClockOffset::packet_arrived(const PacketTimes& packet) {

@@ -56,7 +56,6 @@ class ClockOffset {
 
  private:
   void begin_anew();
-  [[nodiscard]] Verdict contradicted(int& in_a_row);
   [[nodiscard]] bool is_plausible(double t, double low, double high) const;
   [[nodiscard]] double seconds(Timestamp t) const;
   [[nodiscard]] double offset_seconds(PeerTimestamp peer, Timestamp ours) const;

@@ -136,12 +136,13 @@ class Selection {
   std::vector<const Item*> newest_first(const std::vector<Item>& items) {
     std::vector<const Item*> chosen;
     for (const Item& item : items) {
-      if (!is_writable(item))
+      if (!is_writable(item)) {
         ++refused;
-      else if (!ticks_from<std::int16_t>(base_tick_, item.stamp))
+      } else if (!ticks_from<std::int16_t>(base_tick_, item.stamp)) {
         ++left_out;
-      else
+      } else {
         chosen.push_back(&item);
+      }
     }
     std::stable_sort(chosen.begin(), chosen.end(),
                      [](const Item* a, const Item* b) { return a->stamp > b->stamp; });
@@ -399,7 +400,7 @@ class Decoder {
     for (std::size_t i = 0; i < n && !fault_; ++i) read_one();
   }
 
-  PeerTimestamp time(std::int64_t ticks) const {
+  [[nodiscard]] PeerTimestamp time(std::int64_t ticks) const {
     return PeerTimestamp{Duration{(base_tick_ + ticks) * kTick}};
   }
   PeerTimestamp stamp() { return time(in_.read<std::int16_t>()); }
@@ -455,7 +456,7 @@ class Decoder {
   }
 
   int exponent() {
-    const int exponent = in_.read<std::int8_t>();
+    const auto exponent = in_.read<std::int8_t>();
     expect(exponent >= kMinExponent && exponent <= kMaxExponent, PeerMessageFault::kOutOfRange);
     return exponent;
   }

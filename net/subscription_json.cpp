@@ -55,14 +55,15 @@ bool is_nested_deeply(std::string_view text) {
   bool in_string = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
-    if (in_string && c == '\\')
+    if (in_string && c == '\\') {
       ++i;
-    else if (c == '"')
+    } else if (c == '"') {
       in_string = !in_string;
-    else if (!in_string && (c == '{' || c == '['))
+    } else if (!in_string && (c == '{' || c == '[')) {
       depth += 1;
-    else if (!in_string && (c == '}' || c == ']'))
+    } else if (!in_string && (c == '}' || c == ']')) {
       depth -= 1;
+    }
     if (depth > kMaxDepth) return true;
   }
   return false;
@@ -113,9 +114,10 @@ Json sources_of(const PoseSources& sources) {
 
 Json covariance_of(const Matrix6d& covariance) {
   Json entries = Json::array();
-  for (int row = 0; row < 6; ++row)
+  for (int row = 0; row < 6; ++row) {
     for (int column = row; column < 6; ++column)
       entries.push_back(rounded(covariance(row, column), 6));
+  }
   return entries;
 }
 
@@ -132,16 +134,20 @@ Json sensor_json(const SensorStatus& sensor) {
 Json neighbor_json(const NeighborStatus& neighbor) {
   Json json{{"peer", neighbor.neighbor.value}, {"name", shortened(neighbor.name, kMaxName)}};
   json["state"] = neighbor.pose ? name_of(neighbor.pose->mode) : "none";
-  if (neighbor.pose)
+  if (neighbor.pose) {
     put(json, "age_s", neighbor.pose->age_s, 3);
-  else
+  } else {
     json["reason"] = name_of(neighbor.reason);
+  }
   json["id_decodes"] = neighbor.id_decodes;
-  for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind)
-    for (std::size_t verdict = 0; verdict < kVerdictCount; ++verdict)
-      if (const auto total = neighbor.measurements.at(kind).at(verdict); total > 0)
+  for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind) {
+    for (std::size_t verdict = 0; verdict < kVerdictCount; ++verdict) {
+      if (const auto total = neighbor.measurements.at(kind).at(verdict); total > 0) {
         json["measurements"][std::string(name_of(static_cast<MeasurementKind>(kind)))]
             [std::string(name_of(static_cast<Verdict>(verdict)))] = total;
+      }
+    }
+  }
   return json;
 }
 
@@ -226,11 +232,12 @@ std::string pose_json(std::uint64_t sequence, RobotId self, std::string_view nam
             {"mode", name_of(pose.mode)}};
   const Eigen::Quaterniond& q = pose.T_B_N.pose.q;
   put_vector(json, "position", pose.T_B_N.pose.p);
-  if (q.coeffs().allFinite())
+  if (q.coeffs().allFinite()) {
     json["orientation"] = {{"w", rounded(q.w(), 9)},
                            {"x", rounded(q.x(), 9)},
                            {"y", rounded(q.y(), 9)},
                            {"z", rounded(q.z(), 9)}};
+  }
   put_vector(json, "velocity", pose.v_B_N);
   if (pose.T_B_N.covariance.allFinite()) json["covariance"] = covariance_of(pose.T_B_N.covariance);
   put(json, "age_s", pose.age_s, 4);

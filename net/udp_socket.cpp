@@ -15,6 +15,7 @@
 #include <cstring>
 #include <memory>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "estimator/core/contract.hpp"
@@ -87,7 +88,8 @@ std::string_view advice_for(int error) {
 }
 
 tl::unexpected<Error> fail_errno(const std::string& what, int error) {
-  return fail(ErrorCode::kIo, what + ": " + std::strerror(error) + std::string(advice_for(error)));
+  return fail(ErrorCode::kIo, what + ": " + std::generic_category().message(error) +
+                                  std::string(advice_for(error)));
 }
 
 struct FreeInterfaces {

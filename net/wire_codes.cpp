@@ -28,7 +28,7 @@ std::array<std::int16_t, 2> encode_direction(const Eigen::Vector3d& u) {
   // Of the four codes around the point, not the nearest in the plane but the nearest on the sphere.
   std::array<std::int16_t, 2> best{};
   double least = std::numeric_limits<double>::infinity();
-  for (const double column : {std::floor(a * kUnit), std::ceil(a * kUnit)})
+  for (const double column : {std::floor(a * kUnit), std::ceil(a * kUnit)}) {
     for (const double row : {std::floor(b * kUnit), std::ceil(b * kUnit)}) {
       const std::array code{to_code(column), to_code(row)};
       const double error = (*decode_direction(code) - u).squaredNorm();
@@ -37,6 +37,7 @@ std::array<std::int16_t, 2> encode_direction(const Eigen::Vector3d& u) {
         best = code;
       }
     }
+  }
   return best;
 }
 
