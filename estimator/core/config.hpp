@@ -33,6 +33,8 @@ struct Choice {
   std::string_view name;
   Enum value;
 };
+template <class Enum>
+Choice(std::string_view, Enum) -> Choice<Enum>;
 
 struct RobotConfig {
   RobotId id{};
