@@ -41,7 +41,8 @@ SimImu::SimImu(const SimWorld& world, RobotId robot, const ImuConfig& config)
               config.scale_sigma}) {}
 
 std::vector<std::uint8_t> SimImu::sample(double t_s) {
-  const BodyState body = world_.state(robot_, t_s);
+  // A sensor that integrates inside sends the mean since its last sample.
+  const BodyState body = world_.state(robot_, t_s - 0.5 * period_s_);
   const auto bytes = encode_witmotion(gyro_.measure(body.w_W_B_B, period_s_),
                                       accel_.measure(body.specific_force(), period_s_));
   return {bytes.begin(), bytes.end()};

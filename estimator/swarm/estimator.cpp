@@ -9,7 +9,7 @@
 
 #include "estimator/core/contract.hpp"
 #include "estimator/relative/tilt_filter.hpp"
-#include "estimator/swarm/body_state.hpp"
+#include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/neighbor.hpp"
 #include "estimator/swarm/report_composer.hpp"
@@ -95,7 +95,7 @@ struct Estimator::State {
   [[nodiscard]] GraphProblem graph_problem(const std::vector<NeighborEstimate>& own) const;
 
   RobotId id;
-  BodyState self;
+  RobotState self;
   TiltFilter tilt_filter;
   std::vector<BlinkTracker> trackers;
   std::map<RobotId, Neighbor> neighbors;

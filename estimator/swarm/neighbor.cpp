@@ -49,7 +49,7 @@ void Neighbor::take_range(const UwbRange& range, MeasurementKind kind) {
   enqueue({range.stamp, kind, RangeReading{range.range_m, settings_.range_sigma_m}});
 }
 
-void Neighbor::add_report(const ReceivedReport& received, const BodyState& self) {
+void Neighbor::add_report(const ReceivedReport& received, const RobotState& self) {
   const Report& report = received.report;
   last_heard_ = std::max(last_heard_, report.stamp);
   for (const ImuSample& sample : report.imu) body_.imu.push(sample);
@@ -63,7 +63,7 @@ void Neighbor::add_report(const ReceivedReport& received, const BodyState& self)
 }
 
 void Neighbor::take_peer_bearing(const Bearing& bearing, double clock_sigma_s,
-                                 const BodyState& self) {
+                                 const RobotState& self) {
   last_seen_by_ = std::max(last_seen_by_, bearing.stamp);
   // A stamp off by dt turns the direction by w dt.
   const double w = body_.imu.empty() ? 0.0 : body_.imu.newest().gyro_radps.norm();
@@ -136,14 +136,14 @@ void Neighbor::count(MeasurementKind kind, Verdict verdict) {
   ++status_.measurements[static_cast<std::size_t>(kind)][static_cast<std::size_t>(verdict)];
 }
 
-void Neighbor::tick(Timestamp now, const BodyState& self) {
+void Neighbor::tick(Timestamp now, const RobotState& self) {
   pose_.reset();
   release(now, self);
   look_ahead(now, self);
   reason_ = pose_ ? NoPoseReason::kNone : reason(now, self);
 }
 
-void Neighbor::release(Timestamp now, const BodyState& self) {
+void Neighbor::release(Timestamp now, const RobotState& self) {
   while (const auto measurement = sequencer_.pop_ready(now)) {
     const bool usable =
         track_ && measurement->stamp >= track_->stamp() && !self.imu.empty() && !body_.imu.empty();
@@ -156,7 +156,7 @@ void Neighbor::release(Timestamp now, const BodyState& self) {
   }
 }
 
-void Neighbor::look_ahead(Timestamp now, const BodyState& self) {
+void Neighbor::look_ahead(Timestamp now, const RobotState& self) {
   if (!track_ || self.imu.empty() || body_.imu.empty()) return;
   const Timestamp state_time = std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
   if (track_->stamp() > state_time) return;
@@ -210,7 +210,7 @@ std::optional<NeighborPose> Neighbor::improved_pose() const {
   return improved;
 }
 
-NoPoseReason Neighbor::reason(Timestamp now, const BodyState& self) const {
+NoPoseReason Neighbor::reason(Timestamp now, const RobotState& self) const {
   if (last_heard_ == kNever) return NoPoseReason::kNeverHeard;
   if (now - last_heard_ > kSilence) return NoPoseReason::kSilent;
   if (self.imu.empty() || now - self.imu.newest().stamp > kSilence) return NoPoseReason::kNoOwnImu;

@@ -6,7 +6,7 @@
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/outputs.hpp"
-#include "estimator/swarm/body_state.hpp"
+#include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/event_sequencer.hpp"
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/neighbor_track.hpp"
@@ -23,11 +23,11 @@ class Neighbor {
 
   void add_bearing(const Bearing& bearing);
   void add_range(const UwbRange& range);
-  void add_report(const ReceivedReport& received, const BodyState& self);
+  void add_report(const ReceivedReport& received, const RobotState& self);
   void add_graph_pose(Timestamp stamp, const GraphPose& pose);
 
   /// Moves on to `now`: fuses what has waited long enough and looks ahead.
-  void tick(Timestamp now, const BodyState& self);
+  void tick(Timestamp now, const RobotState& self);
 
   /// The pose at the last tick, by the filter alone. Empty while unknown or too uncertain.
   [[nodiscard]] const std::optional<NeighborPose>& pose() const { return pose_; }
@@ -36,27 +36,27 @@ class Neighbor {
   /// The last pose with the graph's correction, where there is a fresh one.
   [[nodiscard]] std::optional<NeighborPose> improved_pose() const;
 
-  [[nodiscard]] const BodyState& body() const { return body_; }
+  [[nodiscard]] const RobotState& body() const { return body_; }
   [[nodiscard]] Timestamp last_heard() const { return last_heard_; }
   [[nodiscard]] NeighborStatus status() const;
 
  private:
   void take_range(const UwbRange& range, MeasurementKind kind);
-  void take_peer_bearing(const Bearing& bearing, double clock_sigma_s, const BodyState& self);
+  void take_peer_bearing(const Bearing& bearing, double clock_sigma_s, const RobotState& self);
   void start_or_feed(Timestamp stamp, const RawPose& raw);
   void enqueue(Measurement measurement);
   void count(MeasurementKind kind, Verdict verdict);
-  void release(Timestamp now, const BodyState& self);
-  void look_ahead(Timestamp now, const BodyState& self);
+  void release(Timestamp now, const RobotState& self);
+  void look_ahead(Timestamp now, const RobotState& self);
   [[nodiscard]] bool needs_start(Timestamp stamp) const;
-  [[nodiscard]] NoPoseReason reason(Timestamp now, const BodyState& self) const;
+  [[nodiscard]] NoPoseReason reason(Timestamp now, const RobotState& self) const;
 
   MemberConfig member_;
   RobotId self_id_;
   PairMounting mounting_;
   FilterSettings settings_;
 
-  BodyState body_;
+  RobotState body_;
   SightingLog sightings_;
   EventSequencer sequencer_;
   std::optional<NeighborTrack> track_;

@@ -12,7 +12,7 @@ void forget_before(Timestamp t, Readings& readings) {
 
 }  // namespace
 
-std::optional<Report> ReportComposer::compose(Timestamp now, const BodyState& self,
+std::optional<Report> ReportComposer::compose(Timestamp now, const RobotState& self,
                                               const std::vector<NeighborEstimate>& estimates) {
   // Of each neighbor the newest frame's bearings: two of them where a mirror image shows it twice.
   for (auto& [neighbor, seen] : newest_) {

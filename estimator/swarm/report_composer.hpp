@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
-#include "estimator/swarm/body_state.hpp"
+#include "estimator/swarm/robot_state.hpp"
 
 namespace crepes {
 
@@ -22,7 +22,7 @@ class ReportComposer {
   void add(const UwbRange& range) { ranges_.push_back(range); }
 
   /// Empty before there is a tilt: peers could do nothing with the rest.
-  [[nodiscard]] std::optional<Report> compose(Timestamp now, const BodyState& self,
+  [[nodiscard]] std::optional<Report> compose(Timestamp now, const RobotState& self,
                                               const std::vector<NeighborEstimate>& estimates);
 
  private:

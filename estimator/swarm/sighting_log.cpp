@@ -71,8 +71,8 @@ std::optional<double> SightingLog::range_at(Timestamp t) const {
 }
 
 std::variant<RawPose, NoPoseReason> SightingLog::raw_pose(const Bearing& peer_bearing,
-                                                          const BodyState& self,
-                                                          const BodyState& neighbor) const {
+                                                          const RobotState& self,
+                                                          const RobotState& neighbor) const {
   const Timestamp t = peer_bearing.stamp;
   const auto tilt_B = self.tilt_at(t);
   const auto tilt_N = neighbor.tilt_at(t);

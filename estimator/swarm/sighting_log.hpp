@@ -8,7 +8,7 @@
 #include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/relative/raw_pose.hpp"
-#include "estimator/swarm/body_state.hpp"
+#include "estimator/swarm/robot_state.hpp"
 
 namespace crepes {
 
@@ -25,8 +25,8 @@ class SightingLog {
 
   /// The raw pose at the instant when the neighbor saw us; or what is missing.
   [[nodiscard]] std::variant<RawPose, NoPoseReason> raw_pose(const Bearing& peer_bearing,
-                                                             const BodyState& self,
-                                                             const BodyState& neighbor) const;
+                                                             const RobotState& self,
+                                                             const RobotState& neighbor) const;
 
  private:
   [[nodiscard]] std::optional<Bearing> own_at(Timestamp t, const ImuHistory& imu) const;

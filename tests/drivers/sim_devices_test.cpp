@@ -117,7 +117,7 @@ TEST(SimImu, ReadsWhatTheBodyFeelsWithinItsErrors) {
     const double t = i * 0.01;
     const auto bytes = imu.sample(t);
     const auto take = [&](const ImuSample& sample) {
-      const BodyState body = world.state(RobotId{1}, t);
+      const BodyState body = world.state(RobotId{1}, t - 0.5 / config.update_rate);
       const Eigen::Vector3d error = sample.gyro_radps - body.w_W_B_B;
       gyro_error += error / kSamples;
       accel_error += (sample.accel_mps2 - body.specific_force()) / kSamples;

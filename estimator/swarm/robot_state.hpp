@@ -9,7 +9,7 @@
 namespace crepes {
 
 /// A robot's motion and attitude, own or as a neighbor reports them.
-struct BodyState {
+struct RobotState {
   ImuHistory imu;
   std::optional<Tilt> tilt;
 
