@@ -21,6 +21,12 @@ void add(const ImuSample& sample, double dt, bool guessed, ImuMean& sum) {
 
 }  // namespace
 
+bool is_plausible(const ImuSample& sample) {
+  // Written so that NaN is not.
+  return (sample.gyro_radps.array().abs() <= 100.0).all() &&
+         (sample.accel_mps2.array().abs() <= 1000.0).all();
+}
+
 std::size_t ImuHistory::first_after(Timestamp t) const {
   std::size_t low = 0;
   std::size_t high = size_;
@@ -36,7 +42,7 @@ std::size_t ImuHistory::first_after(Timestamp t) const {
 }
 
 bool ImuHistory::push(const ImuSample& sample) {
-  if (!sample.gyro_radps.allFinite() || !sample.accel_mps2.allFinite()) return false;
+  if (!is_plausible(sample)) return false;
   std::size_t place = first_after(sample.stamp);
   if (place > 0 && (*this)[place - 1].stamp == sample.stamp) return false;
   if (size_ == kCapacity) {

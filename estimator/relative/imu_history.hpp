@@ -21,6 +21,9 @@ struct ImuMean {
   double accel_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
 };
 
+/// Finite, and within what sensors of these robots measure: 100 rad/s and 1000 m/s^2 an axis.
+[[nodiscard]] bool is_plausible(const ImuSample& sample);
+
 /// Bounded: keeps the newest `kCapacity` samples in order of their stamps. A sample is the mean
 /// since the one before, stamped at the end, as an IMU that integrates inside gives it: so sums
 /// over samples are exact. Outside and across gaps longer than `kMaxGap` the nearest is held and
@@ -31,7 +34,7 @@ class ImuHistory {
   static constexpr std::size_t kCapacity = 256;
   static constexpr Duration kMaxGap = std::chrono::milliseconds{50};
 
-  /// False, and nothing changes: not finite, a stamp already there, or older than everything kept.
+  /// False, and nothing changes: not plausible, a stamp already there, or older than everything kept.
   bool push(const ImuSample& sample);
 
   [[nodiscard]] bool empty() const { return size_ == 0; }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/core/so3.hpp"
+#include "estimator/relative/imu_history.hpp"
 #include "estimator/relative/kalman_update.hpp"
 
 namespace crepes {
@@ -38,7 +39,7 @@ void TiltFilter::start(const ImuSample& sample) {
 }
 
 bool TiltFilter::add(const ImuSample& sample) {
-  if (!sample.gyro_radps.allFinite() || !sample.accel_mps2.allFinite()) return false;
+  if (!is_plausible(sample)) return false;
   if (!last_ || sample.stamp - last_->stamp > kMaxGap) {
     start(sample);
     return true;

@@ -18,7 +18,7 @@ class TiltFilter {
  public:
   explicit TiltFilter(const ImuConfig& config);
 
-  /// False, and nothing changes: not finite, or a stamp that does not advance. A gap of more than
+  /// False, and nothing changes: not plausible, or a stamp that does not advance. A gap of more than
   /// half a second starts the filter anew.
   bool add(const ImuSample& sample);
 

@@ -48,7 +48,7 @@ TEST(Pose, InverseUndoesThePoseFromBothSides) {
 TEST(Pose, ALongChainKeepsAUnitQuaternion) {
   RandomGeometry random(4);
   Pose chain;
-  for (int i = 0; i < 10000; ++i) chain = chain * Pose{{}, random.rotation()};
+  for (int i = 0; i < 10000; ++i) chain = chain * Pose{Eigen::Vector3d::Zero(), random.rotation()};
 
   EXPECT_NEAR(chain.q.norm(), 1.0, 1e-15);
 }

@@ -167,7 +167,7 @@ TEST(PaperFilter, TwoSidedErrorTurnsPositionAndVelocityWithTheObserver) {
 
 TEST(PaperFilter, StartsWithTheCovarianceOfTheRawPose) {
   RandomGeometry random(7);
-  RawPose first{.T_B_N = random.pose(), .p_N_B = {}};
+  RawPose first{.T_B_N = random.pose(), .p_N_B = Eigen::Vector3d::Zero()};
   first.covariance = random.covariance<9>(0.1);
 
   const PaperFilter filter(Timestamp{}, first, ProcessNoise{});

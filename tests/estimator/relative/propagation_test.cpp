@@ -210,7 +210,8 @@ TEST(Propagation, CovarianceOfTheStateFollowsAMonteCarloOfItsErrors) {
 
 TEST(Propagation, WhiteNoiseGivesTheSameVarianceInManyStepsAsInFew) {
   ImuHistory imu;
-  for (int i = 0; i <= 200; ++i) imu.push({Timestamp{i * 10ms}, {}, {0, 0, 9.81}});
+  for (int i = 0; i <= 200; ++i)
+    imu.push({Timestamp{i * 10ms}, Eigen::Vector3d::Zero(), {0, 0, 9.81}});
   const ProcessNoise noise{.gyro_density = 0.01, .accel_density = 0.1};
   const auto variance_after = [&](Duration step) {
     NominalState state;
@@ -233,9 +234,10 @@ TEST(Propagation, WhiteNoiseGivesTheSameVarianceInManyStepsAsInFew) {
 
 TEST(Propagation, TrustsAGapFarLessThanSamples) {
   ImuHistory steady;
-  for (int i = 0; i <= 200; ++i) steady.push({Timestamp{i * 10ms}, {}, {0, 0, 9.81}});
+  for (int i = 0; i <= 200; ++i)
+    steady.push({Timestamp{i * 10ms}, Eigen::Vector3d::Zero(), {0, 0, 9.81}});
   ImuHistory silent;
-  silent.push({Timestamp{}, {}, {0, 0, 9.81}});
+  silent.push({Timestamp{}, Eigen::Vector3d::Zero(), {0, 0, 9.81}});
   const ProcessNoise noise{.gyro_density = 1e-3, .accel_density = 1e-3};
   const auto variance_with = [&](const ImuHistory& neighbor) {
     NominalState state;

@@ -1,0 +1,223 @@
+#include "estimator/relative/neighbor_filter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <limits>
+
+#include "estimator/relative/paper_filter.hpp"
+#include "tests/support/simulated_pair.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using test::SimulatedPair;
+
+constexpr double kNoGate = std::numeric_limits<double>::infinity();
+
+RawPose first_raw_pose(SimulatedPair& pair, Timestamp t) {
+  return std::get<RawPose>(compute_raw_pose(pair.sighting(t)));
+}
+
+/// Runs the tight filter from `first` at 50 ms: bearings of both at 50 Hz, ranges at 25 Hz.
+NeighborFilter tight_filter(SimulatedPair& pair, const GaussianPose& first, Duration duration) {
+  pair.sample_imus(Timestamp{50ms});
+  NeighborFilter filter(Timestamp{50ms}, first, pair.process_noise(), pair.priors());
+  for (Timestamp t{60ms}; t <= Timestamp{50ms} + duration; t += 10ms) {
+    pair.sample_imus(t);
+    filter.advance_to(t, pair.imu_B, pair.imu_N);
+    const auto tick = t.time_since_epoch() / 10ms;
+    if (tick % 2 == 0) {
+      static_cast<void>(filter.fuse_bearing(pair.bearing(t), pair.mounting_N.led, kNoGate));
+      static_cast<void>(
+          filter.fuse_peer_bearing(pair.peer_bearing(t), pair.mounting_B.led, kNoGate));
+    }
+    if (tick % 4 == 1) {
+      static_cast<void>(filter.fuse_range(pair.range(t), pair.mounting_B.antenna,
+                                          pair.mounting_N.antenna, kNoGate));
+    }
+  }
+  return filter;
+}
+
+NeighborFilter tight_filter(SimulatedPair& pair, Duration duration) {
+  return tight_filter(pair, first_raw_pose(pair, Timestamp{50ms}).gaussian(), duration);
+}
+
+template <class Filter>
+Vector6d pose_error(const SimulatedPair& pair, const Filter& filter) {
+  return pose_difference(filter.motion().T_B_N, pair.truth(filter.stamp()).motion.T_B_N);
+}
+
+TEST(NeighborFilter, ConvergesFromARawPose) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedPair pair(seed);
+
+    const NeighborFilter filter = tight_filter(pair, 8s);
+
+    const Vector6d error = pose_error(pair, filter);
+    const NominalState truth = pair.truth(filter.stamp());
+    EXPECT_LT(error.head<3>().norm(), 0.25) << seed;  // the range's bias of 0.1 m, one sigma
+    EXPECT_LT(error.tail<3>().norm(), 0.03) << seed;
+    EXPECT_LT((filter.motion().v_B_N - truth.motion.v_B_N).norm(), 0.15) << seed;
+  }
+}
+
+/// A first pose whose error is what its covariance says and has nothing to do with any sensor's.
+GaussianPose independent_start(SimulatedPair& pair, std::uint64_t seed) {
+  test::RandomGeometry random(seed + 1000);
+  const Matrix6d covariance = first_raw_pose(pair, Timestamp{50ms}).gaussian().covariance;
+  const Pose truth = pair.truth(Timestamp{50ms}).motion.T_B_N;
+  return {perturbed(truth, random.draw<6>(covariance)), covariance};
+}
+
+/// Mean normalized squared error of the pose over 50 runs of this length, divided by its dimension.
+template <class Start>
+double mean_pose_nees(Duration duration, const Start& start) {
+  constexpr int kRuns = 50;
+  double sum = 0.0;
+  for (std::uint64_t seed = 100; seed < 100 + kRuns; ++seed) {
+    SimulatedPair pair(seed);
+    const NeighborFilter filter = tight_filter(pair, start(pair, seed), duration);
+    const Vector6d e = pose_error(pair, filter);
+    sum += e.dot(filter.pose_covariance().inverse() * e);
+  }
+  return sum / (6 * kRuns);
+}
+
+// chi-square with 300 degrees of freedom lies within [253.9, 349.9] in 95 % of all trials.
+constexpr double kLow = 253.9 / 300;
+constexpr double kHigh = 349.9 / 300;
+
+TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysAfterASecond) {
+  const double nees = mean_pose_nees(1s, independent_start);
+  EXPECT_GT(nees, kLow);
+  EXPECT_LT(nees, kHigh);
+}
+
+TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysAfterFiveSeconds) {
+  const double nees = mean_pose_nees(5s, independent_start);
+  EXPECT_GT(nees, kLow);
+  EXPECT_LT(nees, kHigh);
+}
+
+// A raw pose shares the range's bias and the cameras' misalignment with the filter's own states; the
+// start takes them for independent. That understates the variance by 1.35 here, and not by more.
+TEST(NeighborFilter, ARawPoseStartsItOverconfidentByNoMoreThanAHalf) {
+  const double nees = mean_pose_nees(5s, [](SimulatedPair& pair, std::uint64_t) {
+    return first_raw_pose(pair, Timestamp{50ms}).gaussian();
+  });
+  EXPECT_GT(nees, kLow);
+  EXPECT_LT(nees, 1.5);
+}
+
+TEST(NeighborFilter, EstimatesWhatTheSensorsHideBetterThanItsPriors) {
+  double squared = 0.0;
+  constexpr int kRuns = 20;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    SimulatedPair pair(seed);
+    const NeighborFilter filter = tight_filter(pair, 10s);
+    const NominalState truth = pair.truth(filter.stamp());
+    squared += (filter.state().bias_N.gyro_radps - truth.bias_N.gyro_radps -
+                (filter.state().motion.T_B_N.q.conjugate() *
+                 (filter.state().bias_B.gyro_radps - truth.bias_B.gyro_radps)))
+                   .squaredNorm();
+  }
+
+  // The difference of both gyros' biases, six priors' worth of variance at the start.
+  EXPECT_LT(std::sqrt(squared / kRuns), 0.5 * std::sqrt(6.0) * 0.005);
+}
+
+TEST(NeighborFilter, UncertaintyGrowsWhileNothingIsMeasured) {
+  SimulatedPair pair(1);
+  NeighborFilter filter = tight_filter(pair, 2s);
+  Matrix6d before = filter.pose_covariance();
+  for (int i = 0; i < 10; ++i) {
+    const Timestamp next = filter.stamp() + 100ms;
+    pair.sample_imus(next);
+
+    filter.advance_to(next, pair.imu_B, pair.imu_N);
+
+    const Matrix6d after = filter.pose_covariance();
+    EXPECT_GT((after.topLeftCorner<3, 3>().trace()), (before.topLeftCorner<3, 3>().trace()));
+    EXPECT_GT((after.bottomRightCorner<3, 3>().trace()),
+              (before.bottomRightCorner<3, 3>().trace()));
+    before = after;
+  }
+}
+
+TEST(NeighborFilter, AGatedOrDegenerateReadingChangesNothing) {
+  SimulatedPair pair(2);
+  NeighborFilter filter = tight_filter(pair, 1s);
+  const ErrorState::Covariance P = filter.covariance();
+  const Pose T_B_N = filter.motion().T_B_N;
+  RangeReading outlier = pair.range(filter.stamp());
+  outlier.range_m += 3.0;
+  DirectionReading behind = pair.bearing(filter.stamp());
+  behind.u = -behind.u;
+
+  EXPECT_EQ(filter.fuse_range(outlier, pair.mounting_B.antenna, pair.mounting_N.antenna, 10.8),
+            Verdict::kGated);
+  EXPECT_EQ(filter.fuse_bearing(behind, pair.mounting_N.led, 13.8), Verdict::kDegenerate);
+  EXPECT_EQ(filter.covariance(), P);
+  EXPECT_EQ(filter.motion().T_B_N.p, T_B_N.p);
+  EXPECT_EQ(filter.motion().T_B_N.q.coeffs(), T_B_N.q.coeffs());
+}
+
+TEST(NeighborFilter, AGraphPoseDrawsItInByTheirCovariances) {
+  SimulatedPair pair(3);
+  NeighborFilter filter = tight_filter(pair, 500ms);
+  const Vector6d before = pose_error(pair, filter);
+  const GaussianPose sharp{pair.truth(filter.stamp()).motion.T_B_N, 1e-8 * Matrix6d::Identity()};
+
+  EXPECT_EQ(filter.fuse_pose(sharp, kNoGate), Verdict::kFused);
+
+  EXPECT_LT(pose_error(pair, filter).norm(), 0.01 * before.norm());
+}
+
+/// Root mean square position and attitude errors [m, rad] of 20 runs.
+template <class Run>
+Eigen::Vector2d rms_error(const Run& run) {
+  constexpr int kRuns = 20;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    const Vector6d e = run(seed);
+    sum += Eigen::Vector2d(e.head<3>().squaredNorm(), e.tail<3>().squaredNorm()) / kRuns;
+  }
+  return sum.cwiseSqrt();
+}
+
+TEST(PaperFilter, IsAtLeastAsAccurateAsTheRawPosesItIsFed) {
+  const auto raw = rms_error([](std::uint64_t seed) {
+    SimulatedPair pair(seed);
+    const RawPose z = first_raw_pose(pair, Timestamp{4s});
+    return pose_difference(z.T_B_N, pair.truth(Timestamp{4s}).motion.T_B_N);
+  });
+
+  const auto filtered = rms_error([](std::uint64_t seed) {
+    SimulatedPair pair(seed);
+    pair.sample_imus(Timestamp{50ms});
+    ProcessNoise noise = pair.process_noise();
+    noise.accel_density = 0.1;  // it has no bias states: they pass as noise
+    noise.gyro_density = 0.01;
+    const auto regular = [&](Timestamp t) {
+      RawPose z = first_raw_pose(pair, t);
+      z.covariance.diagonal().array() += 1e-6;  // the two positions tell one distance
+      return z;
+    };
+    PaperFilter filter(Timestamp{50ms}, regular(Timestamp{50ms}), noise);
+    for (Timestamp t{70ms}; t <= Timestamp{4s}; t += 20ms) {
+      pair.sample_imus(t);
+      filter.advance_to(t, pair.imu_B, pair.imu_N);
+      EXPECT_EQ(filter.fuse(regular(t), kNoGate), Verdict::kFused);
+    }
+    return pose_error(pair, filter);
+  });
+
+  EXPECT_LT(filtered(0), raw(0));
+  EXPECT_LT(filtered(1), raw(1));
+}
+
+}  // namespace
+}  // namespace crepes
