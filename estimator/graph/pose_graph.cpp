@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <utility>
@@ -35,17 +36,22 @@ Pose to_pose(const Parameters& x) {
   return {{x[0], x[1], x[2]}, Eigen::Quaterniond(x[6], x[3], x[4], x[5]).normalized()};
 }
 
-// The edge with the covariance that makes all edges over one pair weigh as one, as L of L^T L =
-// covariance^-1. Empty where the covariance is not positive definite.
-std::optional<Matrix6d> weight(const RelativePoseEdge& edge,
-                               const std::vector<RelativePoseEdge>& edges) {
+// Finite, between two robots and with a covariance that can weigh it.
+bool is_usable(const RelativePoseEdge& edge) {
+  const GaussianPose& T = edge.T_from_to;
+  return edge.from != edge.to && T.pose.p.allFinite() && edge.v_from_to.allFinite() &&
+         std::abs(T.pose.q.norm() - 1.0) < 1e-3 && T.covariance.allFinite() &&
+         Eigen::LLT<Matrix6d>(T.covariance).info() == Eigen::Success;
+}
+
+// L of L^T L = covariance^-1, with the covariance that makes all edges over one pair weigh as one.
+Matrix6d weight(const RelativePoseEdge& edge, const std::vector<RelativePoseEdge>& edges) {
   const auto same_pair = [&](const RelativePoseEdge& other) {
     return (other.from == edge.from && other.to == edge.to) ||
            (other.from == edge.to && other.to == edge.from);
   };
   const auto count = static_cast<double>(std::count_if(edges.begin(), edges.end(), same_pair));
   const Eigen::LLT<Matrix6d> chol(count * edge.T_from_to.covariance);
-  if (chol.info() != Eigen::Success) return std::nullopt;
   return chol.matrixL().solve(Matrix6d::Identity());
 }
 
@@ -77,8 +83,8 @@ std::unique_ptr<ceres::Problem> build(const GraphProblem& input, const GraphConf
   }
   problem->SetParameterBlockConstant(nodes.at(input.self).data());
   for (const RelativePoseEdge& edge : input.edges) {
-    if (!nodes.contains(edge.from) || !nodes.contains(edge.to) || edge.from == edge.to) continue;
-    if (const auto L = weight(edge, input.edges)) add_factor(edge, *L, config, nodes, *problem);
+    if (!nodes.contains(edge.from) || !nodes.contains(edge.to)) continue;
+    add_factor(edge, weight(edge, input.edges), config, nodes, *problem);
   }
   return problem;
 }
@@ -107,7 +113,9 @@ Eigen::MatrixXd marginals(const GraphProblem& input, GraphConfig config, Nodes n
 
 }  // namespace
 
-GraphSolution solve_pose_graph(const GraphProblem& problem, const GraphConfig& config) {
+GraphSolution solve_pose_graph(const GraphProblem& input, const GraphConfig& config) {
+  GraphProblem problem = input;
+  std::erase_if(problem.edges, [](const RelativePoseEdge& edge) { return !is_usable(edge); });
   GraphSolution solution{.stamp = problem.stamp, .poses = {}};
   Nodes nodes;
   for (const auto& [robot, pose] : spanning_tree_poses(problem.self, problem.edges)) {
@@ -135,7 +143,7 @@ GraphSolution solve_pose_graph(const GraphProblem& problem, const GraphConfig& c
     if (robot == problem.self) continue;
     const Matrix6d P = covariance.block<6, 6>(block, block);
     block += 6;
-    if (!P.allFinite()) continue;  // hangs on an edge without a covariance
+    if (!P.allFinite()) continue;
     solution.poses.push_back({robot, {pose, 0.5 * (P + P.transpose())}, velocities.at(robot)});
   }
   solution.cost = summary.final_cost;

@@ -6,12 +6,12 @@
 
 namespace crepes {
 
-/// Solves for the poses of all robots that edges connect to `problem.self`, in self's body frame.
+/// Solves for the poses of all robots that edges connect to `input.self`, in self's body frame.
 ///
 /// Two edges over one pair of robots rest on the same measurements, so each pair carries the weight
-/// of one. Covariances are the marginals of the solution. Deterministic; bounded by
+/// of one. Edges that are not finite or whose covariance is not positive definite do not count.
+/// Covariances are the marginals of the solution. Deterministic; bounded by
 /// `config.max_iterations`.
-[[nodiscard]] GraphSolution solve_pose_graph(const GraphProblem& problem,
-                                             const GraphConfig& config);
+[[nodiscard]] GraphSolution solve_pose_graph(const GraphProblem& input, const GraphConfig& config);
 
 }  // namespace crepes
