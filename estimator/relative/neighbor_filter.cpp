@@ -1,6 +1,10 @@
 #include "estimator/relative/neighbor_filter.hpp"
 
+#include <limits>
+#include <optional>
+
 #include "estimator/core/contract.hpp"
+#include "estimator/core/so3.hpp"
 #include "estimator/relative/bearing_measurement.hpp"
 #include "estimator/relative/pose_measurement.hpp"
 #include "estimator/relative/range_measurement.hpp"
@@ -34,9 +38,10 @@ ErrorState::Covariance first_covariance(const Matrix6d& pose, double speed_sigma
   return P;
 }
 
-template <class Linearized, class Correct>
-Verdict correct_if(const Linearized& z, const Correct& correct) {
-  return z ? correct(*z) : Verdict::kDegenerate;
+// P of the error at the corrected state: theta_new = J_r(theta) (theta - theta_hat).
+void reset(const Eigen::Matrix3d& J_r, E::Covariance& P) {
+  P.middleRows<3>(E::kTheta) = (J_r * P.middleRows<3>(E::kTheta)).eval();
+  P.middleCols<3>(E::kTheta) = (P.middleCols<3>(E::kTheta) * J_r.transpose()).eval();
 }
 
 }  // namespace
@@ -63,33 +68,72 @@ void NeighborFilter::advance_to(Timestamp to, const ImuHistory& imu_B, const Imu
   stamp_ = to;
 }
 
-template <int M>
-Verdict NeighborFilter::correct(const Innovation<M, ErrorState::kSize>& z, double gate_nis) {
-  const auto outcome = kalman_update(z, gate_nis, P_);
-  if (outcome.verdict == Verdict::kFused) inject(outcome.correction, state_);
+// An update that turns the state far is done again, linearized where it leads to (iterated Kalman
+// filter, Bell and Cathey 1993). A first pose is off by degrees and a bearing is not: with the
+// first linearization alone, what the bearing does not see, the roll about the line of sight, would
+// come out as known from the next bearing on.
+template <class Linearize>
+Verdict NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
+  constexpr double kLinear = 0.01;  // rad; half its square is well below any bearing's noise
+  constexpr int kMaxIterations = 5;
+
+  auto z = linearize(state_);
+  if (!z) return Verdict::kDegenerate;
+  E::Covariance P = P_;
+  auto outcome = kalman_update(*z, gate_nis, P);
+  if (outcome.verdict != Verdict::kFused) return outcome.verdict;
+
+  Eigen::Vector3d theta = outcome.correction.template segment<3>(E::kTheta);
+  const bool is_far = theta.norm() > kLinear;
+  for (int i = 0; is_far && i < kMaxIterations; ++i) {
+    NominalState there = state_;
+    inject(outcome.correction, there);
+    z = linearize(there);
+    if (!z) return Verdict::kDegenerate;
+    z->H.template middleCols<3>(E::kTheta) =
+        (z->H.template middleCols<3>(E::kTheta) * so3_right_jacobian(theta)).eval();
+    z->residual += z->H * outcome.correction;
+    P = P_;
+    outcome = kalman_update(*z, std::numeric_limits<double>::infinity(), P);
+    theta = outcome.correction.template segment<3>(E::kTheta);
+  }
+  if (is_far) reset(so3_right_jacobian(theta), P);
+  P_ = P;
+  inject(outcome.correction, state_);
   return outcome.verdict;
 }
 
 Verdict NeighborFilter::fuse_bearing(const DirectionReading& z, const Eigen::Vector3d& p_N_M,
                                      double gate_nis) {
-  return correct_if(linearize_bearing(state_, z.u, z.camera, p_N_M, z.sigma_rad),
-                    [&](const auto& innovation) { return correct(innovation, gate_nis); });
+  return correct(
+      [&](const NominalState& state) {
+        return linearize_bearing(state, z.u, z.camera, p_N_M, z.sigma_rad);
+      },
+      gate_nis);
 }
 
 Verdict NeighborFilter::fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,
                                           double gate_nis) {
-  return correct_if(linearize_peer_bearing(state_, z.u, z.camera, p_B_M, z.sigma_rad),
-                    [&](const auto& innovation) { return correct(innovation, gate_nis); });
+  return correct(
+      [&](const NominalState& state) {
+        return linearize_peer_bearing(state, z.u, z.camera, p_B_M, z.sigma_rad);
+      },
+      gate_nis);
 }
 
 Verdict NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
                                    const Eigen::Vector3d& p_N_Q, double gate_nis) {
-  return correct_if(linearize_range(state_, p_B_U, p_N_Q, z.range_m, z.sigma_m),
-                    [&](const auto& innovation) { return correct(innovation, gate_nis); });
+  return correct(
+      [&](const NominalState& state) {
+        return linearize_range(state, p_B_U, p_N_Q, z.range_m, z.sigma_m);
+      },
+      gate_nis);
 }
 
 Verdict NeighborFilter::fuse_pose(const GaussianPose& T_B_N, double gate_nis) {
-  return correct(linearize_pose(state_, T_B_N), gate_nis);
+  return correct(
+      [&](const NominalState& state) { return std::optional(linearize_pose(state, T_B_N)); },
+      gate_nis);
 }
 
 Matrix6d NeighborFilter::pose_covariance() const {

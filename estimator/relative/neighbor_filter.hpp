@@ -61,8 +61,9 @@ class NeighborFilter {
   [[nodiscard]] Matrix6d pose_covariance() const;
 
  private:
-  template <int M>
-  Verdict correct(const Innovation<M, ErrorState::kSize>& z, double gate_nis);
+  /// `linearize` gives the innovation at a state, or nothing where it says nothing.
+  template <class Linearize>
+  Verdict correct(const Linearize& linearize, double gate_nis);
 
   Timestamp stamp_;
   NominalState state_;

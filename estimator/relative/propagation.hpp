@@ -22,8 +22,8 @@ struct ProcessNoise {
   double gyro_walk = 0.0;
   double accel_walk = 0.0;
   double scale_sigma = 0.0;
-  double gyro_guess_density = 0.2;
-  double accel_guess_density = 1.0;
+  double gyro_guess_density = 0.05;
+  double accel_guess_density = 0.5;
   double range_bias_walk = 0.0;  ///< [m/sqrt(s)]
 };
 
