@@ -9,6 +9,7 @@ namespace crepes {
 namespace {
 
 constexpr Duration kStale = std::chrono::milliseconds(500);
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 double largest_sigma(const Eigen::Matrix3d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance, Eigen::EigenvaluesOnly);
@@ -26,7 +27,7 @@ void NeighborView::on_pose(const NeighborPose& pose, Timestamp now) {
   const Duration elapsed = now - window_start_;
   if (elapsed > std::chrono::seconds(1)) {
     const bool is_continuous = elapsed < std::chrono::seconds(2);
-    rate_hz_ = is_continuous ? in_window_ / to_seconds(elapsed) : 0.0;
+    rate_hz_ = is_continuous ? in_window_ / to_seconds(elapsed) : kNaN;
     window_start_ = now;
     in_window_ = 0;
   }
@@ -39,6 +40,6 @@ const NeighborPose* NeighborView::pose(Timestamp now) const {
   return pose_ && now - heard_ <= kStale ? &*pose_ : nullptr;
 }
 
-double NeighborView::rate_hz(Timestamp now) const { return pose(now) != nullptr ? rate_hz_ : 0.0; }
+double NeighborView::rate_hz(Timestamp now) const { return pose(now) != nullptr ? rate_hz_ : kNaN; }
 
 }  // namespace crepes

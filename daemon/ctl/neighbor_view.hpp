@@ -1,6 +1,7 @@
 /// What a client last heard of one neighbor, and how it looks in a table.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -23,7 +24,7 @@ class NeighborView {
 
   /// The last pose, unless it is older than half a second.
   [[nodiscard]] const NeighborPose* pose(Timestamp now) const;
-  /// Poses a second, over the last second or so.
+  /// Poses a second, over the last second or so; NaN until known.
   [[nodiscard]] double rate_hz(Timestamp now) const;
   [[nodiscard]] const std::string& reason() const { return reason_; }
 
@@ -33,7 +34,7 @@ class NeighborView {
   std::string reason_ = "no answer yet";
   Timestamp window_start_{};
   int in_window_ = 0;
-  double rate_hz_ = 0.0;
+  double rate_hz_ = std::numeric_limits<double>::quiet_NaN();  ///< not yet known
 };
 
 }  // namespace crepes

@@ -12,29 +12,26 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr Duration kPeriod = std::chrono::milliseconds(20);
 
-/// The grid instant closest to `t`, counted from `origin`.
-std::int64_t instant_of(Timestamp t, Timestamp origin) {
-  const auto half = kPeriod / 2;
-  const Duration shifted = t - origin + half;
-  const std::int64_t quotient = shifted / kPeriod;
-  return shifted % kPeriod < Duration::zero() ? quotient - 1 : quotient;
-}
-
 /// Instants `origin + k 20 ms` inside the window that have a row, of all. The first row gives the
-/// grid its phase.
+/// grid its phase. Each row serves one instant less than a period away from it, the earliest that
+/// is still free, so that a jitter of the rows costs nothing.
 double availability_of(std::span<const NeighborPose> inside, const ScoreWindow& window) {
-  if (inside.empty() || window.end < window.begin) return 0.0;
+  if (inside.empty()) return 0.0;
   const Timestamp origin = inside.front().stamp;
-  const std::int64_t before = (origin - window.begin) / kPeriod;
-  const std::int64_t after = (window.end - origin) / kPeriod;
-  std::int64_t present = 0;
-  std::optional<std::int64_t> last;
+  const std::int64_t first = -((origin - window.begin) / kPeriod);
+  const std::int64_t last = (window.end - origin) / kPeriod;
+  std::int64_t served = 0;
+  std::int64_t next = first;
   for (const NeighborPose& pose : inside) {
-    const std::int64_t instant = instant_of(pose.stamp, origin);
-    if (instant <= after && instant != last) ++present;
-    last = instant;
+    const Duration since = pose.stamp - origin;  // not negative: the rows are in order
+    const std::int64_t before = since / kPeriod;
+    const bool is_on_grid = since % kPeriod == Duration::zero();
+    const std::int64_t instant = std::max(next, before);
+    if (instant > std::min(last, is_on_grid ? before : before + 1)) continue;
+    ++served;
+    next = instant + 1;
   }
-  return static_cast<double>(present) / static_cast<double>(before + 1 + after);
+  return static_cast<double>(served) / static_cast<double>(last - first + 1);
 }
 
 }  // namespace

@@ -120,9 +120,9 @@ Result<std::vector<ClockSample>> read_clock_samples(const std::filesystem::path&
   const Result<std::string> text = read_text_file(file);
   if (!text) return tl::unexpected(text.error());
   try {
+    const Json report = Json::parse(*text);
     std::vector<ClockSample> samples;
-    for (const Json& sample : Json::parse(*text).at("clocks"))
-      samples.push_back(clock_from(sample, names));
+    for (const Json& sample : report.at("clocks")) samples.push_back(clock_from(sample, names));
     return samples;
   } catch (const nlohmann::json::exception& e) {
     return fail(ErrorCode::kFormat, file.string() + ": " + e.what());
