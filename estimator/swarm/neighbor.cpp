@@ -8,6 +8,7 @@ namespace crepes {
 namespace {
 
 constexpr Duration kMaxAge = std::chrono::milliseconds{20};  // of a published state
+constexpr Duration kMaxBehind = std::chrono::seconds{1};
 constexpr Duration kSilence = std::chrono::seconds{2};
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
 // A filter whose sightings were all refused for so long is wrong, not unlucky.
@@ -153,6 +154,12 @@ void Neighbor::release(Timestamp now, const RobotState& self) {
     }
     track_->advance_to(measurement->stamp, self.imu, body_.imu);
     count(measurement->kind, track_->fuse(*measurement, mounting_, settings_.gates));
+  }
+  // Without readings the filter follows all the same: no further behind than IMU samples are kept,
+  // and looking ahead costs no more as a silence grows.
+  const Timestamp latest_start = now - settings_.lag - kMaxBehind;
+  if (track_ && track_->stamp() < latest_start && !self.imu.empty() && !body_.imu.empty()) {
+    track_->advance_to(latest_start, self.imu, body_.imu);
   }
 }
 

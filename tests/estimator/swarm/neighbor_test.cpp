@@ -1,0 +1,278 @@
+#include "estimator/swarm/neighbor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/support/simulated_pair.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using test::SimulatedPair;
+
+constexpr RobotId kSelf{1};
+constexpr RobotId kOther{2};
+
+MemberConfig member(RobotId id, const Mounting& mounting) {
+  MemberConfig config;
+  config.id = id;
+  config.name = "robot" + std::to_string(id.value);
+  config.p_body_led = mounting.led;
+  config.p_body_uwb = mounting.antenna;
+  return config;
+}
+
+/// What reaches this robot; a test takes ingredients away.
+struct Ingredients {
+  bool reports = true;
+  bool own_imu = true;
+  bool peer_imu = true;
+  bool own_tilt = true;
+  bool peer_tilt = true;
+  bool bearings = true;
+  bool peer_bearings = true;
+  bool ranges = true;
+};
+
+/// Robot 1's view of robot 2, fed from a simulated pair every 10 ms.
+class View {
+ public:
+  explicit View(Profile profile = Profile::kTight, Duration report_delay = 20ms)
+      : report_delay_(report_delay),
+        neighbor_(member(kSelf, pair_.mounting_B), member(kOther, pair_.mounting_N),
+                  settings(profile)) {}
+
+  void run_until(Timestamp end, const Ingredients& with = {}) {
+    for (; now_ <= end; now_ += 10ms) {
+      pair_.sample_imus(now_);
+      const auto step = now_.time_since_epoch() / 10ms;
+      if (with.own_imu && !pair_.imu_B.empty()) self_.imu.push(pair_.imu_B.newest());
+      if (with.own_tilt) self_.tilt = tilt(true, now_);
+      if (with.bearings && step % 2 == 0) neighbor_.add_bearing(own_bearing());
+      if (with.ranges && step % 4 == 1) neighbor_.add_range(range());
+      if (with.reports && step % 2 == 1) neighbor_.add_report(report(with), self_);
+      neighbor_.tick(now_, self_);
+    }
+  }
+
+  /// Ticks once a second and nothing else.
+  void coast_until(Timestamp end) {
+    for (; now_ <= end; now_ += 1s) neighbor_.tick(now_, self_);
+  }
+
+  [[nodiscard]] Vector6d error() const {
+    return pose_difference(neighbor_.pose()->T_B_N.pose,
+                           pair_.truth(neighbor_.pose()->stamp).motion.T_B_N);
+  }
+  [[nodiscard]] Neighbor& neighbor() { return neighbor_; }
+  [[nodiscard]] NoPoseReason reason() const { return neighbor_.status().reason; }
+  [[nodiscard]] std::uint64_t count(MeasurementKind kind, Verdict verdict) const {
+    return neighbor_.status()
+        .measurements[static_cast<std::size_t>(kind)][static_cast<std::size_t>(verdict)];
+  }
+  [[nodiscard]] RobotState& self() { return self_; }
+
+  [[nodiscard]] ReceivedReport report(const Ingredients& with) {
+    const Timestamp stamp = now_ - report_delay_;
+    ReceivedReport received;
+    received.report.sender = kOther;
+    received.report.stamp = stamp;
+    if (with.peer_tilt) received.report.tilt = tilt(false, stamp);
+    for (std::size_t i = 0; with.peer_imu && i < pair_.imu_N.size(); ++i) {
+      const ImuSample& sample = pair_.imu_N[i];
+      if (sample.stamp <= stamp && sample.stamp > stamp - 160ms) {
+        received.report.imu.push_back(sample);
+      }
+    }
+    if (with.peer_bearings && stamp > Timestamp{}) {
+      const DirectionReading u = pair_.peer_bearing(stamp);
+      received.report.bearings.push_back({stamp, kSelf, u.u, u.camera, u.sigma_rad});
+    }
+    return received;
+  }
+
+ private:
+  static FilterSettings settings(Profile profile) {
+    EstimatorConfig estimator;
+    estimator.profile = profile;
+    return filter_settings(estimator, ImuConfig{}, UwbConfig{});
+  }
+  [[nodiscard]] Tilt tilt(bool own, Timestamp stamp) {
+    const MutualSighting z = pair_.sighting(stamp);
+    return {stamp, own ? z.B.up : z.N.up, 0.01};
+  }
+  [[nodiscard]] Bearing own_bearing() {
+    const DirectionReading u = pair_.bearing(now_);
+    return {now_, kOther, u.u, u.camera, u.sigma_rad};
+  }
+  [[nodiscard]] UwbRange range() { return {now_, kOther, pair_.range(now_).range_m, -80.0, -79.0}; }
+
+  SimulatedPair pair_{1};
+  Duration report_delay_;
+  RobotState self_;
+  Neighbor neighbor_;
+  Timestamp now_{10ms};
+};
+
+TEST(Neighbor, IsLocatedWithinTwoSeconds) {
+  View view;
+
+  view.run_until(Timestamp{2s});
+
+  ASSERT_TRUE(view.neighbor().pose());
+  EXPECT_EQ(view.reason(), NoPoseReason::kNone);
+  EXPECT_EQ(view.neighbor().pose()->mode, PoseMode::kDirect);
+  EXPECT_LT(view.error().head<3>().norm(), 0.35);  // mostly the range's bias of 0.1 m, one sigma
+  EXPECT_LT(view.error().tail<3>().norm(), 0.06);
+  EXPECT_LE(Timestamp{2s} - view.neighbor().pose()->stamp, Duration{20ms});
+}
+
+TEST(Neighbor, IsLocatedUnderThePapersProfileToo) {
+  View view(Profile::kPaper);
+
+  view.run_until(Timestamp{3s});
+
+  ASSERT_TRUE(view.neighbor().pose());
+  EXPECT_LT(view.error().head<3>().norm(), 0.4);
+  EXPECT_LT(view.error().tail<3>().norm(), 0.1);
+}
+
+struct Missing {
+  const char* name;
+  Ingredients with;
+  NoPoseReason reason;
+};
+
+class WithoutAnIngredient : public testing::TestWithParam<Missing> {};
+
+TEST_P(WithoutAnIngredient, ThereIsNoPoseAndAReason) {
+  View view;
+
+  view.run_until(Timestamp{3s}, GetParam().with);
+
+  EXPECT_FALSE(view.neighbor().pose());
+  EXPECT_EQ(view.reason(), GetParam().reason) << name_of(view.reason());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Neighbor, WithoutAnIngredient,
+    testing::Values(Missing{"Reports", {.reports = false}, NoPoseReason::kNeverHeard},
+                    Missing{"OwnImu", {.own_imu = false}, NoPoseReason::kNoOwnImu},
+                    Missing{"PeerImu", {.peer_imu = false}, NoPoseReason::kNoPeerImu},
+                    Missing{"OwnTilt", {.own_tilt = false}, NoPoseReason::kTiltUnknown},
+                    Missing{"Bearings", {.bearings = false}, NoPoseReason::kNotSeen},
+                    Missing{"PeerBearings", {.peer_bearings = false}, NoPoseReason::kDoesNotSeeUs},
+                    Missing{"Ranges", {.ranges = false}, NoPoseReason::kNoRange}),
+    [](const auto& test) { return test.param.name; });
+
+TEST(Neighbor, IsSilentAfterTwoSecondsWithoutAReport) {
+  View view;
+  view.run_until(Timestamp{2s});
+
+  view.run_until(Timestamp{60s}, {.reports = false, .bearings = false, .ranges = false});
+
+  EXPECT_FALSE(view.neighbor().pose());
+  EXPECT_EQ(view.reason(), NoPoseReason::kSilent);
+}
+
+TEST(Neighbor, IsPredictedForAWhileAndSaysSo) {
+  View view;
+  view.run_until(Timestamp{3s});
+  const double sigma_before = view.neighbor().pose()->T_B_N.covariance.trace();
+
+  view.run_until(Timestamp{3800ms}, {.bearings = false, .peer_bearings = false, .ranges = false});
+
+  ASSERT_TRUE(view.neighbor().pose());
+  EXPECT_EQ(view.neighbor().pose()->mode, PoseMode::kPredicted);
+  EXPECT_GT(view.neighbor().pose()->age_s, 0.5);
+  EXPECT_GT(view.neighbor().pose()->T_B_N.covariance.trace(), sigma_before);
+  EXPECT_FALSE(view.neighbor().estimate());  // nothing for the graph
+}
+
+TEST(Neighbor, HalfAnHourWithoutAReadingCostsNoMoreThanASecond) {
+  View view;
+  view.run_until(Timestamp{2s});
+
+  // Were every look ahead to start at the last reading, this alone would run into the timeout.
+  view.coast_until(Timestamp{30min});
+  EXPECT_FALSE(view.neighbor().pose());
+  view.run_until(Timestamp{30min + 3s});
+
+  ASSERT_TRUE(view.neighbor().pose());
+  EXPECT_EQ(view.neighbor().pose()->reset_counter, 2U);
+  EXPECT_LT(view.error().head<3>().norm(), 0.35);
+}
+
+TEST(Neighbor, ATiltFromLongAgoCostsNothingAndIsNotBelieved) {
+  View view;
+  view.run_until(Timestamp{1s});
+  view.self().tilt->stamp = Timestamp{-(24h * 365 * 50)};  // fifty years of gyroscope
+
+  EXPECT_FALSE(view.self().tilt_at(Timestamp{1s}));
+  EXPECT_TRUE(view.self().tilt_at(view.self().tilt->stamp + 100ms));
+}
+
+TEST(Neighbor, RefusesRangesThatNoModuleCanMeanAndCountsThem) {
+  View view;
+  view.run_until(Timestamp{1s});
+  const auto gated = view.count(MeasurementKind::kRange, Verdict::kGated);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+
+  view.neighbor().add_range({Timestamp{1s}, kOther, nan, -80.0, -79.0});
+  view.neighbor().add_range({Timestamp{1s}, kOther, -1.0, -80.0, -79.0});
+  view.neighbor().add_range({Timestamp{1s}, kOther, 1e6, -80.0, -79.0});
+  view.neighbor().add_range({Timestamp{1s}, kOther, 3.0, -95.0, -79.0});  // no line of sight
+
+  EXPECT_EQ(view.count(MeasurementKind::kRange, Verdict::kGated), gated + 4);
+}
+
+TEST(Neighbor, SurvivesAReportFullOfNotANumber) {
+  View view;
+  view.run_until(Timestamp{2s});
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  ReceivedReport bad = view.report({});
+  bad.report.bearings[0].u_B.setConstant(nan);
+  bad.report.ranges.push_back({bad.report.stamp, kSelf, nan, nan, nan});
+  bad.report.imu.push_back(
+      {bad.report.stamp + 1ms, Eigen::Vector3d::Constant(nan), Eigen::Vector3d::Constant(nan)});
+
+  view.neighbor().add_report(bad, view.self());
+  view.run_until(Timestamp{4s});
+
+  ASSERT_TRUE(view.neighbor().pose());
+  EXPECT_LT(view.error().norm(), 0.35);
+  EXPECT_GT(view.count(MeasurementKind::kPeerBearing, Verdict::kGated) +
+                view.count(MeasurementKind::kPeerBearing, Verdict::kDegenerate),
+            0U);
+}
+
+TEST(Neighbor, CountsWhatComesTooLate) {
+  View view;
+  view.run_until(Timestamp{2s});
+
+  view.neighbor().add_range({Timestamp{1500ms}, kOther, 3.0, -80.0, -79.0});
+
+  EXPECT_EQ(view.count(MeasurementKind::kRange, Verdict::kLate), 1U);
+}
+
+TEST(Neighbor, IsReachedByTheGraphWhenItIsNotSeen) {
+  const Ingredients unseen{.bearings = false, .peer_bearings = false, .ranges = false};
+  View view;
+  view.run_until(Timestamp{1s}, unseen);
+  GraphPose pose;
+  pose.neighbor = kOther;
+  pose.T_B_N = {{{4.0, 1.0, 0.0}, Eigen::Quaterniond::Identity()}, 0.01 * Matrix6d::Identity()};
+
+  view.neighbor().add_graph_pose(Timestamp{1s}, pose);
+  view.run_until(Timestamp{1100ms}, unseen);
+
+  ASSERT_TRUE(view.neighbor().pose());
+  EXPECT_EQ(view.neighbor().pose()->mode, PoseMode::kGraph);
+  EXPECT_TRUE(view.neighbor().pose()->sources.graph);
+  EXPECT_FALSE(view.neighbor().estimate());  // the graph does not hear its own echo
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,110 @@
+#include "estimator/swarm/report_composer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+
+Bearing bearing_at(Duration t, RobotId neighbor = RobotId{2}) {
+  Bearing bearing;
+  bearing.stamp = Timestamp{t};
+  bearing.neighbor = neighbor;
+  return bearing;
+}
+
+UwbRange range_at(Duration t) {
+  UwbRange range;
+  range.stamp = Timestamp{t};
+  range.neighbor = RobotId{2};
+  range.range_m = 3.0;
+  return range;
+}
+
+RobotState state_with_imu(int samples) {
+  RobotState state;
+  for (int i = 1; i <= samples; ++i) {
+    state.imu.push({Timestamp{i * 10ms}, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ()});
+  }
+  state.tilt = Tilt{.stamp = Timestamp{samples * 10ms}};
+  return state;
+}
+
+TEST(ReportComposer, SaysNothingBeforeThereIsATilt) {
+  ReportComposer composer(RobotId{1});
+  composer.add(bearing_at(10ms));
+
+  EXPECT_FALSE(composer.compose(Timestamp{20ms}, RobotState{}, {}));
+}
+
+TEST(ReportComposer, RepeatsTheLast160Milliseconds) {
+  ReportComposer composer(RobotId{1});
+  const RobotState state = state_with_imu(50);
+  composer.add(range_at(100ms));
+  composer.add(bearing_at(105ms));
+
+  for (const Duration now : {Duration{120ms}, Duration{200ms}, Duration{260ms}}) {
+    const auto report = composer.compose(Timestamp{now}, state, {});
+    ASSERT_TRUE(report);
+    EXPECT_EQ(report->ranges.size(), 1U);
+    EXPECT_EQ(report->bearings.size(), 1U);
+    EXPECT_EQ(report->sender, RobotId{1});
+    EXPECT_EQ(report->stamp, Timestamp{now});
+  }
+  const auto later = composer.compose(Timestamp{266ms}, state, {});
+  EXPECT_TRUE(later->ranges.empty());
+  EXPECT_TRUE(later->bearings.empty());
+}
+
+TEST(ReportComposer, RepeatsImuSamplesOfTheSameTime) {
+  ReportComposer composer(RobotId{1});
+
+  const auto report = composer.compose(Timestamp{500ms}, state_with_imu(50), {});
+
+  ASSERT_FALSE(report->imu.empty());
+  EXPECT_EQ(report->imu.front().stamp, Timestamp{340ms});
+  EXPECT_EQ(report->imu.back().stamp, Timestamp{500ms});
+}
+
+TEST(ReportComposer, ThinsBearingsToTheNewestFrameOfEachNeighbor) {
+  ReportComposer composer(RobotId{1});
+  for (int i = 1; i <= 4; ++i) composer.add(bearing_at(i * 5ms, RobotId{2}));
+  for (int i = 1; i <= 4; ++i) composer.add(bearing_at(i * 5ms - 1ms, RobotId{3}));
+
+  const auto report = composer.compose(Timestamp{20ms}, state_with_imu(2), {});
+
+  ASSERT_EQ(report->bearings.size(), 2U);
+  EXPECT_EQ(report->bearings[0].stamp, Timestamp{20ms});
+  EXPECT_EQ(report->bearings[1].stamp, Timestamp{19ms});
+}
+
+TEST(ReportComposer, KeepsBothBearingsOfAFrameThatShowsANeighborTwice) {
+  ReportComposer composer(RobotId{1});
+  composer.add(bearing_at(5ms));
+  composer.add(bearing_at(10ms));
+  composer.add(bearing_at(10ms));
+
+  const auto report = composer.compose(Timestamp{20ms}, state_with_imu(2), {});
+
+  EXPECT_EQ(report->bearings.size(), 2U);
+}
+
+TEST(ReportComposer, StaysBoundedWhileThereIsNoTilt) {
+  ReportComposer composer(RobotId{1});
+  for (int i = 0; i < 10000; ++i) {
+    composer.add(range_at(i * 10ms));
+    composer.add(bearing_at(i * 10ms));
+    static_cast<void>(composer.compose(Timestamp{i * 10ms}, RobotState{}, {}));
+  }
+
+  const auto report = composer.compose(Timestamp{99990ms}, state_with_imu(2), {});
+
+  EXPECT_LE(report->ranges.size(), 17U);
+  EXPECT_LE(report->bearings.size(), 17U);
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,119 @@
+#include "estimator/swarm/sighting_log.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/simulated_pair.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using test::SimulatedPair;
+
+constexpr Timestamp kNow{1s};
+
+/// A pair at 1 s, its log and both robots' states; a test leaves something out.
+class Sighted : public testing::Test {
+ protected:
+  Sighted()
+      : pair_(1, {.gyro = 0, .accel = 0, .bearing = 0, .range = 0, .tilt = 0, .priors = {}}),
+        log_(member(1, pair_.mounting_B), member(2, pair_.mounting_N), 0.003, 0.1) {
+    pair_.sample_imus(Timestamp{2s});
+    const MutualSighting z = pair_.sighting(kNow);
+    self_ = {pair_.imu_B, Tilt{kNow, z.B.up, 0.01}};
+    neighbor_ = {pair_.imu_N, Tilt{kNow, z.N.up, 0.01}};
+  }
+
+  static MemberConfig member(std::uint16_t id, const Mounting& mounting) {
+    MemberConfig config;
+    config.id = RobotId{id};
+    config.p_body_led = mounting.led;
+    config.p_body_uwb = mounting.antenna;
+    return config;
+  }
+  Bearing own(Timestamp t) {
+    const DirectionReading u = pair_.bearing(t);
+    return {t, RobotId{2}, u.u, u.camera, 0.003};
+  }
+  Bearing peer(Timestamp t) {
+    const DirectionReading u = pair_.peer_bearing(t);
+    return {t, RobotId{1}, u.u, u.camera, 0.003};
+  }
+  void add_range(Timestamp t) { log_.add_range(t, pair_.range(t).range_m); }
+  [[nodiscard]] NoPoseReason reason(const Bearing& peer_bearing) const {
+    const auto result = log_.raw_pose(peer_bearing, self_, neighbor_);
+    const auto* why = std::get_if<NoPoseReason>(&result);
+    return why == nullptr ? NoPoseReason::kNone : *why;
+  }
+
+  SimulatedPair pair_;
+  SightingLog log_;
+  RobotState self_;
+  RobotState neighbor_;
+};
+
+TEST_F(Sighted, JoinsReadingsOfOneInstantToTheTruePose) {
+  log_.add_own(own(kNow));
+  add_range(kNow);
+
+  const auto result = log_.raw_pose(peer(kNow), self_, neighbor_);
+
+  ASSERT_TRUE(std::holds_alternative<RawPose>(result));
+  const Pose truth = pair_.truth(kNow).motion.T_B_N;
+  EXPECT_LT(pose_difference(truth, std::get<RawPose>(result).T_B_N).norm(), 1e-9);
+}
+
+TEST_F(Sighted, TurnsABearingOfANearbyInstantByTheGyroscope) {
+  log_.add_own(own(kNow - 15ms));
+  add_range(kNow);
+
+  const auto result = log_.raw_pose(peer(kNow), self_, neighbor_);
+
+  ASSERT_TRUE(std::holds_alternative<RawPose>(result));
+  // What is left is the line of sight's own turn, 15 ms at up to 0.6 rad/s here.
+  const Pose truth = pair_.truth(kNow).motion.T_B_N;
+  EXPECT_LT(pose_difference(truth, std::get<RawPose>(result).T_B_N).head<3>().norm(), 0.05);
+}
+
+TEST_F(Sighted, SaysWhatIsMissing) {
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNotSeen);
+
+  log_.add_own(own(kNow - 50ms));
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNotSeen);
+
+  log_.add_own(own(kNow));
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNoRange);
+
+  add_range(kNow - 100ms);
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNoRange);
+
+  add_range(kNow);
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNone);
+
+  neighbor_.tilt.reset();
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kTiltUnknown);
+}
+
+TEST_F(Sighted, AnOutlierAmongRangesDoesNotPass) {
+  log_.add_own(own(kNow));
+  add_range(kNow - 20ms);
+  log_.add_range(kNow, 40.0);
+  add_range(kNow + 20ms);
+
+  const auto result = log_.raw_pose(peer(kNow), self_, neighbor_);
+
+  ASSERT_TRUE(std::holds_alternative<RawPose>(result));
+  EXPECT_LT(std::get<RawPose>(result).T_B_N.p.norm(), 10.0);
+}
+
+TEST_F(Sighted, ItsCovarianceIsPositiveDefinite) {
+  log_.add_own(own(kNow));
+  add_range(kNow);
+
+  const auto raw = std::get<RawPose>(log_.raw_pose(peer(kNow), self_, neighbor_));
+
+  EXPECT_EQ(raw.covariance.llt().info(), Eigen::Success);
+}
+
+}  // namespace
+}  // namespace crepes
