@@ -48,9 +48,10 @@ Result<std::string> read_text(const std::filesystem::path& path) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return fail(ErrorCode::kIo, "is a directory");
   std::ifstream in(path, std::ios::binary);
-  if (!in)
+  if (!in) {
     return fail(ErrorCode::kNotFound,
                 "cannot be opened: " + std::generic_category().message(errno));
+  }
   std::string text(kMaxFileBytes + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (in.bad()) return fail(ErrorCode::kIo, "cannot be read");

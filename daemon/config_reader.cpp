@@ -65,8 +65,8 @@ std::string check_bounds(double value, const Bounds& bounds) {
   if (value >= bounds.min && value <= bounds.max) return "";
   const auto text = [](double number) {
     std::array<char, 32> buffer{};
-    const auto end = std::to_chars(buffer.begin(), buffer.end(), number).ptr;
-    return std::string(buffer.begin(), end);
+    const std::to_chars_result result = std::to_chars(buffer.begin(), buffer.end(), number);
+    return std::string(buffer.begin(), result.ptr);
   };
   return text(value) + " is outside [" + text(bounds.min) + ", " + text(bounds.max) + "]";
 }
@@ -176,7 +176,8 @@ ConfigReader::ConfigReader(const YAML::Node& node, std::string path, ReadLog& lo
 }
 
 void ConfigReader::finish() {
-  for (const auto& [key, node] : entries_) {
+  for (const auto& entry : entries_) {
+    const std::string& key = entry.first;
     const auto nearest =
         std::ranges::min_element(known_, {}, [&](const auto& k) { return edits_between(k, key); });
     std::string reason = "unknown key";

@@ -43,7 +43,7 @@ void check_unique(const std::string& list, const std::string& key, const std::ve
                   const ValueOf& value_of, Faults& faults) {
   std::map<std::string, std::size_t> first;
   for (std::size_t i = 0; i < items.size(); ++i) {
-    const std::string value = value_of(items[i]);
+    const std::string& value = value_of(items[i]);
     if (value.empty()) continue;
     const auto [it, inserted] = first.emplace(value, i);
     if (!inserted)
@@ -127,9 +127,10 @@ void check_members(const Config& config, Faults& faults) {
     return std::ranges::count(members, id, &MemberConfig::id) > 0;
   };
   const bool all_read = config.robot.id != RobotId{} && !has_member(RobotId{});
-  if (all_read && !has_member(config.robot.id))
+  if (all_read && !has_member(config.robot.id)) {
     faults.push_back(
         {"robot.id", std::to_string(config.robot.id.value) + " is not among swarm.members"});
+  }
 }
 
 /// Usenko, Demmel, Cremers 2018: xi in (-1, 1), alpha in [0, 1], positive focal lengths.

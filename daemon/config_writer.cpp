@@ -25,10 +25,10 @@ std::string yaml_of(double value) {
   const double size = std::abs(value);
   const bool is_plain = size == 0 || (size >= 1e-6 && size < 1e12);
   std::array<char, 32> buffer{};
-  const auto end = std::to_chars(buffer.begin(), buffer.end(), value,
-                                 is_plain ? std::chars_format::fixed : std::chars_format::general)
-                       .ptr;
-  return {buffer.begin(), end};
+  const std::to_chars_result result =
+      std::to_chars(buffer.begin(), buffer.end(), value,
+                    is_plain ? std::chars_format::fixed : std::chars_format::general);
+  return {buffer.begin(), result.ptr};
 }
 
 /// Always quoted, so that no text reads back as something else.

@@ -8,6 +8,7 @@ namespace crepes {
 namespace {
 
 constexpr Duration kStatusPeriod = std::chrono::milliseconds{250};
+constexpr Duration kLongestWait = std::chrono::milliseconds{100};
 
 void hand_on(Outputs outputs, const EstimatorSinks& sinks) {
   if (outputs.graph_problem) sinks.solve(std::move(*std::exchange(outputs.graph_problem, {})));
@@ -26,16 +27,14 @@ void run_estimator(const Config& config, EventQueue& events, const EstimatorSink
     turns.add();
     // Waiting events go first: a Tick says that what came before it is known.
     std::optional<Event> event = events.try_pop();
-    const Timestamp now = clock.now();
-    if (!event && now < next_tick)
-      event =
-          events.pop_for(std::min(next_tick - now, Duration{std::chrono::milliseconds{100}}), stop);
+    if (const Duration wait = next_tick - clock.now(); !event && wait > Duration::zero())
+      event = events.pop_for(std::min(wait, kLongestWait), stop);
     if (event) hand_on(estimator.step(*event), sinks);
     if (clock.now() < next_tick) continue;
     const Timestamp tick = clock.now();
     hand_on(estimator.step(Tick{tick}), sinks);
     // A late loop skips ticks rather than running after them.
-    next_tick = std::max(next_tick + period, tick);
+    next_tick = next_tick + period > tick ? next_tick + period : tick + period;
     if (tick < next_status) continue;
     sinks.inform(estimator.status());
     next_status = tick + kStatusPeriod;

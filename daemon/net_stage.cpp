@@ -31,7 +31,7 @@ std::vector<RobotId> ids_of(const SwarmConfig& swarm) {
 /// The socket on the mesh, opened again when the interface comes and goes.
 class MeshSocket {
  public:
-  explicit MeshSocket(const NetConfig& config) : config_(config) {}
+  explicit MeshSocket(NetConfig config) : config_(std::move(config)) {}
 
   [[nodiscard]] UdpSocket* get(Timestamp now) {
     if (socket_ || now < retry_at_) return socket_ ? &*socket_ : nullptr;
@@ -85,8 +85,10 @@ class NetLoop {
     wait();
     receive();
     stage_.inbox.clear_wake();
-    while (auto input = stage_.inbox.try_pop())
+    while (auto input = stage_.inbox.try_pop()) {
       std::visit([this](auto& what) { on(what); }, *input);
+      receive();  // arrivals are stamped here: clock offsets must not wait for all the sending
+    }
     server_.serve(clock_.now());
   }
 

@@ -19,10 +19,10 @@ constexpr double kLongestWait = 0.1;  ///< s
 }  // namespace
 
 Result<SimSerial> open_sim_imu(const SimWorld& world, const Config& config) {
-  if (!world.contains(config.robot.id))
-    return fail(ErrorCode::kConfig,
-                "sim.scenario has no robot " + std::to_string(config.robot.id.value));
-  SimImu imu(world, config.robot.id, config.imu);
+  const RobotId self = config.robot.id;
+  if (!world.contains(self))
+    return fail(ErrorCode::kConfig, "sim.scenario has no robot " + std::to_string(self.value));
+  SimImu imu(world, self, config.imu);
   return SimSerial::open([imu](double t_s) mutable { return imu.sample(t_s); },
                          config.imu.update_rate);
 }

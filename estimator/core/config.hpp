@@ -34,6 +34,8 @@ struct Choice {
   Enum value;
 };
 template <class Enum>
+Choice(const char*, Enum) -> Choice<Enum>;  // which clang-tidy 14 cannot deduce for an aggregate
+template <class Enum>
 Choice(std::string_view, Enum) -> Choice<Enum>;
 
 struct RobotConfig {

@@ -15,7 +15,7 @@ struct MonoClock {
   using period = std::nano;
   using duration = Duration;
   using time_point = std::chrono::time_point<MonoClock>;
-  static constexpr bool is_steady = true;
+  static constexpr bool is_steady = true;  // NOLINT(readability-identifier-naming): std's name
 };
 
 /// A neighbor's timeline. Its stamps do not mix with ours: only `ClockOffset` bridges the two.
@@ -24,7 +24,7 @@ struct PeerClock {
   using period = std::nano;
   using duration = Duration;
   using time_point = std::chrono::time_point<PeerClock>;
-  static constexpr bool is_steady = true;
+  static constexpr bool is_steady = true;  // NOLINT(readability-identifier-naming): std's name
 };
 
 using Timestamp = MonoClock::time_point;
