@@ -126,7 +126,7 @@ void check_members(const Config& config, Faults& faults) {
   const auto has_member = [&](RobotId id) {
     return std::ranges::count(members, id, &MemberConfig::id) > 0;
   };
-  const bool all_read = config.robot.id != RobotId{} && !has_member(RobotId{});
+  const bool all_read = config.robot.id != RobotId{} && !members.empty() && !has_member(RobotId{});
   if (all_read && !has_member(config.robot.id)) {
     faults.push_back(
         {"robot.id", std::to_string(config.robot.id.value) + " is not among swarm.members"});
