@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "daemon/logging.hpp"
+#include "drivers/imu/bundle_spacing.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/serial/serial_reader.hpp"
 #include "drivers/uwb/nlink.hpp"
@@ -99,20 +100,23 @@ Totals faults_of(const WitMotionCounts& counts) {
   return {{"incomplete", counts.incomplete}, {"implausible", counts.implausible}};
 }
 
-template <class Parser>
+/// `Arrange` puts right what was read at once: a function of a std::vector<Measurement>&.
+template <class Parser, class Arrange>
 class SerialDevice final : public Device {
  public:
-  SerialDevice(SerialPort port, Parser parser, const Clock& clock, const EventSink& sink)
-      : reader_(std::move(port), std::move(parser), clock, [this, sink](const auto& measurement) {
-          ++heard_;
-          sink(Event(measurement));
-        }) {}
+  SerialDevice(SerialPort port, Parser parser, Arrange arrange, const Clock& clock, EventSink sink)
+      : arrange_(std::move(arrange)),
+        sink_(std::move(sink)),
+        reader_(std::move(port), std::move(parser), clock,
+                [this](const auto& measurement) { heard_.push_back(measurement); }) {}
 
   [[nodiscard]] Result<std::size_t> read_once(milliseconds timeout) override {
-    heard_ = 0;
+    heard_.clear();
     if (const Result<void> read = reader_.read_once(timeout); !read)
       return tl::unexpected(read.error());
-    return heard_;
+    arrange_(heard_);
+    for (const auto& measurement : heard_) sink_(Event(measurement));
+    return heard_.size();
   }
 
   [[nodiscard]] Totals counters() const override {
@@ -127,13 +131,16 @@ class SerialDevice final : public Device {
   }
 
  private:
-  std::size_t heard_ = 0;
+  Arrange arrange_;
+  EventSink sink_;
+  std::vector<typename Parser::Measurement> heard_;
   SerialReader<Parser> reader_;
 };
 
-template <class Parser>
+template <class Parser, class Arrange>
 Sensor serial_sensor(const std::string& name, const std::string& port, int baud,
-                     const Parser& parser, const Clock& clock, const EventSink& sink) {
+                     const Parser& parser, const Arrange& arrange, const Clock& clock,
+                     const EventSink& sink) {
   Sensor sensor;
   sensor.name = name;
   sensor.when_silent = port + ": silent for 2 s: is it powered, and is " + name + ".baud right?";
@@ -141,7 +148,8 @@ Sensor serial_sensor(const std::string& name, const std::string& port, int baud,
     if (port.empty()) return fail(ErrorCode::kConfig, "no device: set " + name + ".port");
     Result<SerialPort> opened = SerialPort::open(port, baud);
     if (!opened) return tl::unexpected(opened.error());
-    return std::make_unique<SerialDevice<Parser>>(std::move(*opened), parser, clock, sink);
+    return std::make_unique<SerialDevice<Parser, Arrange>>(std::move(*opened), parser, arrange,
+                                                           clock, sink);
   };
   return sensor;
 }
@@ -179,12 +187,15 @@ std::string_view meaning_of(Exposure exposure) {
 
 Sensor uwb_sensor(const UwbConfig& config, const SwarmConfig& swarm, const Clock& clock,
                   const EventSink& sink) {
-  return serial_sensor("uwb", config.port, config.baud,
-                       NlinkParser(uwb_modules_of(swarm), config.max_range_m), clock, sink);
+  return serial_sensor(
+      "uwb", config.port, config.baud, NlinkParser(uwb_modules_of(swarm), config.max_range_m),
+      [](const std::vector<UwbRange>&) {}, clock, sink);
 }
 
 Sensor imu_sensor(const ImuConfig& config, const Clock& clock, const EventSink& sink) {
-  return serial_sensor("imu", config.port, config.baud, WitMotionParser(), clock, sink);
+  const auto space_out = [spacing = BundleSpacing(from_seconds(1.0 / config.update_rate))](
+                             std::vector<ImuSample>& bundle) mutable { spacing.apply(bundle); };
+  return serial_sensor("imu", config.port, config.baud, WitMotionParser(), space_out, clock, sink);
 }
 
 Sensor camera_sensor(const std::string& name, const OpenCamera& open, FrameQueue& frames,
