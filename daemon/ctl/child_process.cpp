@@ -8,7 +8,7 @@
 
 #include <cerrno>
 #include <csignal>
-#include <cstring>
+#include <system_error>
 #include <utility>
 
 namespace crepes {
@@ -18,7 +18,7 @@ constexpr int kCannotRun = 127;  // as shells say it
 
 /// Between fork and exec: calls only what is safe there.
 [[noreturn]] void become(const char* program, char* const* arguments, int log, pid_t parent) {
-  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+  ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // NOLINT(concurrency-mt-unsafe): the only thread after fork
   if (::getppid() != parent) ::_exit(kCannotRun);
   ::setpgid(0, 0);
   sigset_t none;
@@ -36,21 +36,25 @@ Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
                                          const std::vector<std::string>& arguments,
                                          const std::filesystem::path& log) {
   if (::access(program.c_str(), X_OK) != 0)
-    return fail(ErrorCode::kNotFound, program.string() + ": " + std::strerror(errno));
+    return fail(ErrorCode::kNotFound,
+                program.string() + ": " + std::generic_category().message(errno));
   std::vector<std::string> words{program.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 
   const int fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) return fail(ErrorCode::kIo, log.string() + ": " + std::strerror(errno));
+  if (fd < 0)
+    return fail(ErrorCode::kIo, log.string() + ": " + std::generic_category().message(errno));
   const pid_t parent = ::getpid();
   const pid_t pid = ::fork();
   if (pid == 0) become(argv.front(), argv.data(), fd, parent);
   const int reason = errno;
   ::close(fd);
-  if (pid < 0) return fail(ErrorCode::kIo, std::string("fork: ") + std::strerror(reason));
+  if (pid < 0)
+    return fail(ErrorCode::kIo, std::string("fork: ") + std::generic_category().message(reason));
   return ChildProcess(pid);
 }
 

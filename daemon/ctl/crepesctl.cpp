@@ -31,6 +31,7 @@ template <class Enum, std::size_t N, class Set>
 void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<Enum>, N>& choices,
                 const Set& set, const std::string& help) {
   std::vector<std::string> names;
+  names.reserve(N);
   for (const Choice<Enum>& choice : choices) names.emplace_back(choice.name);
   app->add_option_function<std::string>(
          flag,

@@ -1,8 +1,6 @@
 #include "daemon/ctl/csv_file.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <fstream>
 
 #include "estimator/core/contract.hpp"
@@ -26,7 +24,7 @@ Result<std::string> read_text_file(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file, status))
     return fail(ErrorCode::kIo, file.string() + ": not a file");
   std::ifstream in(file, std::ios::binary);
-  if (!in) return fail(ErrorCode::kIo, file.string() + ": " + std::strerror(errno));
+  if (!in) return fail(ErrorCode::kIo, file.string() + ": cannot be opened");
   std::string text(std::filesystem::file_size(file, status), '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (in.bad()) return fail(ErrorCode::kIo, file.string() + ": cannot be read");

@@ -21,12 +21,12 @@ Eigen::Vector3d vector_from(const Json& json) {
 }
 
 Matrix6d covariance_from(const Json& json) {
-  Matrix6d covariance;
+  Matrix6d P;
   std::size_t next = 0;
-  for (Eigen::Index row = 0; row < 6; ++row)
-    for (Eigen::Index column = row; column < 6; ++column)
-      covariance(row, column) = covariance(column, row) = json.at(next++).get<double>();
-  return covariance;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    for (Eigen::Index j = i; j < 6; ++j) P(i, j) = P(j, i) = json.at(next++).get<double>();
+  }
+  return P;
 }
 
 PoseMessage pose_from(const Json& json) {
@@ -56,21 +56,24 @@ StatusMessage status_from(const Json& json) {
   status.self = id_from(json.at("self"));
   status.name = json.value("name", "");
   status.uptime_s = json.value("uptime_s", 0.0);
-  for (const Json& neighbor : json.value("neighbors", Json::array()))
+  for (const Json& neighbor : json.value("neighbors", Json::array())) {
     status.neighbors.push_back({.neighbor = id_from(neighbor.at("peer")),
                                 .name = neighbor.value("name", ""),
                                 .state = neighbor.value("state", "none"),
                                 .reason = neighbor.value("reason", "")});
-  for (const Json& sensor : json.value("sensors", Json::array()))
+  }
+  for (const Json& sensor : json.value("sensors", Json::array())) {
     status.sensors.push_back({.name = sensor.at("name").get<std::string>(),
                               .rate_hz = sensor.value("rate_hz", 0.0),
                               .ok = sensor.value("ok", false),
                               .message = sensor.value("message", "")});
-  for (const Json& clock : json.value("clocks", Json::array()))
+  }
+  for (const Json& clock : json.value("clocks", Json::array())) {
     status.clocks.push_back({.peer = id_from(clock.at("peer")),
                              .offset_s = clock.value("offset_s", 0.0),
                              .skew_ppm = clock.value("skew_ppm", 0.0),
                              .sigma_s = clock.value("sigma_s", 0.0)});
+  }
   return status;
 }
 

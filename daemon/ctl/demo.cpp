@@ -118,7 +118,7 @@ class Demo {
   }
 
   /// Of each pair the whole run; an error names the pairs without a pose.
-  Result<void> sum_up() const {
+  [[nodiscard]] Result<void> sum_up() const {
     std::vector<Row> rows{{"pair", "first pose s", "avail %", "median m", "max m", "median deg",
                            "max deg", "direct", "graph", "predicted"}};
     std::string missing;
@@ -204,13 +204,13 @@ class Demo {
   /// Everything that has come, after waiting for a moment.
   Result<void> listen() {
     std::chrono::milliseconds patience = 5ms;
-    for (std::size_t i = 0; i < robots_.size(); ++i) {
+    for (Live& robot : robots_) {
       for (;;) {
-        auto answer = robots_[i].client.receive(patience);
+        auto answer = robot.client.receive(patience);
         if (!answer) return tl::unexpected(answer.error());
         patience = 0ms;
         if (!*answer) break;
-        take(robots_[i], (*answer)->message);
+        take(robot, (*answer)->message);
       }
     }
     return {};
@@ -306,7 +306,7 @@ Result<void> demo(const DemoOptions& options) {
   if (!directory) return tl::unexpected(directory.error());
   StopSignals stop;
   Demo demo(options);
-  const Result<void> ran = demo.start(directory->path()).and_then([&] { return demo.run(stop); });
+  Result<void> ran = demo.start(directory->path()).and_then([&] { return demo.run(stop); });
   demo.stop();
   if (!ran) return ran;
   return demo.sum_up();

@@ -176,11 +176,12 @@ Json swarm_json(const SwarmScore& swarm) {
   put(overall, "median_rotation_deg", kDegPerRad * all.pooled_median_rotation_rad);
   put(overall, "max_age_s", to_seconds(all.max_age));
   json["clocks"] = Json::array();
-  for (const ClockScore& clock : swarm.clocks)
+  for (const ClockScore& clock : swarm.clocks) {
     json["clocks"].push_back({{"observer", clock.observer.value},
                               {"peer", clock.peer.value},
                               {"samples", clock.samples},
                               {"max_error_s", clock.max_error_s}});
+  }
   return json;
 }
 

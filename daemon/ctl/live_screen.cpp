@@ -36,7 +36,7 @@ LiveScreen::~LiveScreen() {
   if (is_terminal_) print("\x1b[?25h\x1b[?1049l");
 }
 
-void LiveScreen::show(const std::string& text) {
+void LiveScreen::show(const std::string& text) const {
   if (!is_terminal_) {
     print(text + "\n");
     return;

@@ -39,7 +39,7 @@ class LiveScreen {
   [[nodiscard]] bool is_terminal() const { return is_terminal_; }
 
   /// Shows `text` in place of what was there; lines that do not fit the terminal are cut.
-  void show(const std::string& text);
+  void show(const std::string& text) const;
 
  private:
   bool is_terminal_;

@@ -75,10 +75,11 @@ PairScore score_pair(std::span<const NeighborPose> poses, const RelativeTruth& t
     score.position_errors_m.push_back(d.head<3>().norm());
     score.rotation_errors_rad.push_back(d.tail<3>().norm());
     const Eigen::LLT<Matrix6d> P(pose.T_B_N.covariance);
-    if (P.info() == Eigen::Success)
+    if (P.info() == Eigen::Success) {
       nees.push_back(d.dot(P.solve(d)));
-    else
+    } else {
       ++score.bad_covariances;
+    }
   }
   score.median_nees = median_of(std::move(nees));
   return score;

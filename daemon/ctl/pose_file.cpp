@@ -65,9 +65,10 @@ bool read_row(const CsvFile& csv, NeighborPose& pose, DatasetFaults& faults) {
     return false;
   }
   std::size_t next = kFirstCovariance;
-  for (Eigen::Index row = 0; row < 6; ++row)
-    for (Eigen::Index column = row; column < 6; ++column)
-      pose.T_B_N.covariance(row, column) = pose.T_B_N.covariance(column, row) = x.at(next++);
+  Matrix6d& P = pose.T_B_N.covariance;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    for (Eigen::Index j = i; j < 6; ++j) P(i, j) = P(j, i) = x.at(next++);
+  }
   return true;
 }
 
@@ -87,9 +88,10 @@ void append_pose_row(std::string& text, const NeighborPose& pose) {
   const Pose& T_B_N = pose.T_B_N.pose;
   for (const double p : T_B_N.p) number(p);
   for (const double q : {T_B_N.q.w(), T_B_N.q.x(), T_B_N.q.y(), T_B_N.q.z()}) number(q);
-  for (Eigen::Index row = 0; row < 6; ++row)
+  for (Eigen::Index row = 0; row < 6; ++row) {
     for (Eigen::Index column = row; column < 6; ++column)
       number(pose.T_B_N.covariance(row, column));
+  }
   text += '\n';
 }
 
@@ -115,10 +117,11 @@ Result<std::vector<NeighborPose>> read_pose_file(const std::filesystem::path& fi
     NeighborPose pose;
     pose.neighbor = neighbor;
     if (!read_row(*csv, pose, faults)) continue;
-    if (!poses.empty() && pose.stamp <= poses.back().stamp)
+    if (!poses.empty() && pose.stamp <= poses.back().stamp) {
       faults.add(file, csv->line(), "stamp does not increase");
-    else
+    } else {
       poses.push_back(pose);
+    }
   }
   if (!faults.empty()) return fail(ErrorCode::kFormat, faults.list().front());
   return poses;

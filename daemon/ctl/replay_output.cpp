@@ -1,7 +1,6 @@
 #include "daemon/ctl/replay_output.hpp"
 
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 
 #include "daemon/ctl/pose_file.hpp"
@@ -19,7 +18,7 @@ Result<void> write_text(const fs::path& file, std::string_view text, std::ios::o
   out.write(text.data(), static_cast<std::streamsize>(text.size()));
   out.close();
   if (out) return {};
-  return fail(ErrorCode::kIo, file.string() + ": " + std::strerror(errno));
+  return fail(ErrorCode::kIo, file.string() + ": " + std::generic_category().message(errno));
 }
 
 Result<void> publish(const fs::path& file) {

@@ -27,9 +27,10 @@ Json measurements_json(const NeighborStatus& neighbor) {
   Json kinds = Json::object();
   for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind) {
     Json verdicts = Json::object();
-    for (std::size_t verdict = 0; verdict < kVerdictCount; ++verdict)
+    for (std::size_t verdict = 0; verdict < kVerdictCount; ++verdict) {
       verdicts[std::string(name_of(static_cast<Verdict>(verdict)))] =
           neighbor.measurements.at(kind).at(verdict);
+    }
     kinds[std::string(name_of(static_cast<MeasurementKind>(kind)))] = std::move(verdicts);
   }
   return kinds;

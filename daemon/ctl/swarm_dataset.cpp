@@ -50,10 +50,11 @@ std::vector<bool> in_order(const std::vector<Row<Value>>& rows) {
     if (!ends.empty() && stamp > rows[ends.back()].stamp)
       place = std::upper_bound(ends.begin(), ends.end(), stamp, later);
     if (place != ends.begin()) next[i] = *(place - 1);
-    if (place == ends.end())
+    if (place == ends.end()) {
       ends.push_back(i);
-    else
+    } else {
       *place = i;
+    }
   }
   std::vector<bool> kept(rows.size(), false);
   for (std::size_t i = ends.empty() ? kNone : ends.back(); i != kNone; i = next[i]) kept[i] = true;
@@ -75,10 +76,11 @@ Result<std::vector<Row<Value>>> read_rows(const fs::path& file, std::size_t colu
   const std::vector<bool> kept = in_order(rows);
   std::size_t count = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (!kept[i])
+    if (!kept[i]) {
       context.faults.add(file, rows[i].line, "stamp out of order");
-    else if (count++ != i)
+    } else if (count++ != i) {
       rows[count - 1] = std::move(rows[i]);
+    }
   }
   rows.resize(count);
   return rows;
@@ -193,10 +195,11 @@ Result<CameraRecording> read_camera(const fs::path& dir, std::uint8_t index,
 
 Result<Config> read_config(const fs::path& file, const SwarmRobot& robot) {
   Result<Config> config = load_config(file);
-  if (config && config->robot.id != robot.id)
+  if (config && config->robot.id != robot.id) {
     return fail(ErrorCode::kConfig, file.string() +
                                         ": robot.id: " + std::to_string(config->robot.id.value) +
                                         ", but swarm.yaml says " + std::to_string(robot.id.value));
+  }
   return config;
 }
 
@@ -236,9 +239,10 @@ Result<RobotRecording> load_robot(const fs::path& root, const SwarmRobot& robot,
   }
   const fs::path surplus = dir / ("cam" + std::to_string(cameras));
   std::error_code status;
-  if (fs::exists(surplus, status))
+  if (fs::exists(surplus, status)) {
     faults.add(surplus, 0, "camera without calibration",
                "not in " + recording.config_file.string());
+  }
   return recording;
 }
 

@@ -30,16 +30,17 @@ double number(const YAML::Node& parent, const std::string& key, double min, doub
   double value = 0.0;
   if (!node.IsScalar() || !parse_number(node.Scalar(), value).empty())
     throw Fault{line_of(node), key + ": not a finite number"};
-  if (value < min || value > max)
+  if (value < min || value > max) {
     throw Fault{line_of(node), key + ": outside [" + YAML::Dump(YAML::Node(min)) + ", " +
                                    YAML::Dump(YAML::Node(max)) + "]"};
+  }
   return value;
 }
 
 /// A name that is safe as the name of a file or directory of ours.
 std::string plain_name(const YAML::Node& parent, const std::string& key) {
   const YAML::Node node = child(parent, key);
-  const std::string name = node.IsScalar() ? node.Scalar() : "";
+  std::string name = node.IsScalar() ? node.Scalar() : "";
   const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
   });
@@ -79,9 +80,10 @@ SwarmManifest manifest_from(const YAML::Node& root) {
     throw Fault{line_of(robots), "robots: not a list of robots"};
   for (const YAML::Node& node : robots) {
     SwarmRobot robot = robot_from(node);
-    for (const SwarmRobot& other : manifest.robots)
+    for (const SwarmRobot& other : manifest.robots) {
       if (other.id == robot.id || other.name == robot.name)
         throw Fault{line_of(node), "robot " + robot.name + ": its id or name is another's too"};
+    }
     manifest.robots.push_back(std::move(robot));
   }
   return manifest;

@@ -51,6 +51,7 @@ std::vector<ClockScore> score_clocks(const std::vector<ClockSample>& samples,
     ++score.samples;
   }
   std::vector<ClockScore> list;
+  list.reserve(scores.size());
   for (const auto& [pair, score] : scores) list.push_back(score);
   return list;
 }
@@ -74,14 +75,16 @@ Result<SwarmScore> score_swarm(const fs::path& results, const SwarmManifest& man
       swarm.pairs.push_back(std::move(pair));
     }
   }
-  if (files == 0)
+  if (files == 0) {
     return fail(ErrorCode::kNotFound,
                 results.string() + ": no <observer>/<neighbor>.csv of " + manifest.scenario);
+  }
   auto clocks = read_clock_samples(results / "report.json", names);
-  if (clocks)
+  if (clocks) {
     swarm.clocks = score_clocks(*clocks, manifest);
-  else if (clocks.error().code != ErrorCode::kNotFound)
+  } else if (clocks.error().code != ErrorCode::kNotFound) {
     return tl::unexpected(clocks.error());
+  }
   return swarm;
 }
 

@@ -37,10 +37,11 @@ Result<Trajectory> Trajectory::load(const std::filesystem::path& file) {
   while (csv->next(faults)) {
     TruthSample sample;
     if (!read_sample(*csv, sample, faults)) continue;
-    if (!samples.empty() && sample.t_s <= samples.back().t_s)
+    if (!samples.empty() && sample.t_s <= samples.back().t_s) {
       faults.add(file, csv->line(), "time does not increase");
-    else
+    } else {
       samples.push_back(sample);
+    }
   }
   if (!faults.empty()) return fail(ErrorCode::kFormat, faults.list().front());
   return Trajectory(std::move(samples));

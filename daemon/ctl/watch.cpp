@@ -81,9 +81,10 @@ Row neighbor_row(const std::string& name, const NeighborView& view, Timestamp no
 
 std::string table_of(const Watched& watched, Timestamp now) {
   std::string head = "waiting for the daemon\n";
-  if (watched.status)
+  if (watched.status) {
     head = "robot " + std::to_string(watched.status->self.value) + " " + watched.status->name +
            ", up " + fixed(watched.status->uptime_s, 0) + " s\n";
+  }
   if (watched.heard && now - *watched.heard > kPatience)
     head += "no answer for " + fixed(to_seconds(now - *watched.heard), 0) + " s\n";
   if (!watched.error.empty()) head += "daemon: " + watched.error + "\n";
@@ -164,18 +165,21 @@ std::string status_text(const StatusMessage& status) {
   std::string text = "robot " + std::to_string(status.self.value) + " " + status.name + ", up " +
                      fixed(status.uptime_s, 1) + " s\n\n";
   std::vector<Row> sensors{{"sensor", "rate Hz", "state"}};
-  for (const auto& sensor : status.sensors)
+  for (const auto& sensor : status.sensors) {
     sensors.push_back({sensor.name, fixed(sensor.rate_hz, 1),
                        sensor.ok ? "ok" : (sensor.message.empty() ? "fault" : sensor.message)});
+  }
   std::vector<Row> neighbors{{"neighbor", "state", "why not"}};
-  for (const auto& neighbor : status.neighbors)
+  for (const auto& neighbor : status.neighbors) {
     neighbors.push_back(
         {neighbor.name.empty() ? std::to_string(neighbor.neighbor.value) : neighbor.name,
          neighbor.state, neighbor.reason});
+  }
   std::vector<Row> clocks{{"clock of", "offset s", "skew ppm", "sigma ms"}};
-  for (const auto& clock : status.clocks)
+  for (const auto& clock : status.clocks) {
     clocks.push_back({std::to_string(clock.peer.value), fixed(clock.offset_s, 6),
                       fixed(clock.skew_ppm, 2), fixed(1e3 * clock.sigma_s, 3)});
+  }
   return text + text_table(sensors) + "\n" + text_table(neighbors) + "\n" + text_table(clocks);
 }
 
