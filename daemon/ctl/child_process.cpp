@@ -18,7 +18,8 @@ constexpr int kCannotRun = 127;  // as shells say it
 
 /// Between fork and exec: calls only what is safe there.
 [[noreturn]] void become(const char* program, char* const* arguments, int log, pid_t parent) {
-  ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // NOLINT(concurrency-mt-unsafe): the only thread after fork
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): this is the only thread after fork
+  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(kCannotRun);
   ::setpgid(0, 0);
   sigset_t none;
@@ -35,9 +36,10 @@ constexpr int kCannotRun = 127;  // as shells say it
 Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
                                          const std::vector<std::string>& arguments,
                                          const std::filesystem::path& log) {
-  if (::access(program.c_str(), X_OK) != 0)
+  if (::access(program.c_str(), X_OK) != 0) {
     return fail(ErrorCode::kNotFound,
                 program.string() + ": " + std::generic_category().message(errno));
+  }
   std::vector<std::string> words{program.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
