@@ -18,13 +18,12 @@ constexpr int kCannotRun = 127;  // as shells say it
 
 /// Between fork and exec: calls only what is safe there.
 [[noreturn]] void become(const char* program, char* const* arguments, int log, pid_t parent) {
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): this is the only thread after fork
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(kCannotRun);
   ::setpgid(0, 0);
   sigset_t none;
   sigemptyset(&none);
-  ::sigprocmask(SIG_SETMASK, &none, nullptr);
+  ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
   ::dup2(log, STDOUT_FILENO);
   ::dup2(log, STDERR_FILENO);
   ::execv(program, arguments);
