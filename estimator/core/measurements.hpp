@@ -14,6 +14,7 @@ namespace crepes {
 /// A robot of the swarm, 1..65534.
 struct RobotId {
   std::uint16_t value = 0;
+  // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the 0 behind <=> for a pointer
   auto operator<=>(const RobotId&) const = default;
 };
 

@@ -16,7 +16,6 @@ struct Pose {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();            ///< origin of B in A [m]
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  ///< attitude of B in A (Hamilton)
 
-  // NOLINTNEXTLINE(readability-identifier-naming): mathematics keeps its letters
   [[nodiscard]] Eigen::Matrix3d R() const { return q.toRotationMatrix(); }
 
   [[nodiscard]] Pose inverse() const {

@@ -9,10 +9,10 @@
 
 #include "estimator/core/contract.hpp"
 #include "estimator/relative/tilt_filter.hpp"
-#include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/neighbor.hpp"
 #include "estimator/swarm/report_composer.hpp"
+#include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/team.hpp"
 #include "estimator/vision/blink_tracker.hpp"
 

@@ -18,6 +18,7 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig
   s.profile = estimator.profile;
   s.lag = from_seconds(estimator.lag_ms * 1e-3);
   s.recent = from_seconds(estimator.predicted_after_s);
+  s.forget = from_seconds(estimator.forget_after_s);
 
   s.noise.gyro_density = imu.gyroscope_noise_density;
   s.noise.accel_density = imu.accelerometer_noise_density;

@@ -19,6 +19,7 @@ struct FilterSettings {
   Profile profile = Profile::kTight;
   Duration lag{};
   Duration recent{};  ///< a measurement within this makes a pose direct
+  Duration forget{};  ///< a neighbor silent for longer is forgotten
   ProcessNoise noise;
   Priors priors;
   Gates gates;

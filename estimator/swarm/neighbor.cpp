@@ -139,6 +139,7 @@ void Neighbor::count(MeasurementKind kind, Verdict verdict) {
 
 void Neighbor::tick(Timestamp now, const RobotState& self) {
   pose_.reset();
+  if (now - last_heard_ > settings_.forget) track_.reset();
   release(now, self);
   look_ahead(now, self);
   reason_ = pose_ ? NoPoseReason::kNone : reason(now, self);

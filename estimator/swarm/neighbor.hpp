@@ -6,10 +6,10 @@
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/outputs.hpp"
-#include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/event_sequencer.hpp"
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/neighbor_track.hpp"
+#include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/sighting_log.hpp"
 
 namespace crepes {

@@ -33,8 +33,8 @@ class SightingLog {
   [[nodiscard]] std::optional<double> range_at(Timestamp t) const;
 
   struct StampedRange {
-    Timestamp stamp;
-    double range_m;
+    Timestamp stamp{};
+    double range_m = 0.0;
   };
   MemberConfig self_;
   MemberConfig neighbor_;

@@ -42,7 +42,7 @@ TEST(BoundedQueue, DropsTheNewestValueWhenFullAndCountsIt) {
 }
 
 TEST(BoundedQueue, HoldsTheLastValuesOfAnySequenceAndCountsTheRest) {
-  rc::check([](const std::vector<int>& values) {
+  EXPECT_TRUE(rc::check([](const std::vector<int>& values) {
     const std::size_t capacity = *rc::gen::inRange<std::size_t>(1, 20);
     BoundedQueue<int> queue{capacity, Overflow::kDropOldest};
 
@@ -52,7 +52,7 @@ TEST(BoundedQueue, HoldsTheLastValuesOfAnySequenceAndCountsTheRest) {
     RC_ASSERT(queue.dropped() == values.size() - kept);
     RC_ASSERT(drain(queue) ==
               std::vector<int>(values.end() - static_cast<std::ptrdiff_t>(kept), values.end()));
-  });
+  }));
 }
 
 TEST(BoundedQueue, CarriesValuesThatCanOnlyBeMoved) {

@@ -76,7 +76,7 @@ TEST(DaemonMessages, RefuseWhatTheyCannotRead) {
 }
 
 TEST(DaemonMessages, SurviveAnyBytes) {
-  rc::check([](const std::string& bytes) { (void)parse_message(bytes); });
+  EXPECT_TRUE(rc::check([](const std::string& bytes) { (void)parse_message(bytes); }));
 }
 
 TEST(DaemonClient, TalksToWhoeverIsAtItsPortAndNobodyElse) {

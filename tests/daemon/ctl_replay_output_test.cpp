@@ -45,7 +45,7 @@ Result<std::vector<NeighborPose>> read_text(const fs::path& file, const std::str
 TEST(PoseFile, ReadsBackEveryBit) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
 
-  rc::check([&] {
+  EXPECT_TRUE(rc::check([&] {
     NeighborPose pose = a_pose(*rc::gen::arbitrary<std::int64_t>() / 2);
     pose.mode = *rc::gen::element(PoseMode::kDirect, PoseMode::kGraph, PoseMode::kPredicted);
     pose.T_B_N.pose = {{any_finite(), any_finite(), any_finite()}, any_rotation()};
@@ -65,7 +65,7 @@ TEST(PoseFile, ReadsBackEveryBit) {
     RC_ASSERT(read->front().T_B_N.pose.p == pose.T_B_N.pose.p);
     RC_ASSERT(read->front().T_B_N.pose.q.coeffs() == pose.T_B_N.pose.q.coeffs());
     RC_ASSERT(read->front().T_B_N.covariance == pose.T_B_N.covariance);
-  });
+  }));
 }
 
 TEST(PoseFile, WritesColumnsInTheAgreedOrder) {

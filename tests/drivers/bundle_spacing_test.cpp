@@ -46,7 +46,7 @@ TEST(BundleSpacing, PutsTheOlderSamplesOfABundleAPeriodApart) {
 }
 
 TEST(BundleSpacing, KeepsAnySequenceOfBundlesInOrderAndNeverStampsAfterArrival) {
-  rc::check([] {
+  EXPECT_TRUE(rc::check([] {
     BundleSpacing spacing(kPeriod);
     Timestamp arrival{};
     Timestamp last{Duration::min()};
@@ -63,7 +63,7 @@ TEST(BundleSpacing, KeepsAnySequenceOfBundlesInOrderAndNeverStampsAfterArrival) 
         last = sample.stamp;
       }
     }
-  });
+  }));
 }
 
 }  // namespace

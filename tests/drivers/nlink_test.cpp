@@ -88,7 +88,7 @@ TEST(Nlink, RecognizesAModuleInAnotherMode) {
 }
 
 TEST(Nlink, EncodesWhatItDecodes) {
-  rc::check([] {
+  EXPECT_TRUE(rc::check([] {
     std::vector<NlinkNode> nodes;
     const int count = *rc::gen::inRange(0, 20);
     for (int i = 0; i < count; ++i) {
@@ -103,7 +103,7 @@ TEST(Nlink, EncodesWhatItDecodes) {
       RC_ASSERT(ranges[i].first_path_dbm == nodes[i].first_path_dbm);
       RC_ASSERT(ranges[i].received_dbm == nodes[i].received_dbm);
     }
-  });
+  }));
 }
 
 TEST(Nlink, GivenModulesByConfigurationFallsBackToRobotIds) {

@@ -71,7 +71,7 @@ TEST(WitMotion, RefusesEverySingleBitErrorInAFrame) {
 }
 
 TEST(WitMotion, EncodesWhatItDecodesToHalfAStep) {
-  rc::check([] {
+  EXPECT_TRUE(rc::check([] {
     const auto axis = [](double scale) { return *rc::gen::inRange(-1000, 1000) * scale; };
     const Eigen::Vector3d gyro(axis(0.03), axis(0.03), axis(0.03));
     const Eigen::Vector3d accel(axis(0.15), axis(0.15), 5.0);
@@ -80,7 +80,7 @@ TEST(WitMotion, EncodesWhatItDecodesToHalfAStep) {
     RC_ASSERT(samples.size() == 1U);
     RC_ASSERT((samples[0].gyro_radps - gyro).cwiseAbs().maxCoeff() < 0.51 * 2000 / 57.29 / 32768);
     RC_ASSERT((samples[0].accel_mps2 - accel).cwiseAbs().maxCoeff() < 0.51 * 157 / 32768);
-  });
+  }));
 }
 
 }  // namespace
