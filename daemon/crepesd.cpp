@@ -40,6 +40,8 @@ int run(const std::string& file) {
   Watchdog watchdog(runtime.heartbeats());
   log_message(LogLevel::kInfo, "running with " + file);
   Watchdog::tell_ready();
+  Watchdog::tell_status("running with " + file +
+                        "; `crepesctl status` tells sensors and neighbors");
   while (!signals.came_within_a_second()) {
     for (const std::string& loop : watchdog.check())
       log_message(LogLevel::kError, loop + ": this loop makes no progress");
