@@ -34,7 +34,8 @@ class ImuHistory {
   static constexpr std::size_t kCapacity = 256;
   static constexpr Duration kMaxGap = std::chrono::milliseconds{50};
 
-  /// False, and nothing changes: not plausible, a stamp already there, or older than everything kept.
+  /// False, and nothing changes: not plausible, a stamp already there, or older than everything
+  /// kept.
   bool push(const ImuSample& sample);
 
   [[nodiscard]] bool empty() const { return size_ == 0; }

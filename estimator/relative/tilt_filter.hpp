@@ -18,8 +18,8 @@ class TiltFilter {
  public:
   explicit TiltFilter(const ImuConfig& config);
 
-  /// False, and nothing changes: not plausible, or a stamp that does not advance. A gap of more than
-  /// half a second starts the filter anew.
+  /// False, and nothing changes: not plausible, or a stamp that does not advance. A gap of more
+  /// than half a second starts the filter anew.
   bool add(const ImuSample& sample);
 
   /// Empty until enough samples came to average out the first ones.

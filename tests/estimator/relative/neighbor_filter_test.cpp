@@ -102,8 +102,9 @@ TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysAfterFiveSeconds) {
   EXPECT_LT(nees, kHigh);
 }
 
-// A raw pose shares the range's bias and the cameras' misalignment with the filter's own states; the
-// start takes them for independent. That understates the variance by 1.35 here, and not by more.
+// A raw pose shares the range's bias and the cameras' misalignment with the filter's own states;
+// the start takes them for independent. That understates the variance by 1.35 here, and not by
+// more.
 TEST(NeighborFilter, ARawPoseStartsItOverconfidentByNoMoreThanAHalf) {
   const double nees = mean_pose_nees(5s, [](SimulatedPair& pair, std::uint64_t) {
     return first_raw_pose(pair, Timestamp{50ms}).gaussian();
