@@ -52,7 +52,8 @@ class Replay : public testing::Test {
   static std::uint64_t id_mistakes(const fs::path& out) {
     std::ifstream in(out / "report.json");
     std::uint64_t mistakes = 0;
-    for (const auto& pair : nlohmann::json::parse(in).at("pairs")) {
+    const auto report = nlohmann::json::parse(in);
+    for (const auto& pair : report.at("pairs")) {
       mistakes += pair.at("id_mistakes").get<std::uint64_t>();
     }
     return mistakes;

@@ -52,7 +52,9 @@ Pair random_pair(RandomGeometry& random, double mounting_m) {
                     random.uniform(-0.7, 0.7));
   };
   const auto mounting = [&] {
-    const auto arm = [&] { return random.uniform(0.0, mounting_m) * random.direction(); };
+    const auto arm = [&]() -> Eigen::Vector3d {
+      return random.uniform(0.0, mounting_m) * random.direction();
+    };
     return Mounting{arm(), arm(), arm()};
   };
   const double azimuth = random.uniform(-3.1, 3.1);
