@@ -6,10 +6,12 @@
 #include <array>
 #include <cstdio>
 #include <exception>
+#include <fstream>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "daemon/ctl/codebook.hpp"
 #include "daemon/ctl/demo.hpp"
 #include "daemon/ctl/evaluate.hpp"
 #include "daemon/ctl/live_screen.hpp"
@@ -138,6 +140,48 @@ void add_demo(CLI::App& app, DemoOptions& options, Command& command) {
   sub->callback([&] { command = [&options] { return demo(options); }; });
 }
 
+/// To a file, or to standard output where none is named.
+Result<void> deliver(const std::string& text, const std::string& file) {
+  if (file.empty()) {
+    print(text);
+    return {};
+  }
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) return fail(ErrorCode::kIo, file + ": cannot be written");
+  return {};
+}
+
+Result<void> run_codebook(CodebookOptions options, const std::string& out) {
+  if (::isatty(STDERR_FILENO) == 1) {
+    options.search.on_progress = [&](std::size_t found, std::size_t clear_frames) {
+      std::fprintf(stderr, "\r%4zu of %zu with %zu clear frames ", found, options.ids,
+                   clear_frames);
+    };
+  }
+  const Result<std::string> text = codebook(options);
+  if (options.search.on_progress) std::fputs("\r", stderr);
+  return text.and_then([&](const std::string& library) { return deliver(library, out); });
+}
+
+void add_codebook(CLI::App& app, CodebookOptions& options, std::string& out, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "codebook",
+      "Search blink patterns that a camera tells apart and write them as swarm.members");
+  sub->add_option("--ids", options.ids, "how many")->capture_default_str();
+  sub->add_option("--slots", options.rules.slots, "length of a pattern, 8 to 32")
+      ->capture_default_str();
+  sub->add_option("--distance", options.rules.distance,
+                  "slots in which any two patterns differ, however they are shifted")
+      ->capture_default_str();
+  sub->add_option("--max-dark", options.rules.max_dark, "dark slots in a row")
+      ->capture_default_str();
+  sub->add_option("--seed", options.search.seed, "of the search")->capture_default_str();
+  sub->add_option("--out", out, "file; left out: standard output");
+  sub->callback([&] { command = [&] { return run_codebook(options, out); }; });
+}
+
 int run(int argc, char** argv) {
   CLI::App app("crepesctl: replay, score and watch relative localization of robot swarms");
   app.require_subcommand(1);
@@ -145,12 +189,15 @@ int run(int argc, char** argv) {
   EvaluateOptions evaluate_options;
   WatchOptions watch_options;
   DemoOptions demo_options;
+  CodebookOptions codebook_options;
+  std::string out;
   Command command;
   add_replay(app, replay_options, command);
   add_evaluate(app, evaluate_options, command);
   add_watch(app, watch_options, command);
   add_status(app, watch_options, command);
   add_demo(app, demo_options, command);
+  add_codebook(app, codebook_options, out, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -313,6 +313,7 @@ TEST(ConfigFile, EveryFileInConfigLoads) {
 
   EXPECT_GE(files.size(), 3U);
   for (const fs::path& file : files) {
+    if (file.parent_path().filename() == "libraries") continue;  // parts: see ctl_codebook_test
     const Result<Config> config = load_config(file);
     EXPECT_TRUE(config.has_value()) << config.error().message;
   }

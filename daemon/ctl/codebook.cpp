@@ -1,0 +1,90 @@
+#include "daemon/ctl/codebook.hpp"
+
+#include <algorithm>
+#include <vector>
+
+namespace crepes {
+namespace {
+
+constexpr std::size_t kMinSlots = 8;
+constexpr std::size_t kMaxSlots = 32;
+constexpr std::size_t kMaxIds = 1000;
+
+std::string text_of(std::size_t number) { return std::to_string(number); }
+
+std::string library_text(const CodebookOptions& options, const Codebook& book) {
+  const auto& [slots, distance, max_dark] = options.rules;
+  std::string text = "# Blink patterns, written by crepesctl codebook --ids " +
+                     text_of(options.ids) + " --slots " + text_of(slots) + " --distance " +
+                     text_of(distance) + " --max-dark " + text_of(max_dark) + " --seed " +
+                     std::to_string(options.search.seed) +
+                     "\n# However shifted, any two differ in at least " + text_of(distance) +
+                     " slots, and so does each from itself and from steady\n# light; never dark "
+                     "for more than " +
+                     text_of(max_dark) +
+                     " slots. Add where LED ring and antenna are mounted, and leave out the\n# "
+                     "robots that you do not have: the fewer there are, the sooner one is "
+                     "recognized.\nswarm:\n  members:\n";
+  for (std::size_t i = 0; i < book.patterns.size(); ++i) {
+    const std::string id = text_of(i + 1);
+    text += "    - {id: " + id + ", name: r" + id + ", pattern: \"" + book.patterns[i] + "\"}\n";
+  }
+  return text;
+}
+
+/// The least change of one rule with which there are enough patterns; empty if none is enough.
+std::string remedy(const CodebookOptions& options, const char* flag,
+                   std::size_t CodebookRules::*rule, const std::vector<std::size_t>& values) {
+  for (const std::size_t value : values) {
+    CodebookRules rules = options.rules;
+    rules.*rule = value;
+    const Codebook book = search_codebook(rules, options.ids, options.search);
+    if (book.patterns.size() == options.ids)
+      return std::string("\n  ") + flag + " " + text_of(value);
+  }
+  return "";
+}
+
+std::vector<std::size_t> numbers(std::size_t first, std::size_t last) {
+  std::vector<std::size_t> values;
+  for (std::size_t value = first; value <= last; ++value) values.push_back(value);
+  return values;
+}
+
+Error shortfall(const CodebookOptions& options, std::size_t found) {
+  const auto& [slots, distance, max_dark] = options.rules;
+  std::vector<std::size_t> distances = numbers(1, distance - 1);
+  std::ranges::reverse(distances);
+  const std::string remedies =
+      remedy(options, "--distance", &CodebookRules::distance, distances) +
+      remedy(options, "--slots", &CodebookRules::slots, numbers(slots + 1, kMaxSlots)) +
+      remedy(options, "--max-dark", &CodebookRules::max_dark, numbers(max_dark + 1, slots / 2)) +
+      (found > 0 ? "\n  --ids " + text_of(found) : "");
+  return {ErrorCode::kConfig, "codebook: found " + text_of(found) + " of " + text_of(options.ids) +
+                                  " patterns of " + text_of(slots) + " slots with distance " +
+                                  text_of(distance) + ", dark for at most " + text_of(max_dark) +
+                                  (remedies.empty() ? "; and no single change is enough"
+                                                    : "; any one of these is enough:" + remedies)};
+}
+
+Result<void> check(const CodebookOptions& options) {
+  const auto& [slots, distance, max_dark] = options.rules;
+  const auto refuse = [](const std::string& why) { return fail(ErrorCode::kUsage, why); };
+  if (options.ids < 1 || options.ids > kMaxIds) return refuse("--ids: must be 1 to 1000");
+  if (slots < kMinSlots || slots > kMaxSlots) return refuse("--slots: must be 8 to 32");
+  if (distance < 1 || distance > slots) return refuse("--distance: must be 1 to --slots");
+  if (max_dark < 1 || max_dark >= slots) return refuse("--max-dark: must be 1 to --slots less 1");
+  return {};
+}
+
+}  // namespace
+
+Result<std::string> codebook(const CodebookOptions& options) {
+  if (auto good = check(options); !good) return tl::unexpected(good.error());
+  const Codebook book = search_codebook(options.rules, options.ids, options.search);
+  if (book.patterns.size() < options.ids)
+    return tl::unexpected(shortfall(options, book.patterns.size()));
+  return library_text(options, book);
+}
+
+}  // namespace crepes
