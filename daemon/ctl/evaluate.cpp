@@ -78,7 +78,9 @@ Row pair_row(const ScoredPair& pair) {
           degrees(r.median),
           degrees(r.max)};
   for (const std::size_t count : score.modes) row.push_back(std::to_string(count));
-  row.push_back(fixed(score.median_nees, 2));
+  row.push_back(fixed(median_of(score.nees), 2));
+  row.push_back(percent(share_within(score.nees, kNees95)));
+  row.push_back(std::to_string(score.divergences));
   row.push_back(milliseconds(score.max_age));
   return row;
 }
@@ -94,7 +96,7 @@ std::string clock_lines(const SwarmScore& swarm) {
 std::string table_of(const SwarmScore& swarm, double after_s) {
   std::vector<Row> rows{{"pair", "rows", "avail %", "first s", "pos rmse m", "mean", "median",
                          "max", "rot rmse deg", "median", "max", "direct", "graph", "predicted",
-                         "nees", "age ms"}};
+                         "nees", "in 95 %", "diverged", "age ms"}};
   for (const ScoredPair& pair : swarm.pairs) rows.push_back(pair_row(pair));
   const Overall all = overall_of(swarm);
   return text_table(rows) + "\nafter " + fixed(after_s, 1) + " s, mean over pairs: available " +
@@ -157,7 +159,9 @@ Json pair_json(const ScoredPair& pair) {
   json["rotation_deg"] = statistics_json(score.rotation_errors_rad, kDegPerRad);
   for (const PoseMode mode : {PoseMode::kDirect, PoseMode::kGraph, PoseMode::kPredicted})
     json["modes"][std::string(name_of(mode))] = score.modes.at(static_cast<std::size_t>(mode));
-  put(json, "median_nees", score.median_nees);
+  put(json, "median_nees", median_of(score.nees));
+  put(json, "share_within_95", share_within(score.nees, kNees95));
+  json["divergences"] = score.divergences;
   json["bad_covariances"] = score.bad_covariances;
   json["max_age_s"] = to_seconds(score.max_age);
   return json;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 
 namespace crepes {
@@ -34,7 +35,47 @@ double availability_of(std::span<const NeighborPose> inside, const ScoreWindow& 
   return static_cast<double>(served) / static_cast<double>(last - first + 1);
 }
 
+/// Counts the spells of bad rows that last; a good row or half a second without any ends one.
+class SpellCounter {
+ public:
+  void add(Timestamp stamp, bool bad) {
+    const bool goes_on = bad && begin_ && stamp - last_ <= kLongestGap;
+    if (!goes_on) {
+      begin_ = bad ? std::optional(stamp) : std::nullopt;
+      counted_ = false;
+    }
+    last_ = stamp;
+    if (counted_ || !begin_ || stamp - *begin_ <= kLasting) return;
+    counted_ = true;
+    ++spells_;
+  }
+  [[nodiscard]] std::size_t spells() const { return spells_; }
+
+ private:
+  static constexpr Duration kLongestGap = std::chrono::milliseconds(500);
+  static constexpr Duration kLasting = std::chrono::seconds(1);
+
+  std::optional<Timestamp> begin_;
+  Timestamp last_{};
+  bool counted_ = false;
+  std::size_t spells_ = 0;
+};
+
+bool is_far(double position_m, double rotation_rad, double nees) {
+  constexpr double kFarthest = 1.0;                              // m
+  constexpr double kFarthestTurn = std::numbers::pi * 20 / 180;  // rad
+  constexpr double kMostSigmas = 10.0;
+  return position_m > kFarthest || rotation_rad > kFarthestTurn ||
+         !(nees <= kMostSigmas * kMostSigmas);
+}
+
 }  // namespace
+
+double share_within(const std::vector<double>& values, double limit) {
+  const auto within =
+      std::count_if(values.begin(), values.end(), [limit](double x) { return x <= limit; });
+  return static_cast<double>(within) / static_cast<double>(values.size());
+}
 
 double median_of(std::vector<double> values) {
   if (values.empty()) return kNaN;
@@ -65,7 +106,7 @@ PairScore score_pair(std::span<const NeighborPose> poses, const RelativeTruth& t
 
   score.rows = inside.size();
   score.availability = availability_of(inside, window);
-  std::vector<double> nees;
+  SpellCounter far;
   for (const NeighborPose& pose : inside) {
     ++score.modes.at(static_cast<std::size_t>(pose.mode));
     score.max_age = std::max(score.max_age, pose.published - pose.stamp);
@@ -75,13 +116,15 @@ PairScore score_pair(std::span<const NeighborPose> poses, const RelativeTruth& t
     score.position_errors_m.push_back(d.head<3>().norm());
     score.rotation_errors_rad.push_back(d.tail<3>().norm());
     const Eigen::LLT<Matrix6d> P(pose.T_B_N.covariance);
+    const double nees = P.info() == Eigen::Success ? d.dot(P.solve(d)) : kNaN;
+    far.add(pose.stamp, is_far(d.head<3>().norm(), d.tail<3>().norm(), nees));
     if (P.info() == Eigen::Success) {
-      nees.push_back(d.dot(P.solve(d)));
+      score.nees.push_back(nees);
     } else {
       ++score.bad_covariances;
     }
   }
-  score.median_nees = median_of(std::move(nees));
+  score.divergences = far.spells();
   return score;
 }
 

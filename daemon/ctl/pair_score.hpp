@@ -23,6 +23,9 @@ struct ErrorStatistics {
 };
 [[nodiscard]] ErrorStatistics statistics_of(std::vector<double> errors);
 
+/// The share of `values` that is at most `limit`; NaN of nothing.
+[[nodiscard]] double share_within(const std::vector<double>& values, double limit);
+
 /// The middle value, or the mean of the two in the middle; NaN of nothing.
 [[nodiscard]] double median_of(std::vector<double> values);
 
@@ -32,16 +35,23 @@ struct ScoreWindow {
   Timestamp end{};
 };
 
+inline constexpr double kNees95 = 12.59;
+
 struct PairScore {
   std::size_t rows = 0;                     ///< inside the window
   double availability = 0.0;                ///< share of the window's 50 Hz instants with a row
   std::vector<double> position_errors_m;    ///< ||p_est - p_true||, one a row
   std::vector<double> rotation_errors_rad;  ///< angle of R_est^T R_true, one a row
   std::array<std::size_t, 3> modes{};       ///< rows by PoseMode
-  double median_nees = 0.0;                 ///< 6 degrees of freedom: 5.35 when consistent
-  std::size_t bad_covariances = 0;          ///< rows whose covariance is not positive definite
-  Duration max_age{};                       ///< greatest `published - stamp`
-  std::optional<Duration> first_row;        ///< the very first row's stamp since `start`
+  /// Normalized estimation error squared, one a row with a proper covariance. Six degrees of
+  /// freedom: of a consistent estimator the median is 5.35, and 95 % lie below `kNees95`.
+  std::vector<double> nees;
+  /// Times that it was wrong for more than a second without knowing: an error above ten sigma, or
+  /// above 1 m or 20 deg, beyond which nothing may be published.
+  std::size_t divergences = 0;
+  std::size_t bad_covariances = 0;    ///< rows whose covariance is not positive definite
+  Duration max_age{};                 ///< greatest `published - stamp`
+  std::optional<Duration> first_row;  ///< the very first row's stamp since `start`
 };
 
 /// Truth of the pair at an instant of the observer's clock.

@@ -109,11 +109,11 @@ struct Robot {
 
 class SwarmReplay {
  public:
-  SwarmReplay(SwarmDataset dataset, std::optional<SwarmTruth> truth, ReplayOutput& output,
-              const ReplayOptions& options)
+  SwarmReplay(SwarmDataset dataset, const std::optional<SwarmTruth>& truth,
+              const ReplayOptions& options, const PoseSink& on_pose)
       : manifest_(std::move(dataset.manifest)),
-        truth_(std::move(truth)),
-        output_(output),
+        truth_(truth),
+        on_pose_(on_pose),
         faults_(std::move(dataset.faults)),
         network_(manifest_.network, options.seed.value_or(manifest_.network.seed)) {
     for (RobotRecording& recording : dataset.robots) {
@@ -126,7 +126,6 @@ class SwarmReplay {
 
   [[nodiscard]] Result<void> run(const std::function<void(double)>& on_progress);
   [[nodiscard]] ReplayReport report(const ReplayOptions& options) const;
-  [[nodiscard]] std::uint64_t poses() const { return poses_; }
 
  private:
   void schedule(double true_s, std::size_t robot, Happening what) {
@@ -144,14 +143,13 @@ class SwarmReplay {
   void sample_clocks(Robot& robot, double true_s);
 
   SwarmManifest manifest_;
-  std::optional<SwarmTruth> truth_;
-  ReplayOutput& output_;
+  const std::optional<SwarmTruth>& truth_;
+  const PoseSink& on_pose_;
   DatasetFaults faults_;
   SimulatedNetwork network_;
   std::deque<Robot> robots_;
   std::priority_queue<Arrival, std::vector<Arrival>, Later> queue_;
   std::uint64_t next_order_ = 0;
-  std::uint64_t poses_ = 0;
   std::vector<ClockSample> clocks_;
 };
 
@@ -232,8 +230,7 @@ void SwarmReplay::step(const Arrival& arrival, const Event& event) {
 
 void SwarmReplay::take(const Arrival& arrival, const Outputs& outputs) {
   Robot& robot = robots_[arrival.robot];
-  for (const NeighborPose& pose : outputs.poses) output_.write(robot.id(), pose);
-  poses_ += outputs.poses.size();
+  for (const NeighborPose& pose : outputs.poses) on_pose_(robot.id(), pose);
   if (outputs.report) broadcast(arrival, *outputs.report);
   if (outputs.graph_problem) {
     const CpuTimer timer(robot.cpu.graph_s);
@@ -312,6 +309,13 @@ ReplayReport SwarmReplay::report(const ReplayOptions& options) const {
 
 }  // namespace
 
+Result<ReplayReport> replay_dataset(SwarmDataset dataset, const std::optional<SwarmTruth>& truth,
+                                    const ReplayOptions& options, const PoseSink& on_pose) {
+  SwarmReplay replay(std::move(dataset), truth, options, on_pose);
+  if (auto done = replay.run(options.on_progress); !done) return tl::unexpected(done.error());
+  return replay.report(options);
+}
+
 Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
   auto dataset = load_swarm(options.swarm_dir);
   if (!dataset) return tl::unexpected(dataset.error());
@@ -329,12 +333,13 @@ Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
   ReplaySummary summary{.robots = dataset->robots.size(),
                         .duration_s = dataset->manifest.duration_s,
                         .faults = dataset->faults};
-  SwarmReplay replay(std::move(*dataset), std::move(truth), *output, options);
-  if (auto done = replay.run(options.on_progress); !done) return tl::unexpected(done.error());
-  summary.poses = replay.poses();
-  if (auto done = output->finish(replay.report(options)); !done) {
-    return tl::unexpected(done.error());
-  }
+  const auto report = replay_dataset(std::move(*dataset), truth, options,
+                                     [&](RobotId observer, const NeighborPose& pose) {
+                                       output->write(observer, pose);
+                                       ++summary.poses;
+                                     });
+  if (!report) return tl::unexpected(report.error());
+  if (auto done = output->finish(*report); !done) return tl::unexpected(done.error());
   return summary;
 }
 

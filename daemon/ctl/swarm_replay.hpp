@@ -7,6 +7,9 @@
 #include <optional>
 
 #include "daemon/ctl/dataset_faults.hpp"
+#include "daemon/ctl/replay_output.hpp"
+#include "daemon/ctl/swarm_dataset.hpp"
+#include "daemon/ctl/truth.hpp"
 #include "estimator/core/config.hpp"
 #include "estimator/core/result.hpp"
 
@@ -31,5 +34,15 @@ struct ReplaySummary {
 /// No threads, one queue in order of true time: same input and seed, same poses to the last bit.
 /// True time orders what reaches the robots; they see only their own clocks.
 [[nodiscard]] Result<ReplaySummary> replay_swarm(const ReplayOptions& options);
+
+/// Takes every pose as it is published.
+using PoseSink = std::function<void(RobotId observer, const NeighborPose&)>;
+
+/// The same from memory; the directories of `options` are not used. `truth` judges IDs for the
+/// report, no estimator sees it. The error of a picture that cannot be read.
+[[nodiscard]] Result<ReplayReport> replay_dataset(SwarmDataset dataset,
+                                                  const std::optional<SwarmTruth>& truth,
+                                                  const ReplayOptions& options,
+                                                  const PoseSink& on_pose);
 
 }  // namespace crepes

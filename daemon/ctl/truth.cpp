@@ -71,14 +71,19 @@ Result<SwarmTruth> SwarmTruth::load(const std::filesystem::path& dir,
   return SwarmTruth(std::move(robots));
 }
 
+std::optional<Pose> SwarmTruth::pose(RobotId robot, double true_s) const {
+  const auto found = robots_.find(robot);
+  CREPES_EXPECT(found != robots_.end(), "no such robot in the swarm");
+  return found->second.path.at(true_s);
+}
+
 std::optional<Pose> SwarmTruth::relative(RobotId observer, RobotId neighbor,
                                          Timestamp local) const {
   const auto B = robots_.find(observer);
-  const auto N = robots_.find(neighbor);
-  CREPES_EXPECT(B != robots_.end() && N != robots_.end(), "no such robot in the swarm");
+  CREPES_EXPECT(B != robots_.end(), "no such robot in the swarm");
   const double true_s = B->second.clock.true_s(local);
-  const std::optional<Pose> T_W_B = B->second.path.at(true_s);
-  const std::optional<Pose> T_W_N = N->second.path.at(true_s);
+  const std::optional<Pose> T_W_B = pose(observer, true_s);
+  const std::optional<Pose> T_W_N = pose(neighbor, true_s);
   if (!T_W_B || !T_W_N) return std::nullopt;
   return T_W_B->inverse() * *T_W_N;
 }

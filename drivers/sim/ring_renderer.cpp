@@ -87,11 +87,36 @@ std::optional<Eigen::Vector2d> RingRenderer::project_ring(RobotId neighbor, doub
   const auto board = std::find_if(boards_.begin(), boards_.end(),
                                   [&](const Board& b) { return b.robot == neighbor; });
   if (board == boards_.end()) return std::nullopt;
+  return project(world_.T_W_B(neighbor, t_s) * board->p_body_led, t_s);
+}
+
+std::optional<Eigen::Vector2d> RingRenderer::project(const Eigen::Vector3d& p_W, double t_s) const {
   const Pose T_W_B = world_.T_W_B(robot_, t_s);
-  const Eigen::Vector3d p_W_M = world_.T_W_B(neighbor, t_s) * board->p_body_led;
-  if (world_.is_occluded(T_W_B * T_C_B_.inverse().p, p_W_M)) return std::nullopt;
-  const auto uv = model_.project(T_C_B_ * (T_W_B.inverse() * p_W_M));
+  if (world_.is_occluded(T_W_B * T_C_B_.inverse().p, p_W)) return std::nullopt;
+  const auto uv = model_.project(T_C_B_ * (T_W_B.inverse() * p_W));
   return uv && model_.contains(*uv) ? uv : std::nullopt;
+}
+
+std::vector<RingRenderer::View> RingRenderer::views(double t_s) const {
+  std::vector<View> views;
+  for (const Board& board : boards_) {
+    const auto center = project_ring(board.robot, t_s);
+    const std::vector<Blob> blobs = blobs_of(board, t_s);
+    if (!center || blobs.empty()) continue;
+    double reach = 0.0;
+    double peak = 0.0;
+    for (const Blob& blob : blobs) {
+      reach = std::max(reach, (blob.center - *center).norm());
+      peak = std::max(peak, blob.peak);
+    }
+    const double radius = reach + 2.0 * kBlur;
+    views.push_back({board.robot,
+                     {.u_px = center->x(),
+                      .v_px = center->y(),
+                      .area_px2 = std::numbers::pi * radius * radius,
+                      .peak = std::min(255.0, kDarkLevel + peak)}});
+  }
+  return views;
 }
 
 std::vector<RingRenderer::Blob> RingRenderer::blobs_of(const Board& board, double t_s) const {

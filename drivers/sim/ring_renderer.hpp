@@ -32,6 +32,18 @@ class RingRenderer {
   /// Takes back a frame of `render` whose pixels have not been changed.
   void recycle(Frame frame);
 
+  /// A lit board in view, as a flawless detector would find it.
+  struct View {
+    RobotId robot{};
+    Spot spot;
+  };
+  [[nodiscard]] std::vector<View> views(double t_s) const;
+
+  /// The pixel that sees a point of the world, if nothing is in the way. With the camera's own
+  /// misalignment.
+  [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p_W,
+                                                       double t_s) const;
+
   /// The pixel where the center of a board's ring appears, if the camera looks at it unhindered,
   /// lit or not. This is truth: with the camera's own misalignment.
   [[nodiscard]] std::optional<Eigen::Vector2d> project_ring(RobotId neighbor, double t_s) const;

@@ -10,6 +10,10 @@ namespace {
 constexpr std::uint64_t kGyro = 0x6779726fU;
 constexpr std::uint64_t kAccel = 0x616363656cU;
 
+// What rotors add to each sample, one sigma.
+constexpr double kGyroVibration = 0.005;  // rad/s
+constexpr double kAccelVibration = 0.2;   // m/s^2
+
 SeededNoise noise_of(std::uint64_t sensor, const SimWorld& world, RobotId robot) {
   return SeededNoise{sensor, static_cast<std::uint64_t>(world.seed()), robot.value};
 }
@@ -33,12 +37,19 @@ SimImu::SimImu(const SimWorld& world, RobotId robot, const ImuConfig& config)
       robot_(robot),
       period_s_(1.0 / config.update_rate),
       gyro_(noise_of(kGyro, world, robot),
-            {config.gyroscope_bias_sigma, config.gyroscope_random_walk,
-             config.gyroscope_noise_density * std::sqrt(config.update_rate), config.scale_sigma}),
+            {.bias = config.gyroscope_bias_sigma,
+             .random_walk = config.gyroscope_random_walk,
+             .noise = sample_noise(config.gyroscope_noise_density, kGyroVibration),
+             .scale = config.scale_sigma}),
       accel_(noise_of(kAccel, world, robot),
-             {config.accelerometer_bias_sigma, config.accelerometer_random_walk,
-              config.accelerometer_noise_density * std::sqrt(config.update_rate),
-              config.scale_sigma}) {}
+             {.bias = config.accelerometer_bias_sigma,
+              .random_walk = config.accelerometer_random_walk,
+              .noise = sample_noise(config.accelerometer_noise_density, kAccelVibration),
+              .scale = config.scale_sigma}) {}
+
+double SimImu::sample_noise(double density, double vibration) const {
+  return std::hypot(density / std::sqrt(period_s_), world_.has_rotors(robot_) ? vibration : 0.0);
+}
 
 std::vector<std::uint8_t> SimImu::sample(double t_s) {
   // A sensor that integrates inside sends the mean since its last sample.

@@ -32,7 +32,8 @@ class SimTriad {
   std::uint64_t drawn_ = 0;
 };
 
-/// One robot's sensor: WitMotion bytes with the errors that `config` says it has.
+/// One robot's sensor: WitMotion bytes with the errors that `config` says it has, and
+/// the vibration of its rotors.
 class SimImu {
  public:
   /// `world` must outlive this.
@@ -42,6 +43,8 @@ class SimImu {
   [[nodiscard]] std::vector<std::uint8_t> sample(double t_s);
 
  private:
+  [[nodiscard]] double sample_noise(double density, double vibration) const;
+
   const SimWorld& world_;
   RobotId robot_;
   double period_s_;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint64_t kPair = 0x70616972U;
 constexpr std::uint64_t kSingle = 0x73696e676c65U;
-constexpr double kPairBias = 0.05;  // m, one sigma
+constexpr double kPairBias = 0.045;  // m, one sigma
 constexpr double kOutlierShare = 0.005;
 constexpr double kThroughBias = 0.3;    // m, least
 constexpr double kThroughSpread = 0.4;  // m, mean of what comes on top

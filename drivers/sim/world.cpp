@@ -25,6 +25,10 @@ class WaveSource {
     return {amplitude, 2.0 * kPi * frequency_hz * stretch, 2.0 * kPi * noise_.uniform(next_++)};
   }
 
+  double within(double around, double spread) {
+    return around + spread * (2.0 * noise_.uniform(next_++) - 1.0);
+  }
+
   /// Two sines about `offset`, the second smaller and faster.
   Wave wander(double offset, double amplitude, double frequency_hz) {
     return {.offset = offset,
@@ -76,6 +80,20 @@ Motion hand_held(WaveSource waves, double bearing) {
   return motion;
 }
 
+/// Still, standing almost level on a table of its own.
+Motion resting(WaveSource waves, double x, double y, double z, double yaw) {
+  const auto askew = [&waves](double around) {
+    return Wave{.offset = waves.within(around, 2.0 * kDegree)};
+  };
+  return {.rule = AttitudeRule::kEuler,
+          .x = {.offset = x},
+          .y = {.offset = y},
+          .z = {.offset = z},
+          .yaw = askew(yaw),
+          .pitch = askew(0.0),
+          .roll = askew(0.0)};
+}
+
 /// 5 m to 27.5 m along x and back within a minute.
 Wave excursion() { return {.offset = 16.25, .sines = {{11.25, 2.0 * kPi / 60.0, -kPi / 2.0}}}; }
 
@@ -108,6 +126,9 @@ std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
       }
       return motions;
     }
+    case SimScenario::kStatic:
+      return {{RobotId{1}, resting(waves(1), 0.0, 0.0, 1.2, 0.0)},
+              {RobotId{2}, resting(waves(2), 5.0, 0.4, 1.0, kPi)}};
   }
   CREPES_EXPECT(false, "every scenario has its motions");
 }
@@ -130,6 +151,12 @@ BodyState SimWorld::state(RobotId robot, double t_s) const {
   const auto it = motions_.find(robot);
   CREPES_EXPECT(it != motions_.end(), "the robot is part of the scenario");
   return it->second.at(t_s);
+}
+
+bool SimWorld::has_rotors(RobotId robot) const {
+  const auto it = motions_.find(robot);
+  CREPES_EXPECT(it != motions_.end(), "the robot is part of the scenario");
+  return it->second.rule == AttitudeRule::kThrust;
 }
 
 Pose SimWorld::T_B_N(RobotId observer, RobotId neighbor, double t_s) const {

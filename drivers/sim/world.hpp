@@ -31,6 +31,8 @@ class SimWorld {
   /// Truth at world time `t_s`; the robot must exist.
   [[nodiscard]] BodyState state(RobotId robot, double t_s) const;
   [[nodiscard]] Pose T_W_B(RobotId robot, double t_s) const { return state(robot, t_s).T_W_B; }
+  /// A multirotor: it vibrates.
+  [[nodiscard]] bool has_rotors(RobotId robot) const;
   /// The pose of `neighbor` as seen by `observer`.
   [[nodiscard]] Pose T_B_N(RobotId observer, RobotId neighbor, double t_s) const;
 

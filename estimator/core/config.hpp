@@ -304,11 +304,20 @@ struct SubscriptionConfig {
   }
 };
 
-enum class SimScenario : std::uint8_t { kTwo, kFour, kLongRange, kAggressive, kOccluded };
-inline constexpr std::array kSimScenarios{
-    Choice{"two", SimScenario::kTwo}, Choice{"four", SimScenario::kFour},
-    Choice{"long-range", SimScenario::kLongRange}, Choice{"aggressive", SimScenario::kAggressive},
-    Choice{"occluded", SimScenario::kOccluded}};
+enum class SimScenario : std::uint8_t {
+  kTwo,
+  kFour,
+  kLongRange,
+  kAggressive,
+  kOccluded,
+  kStatic,
+};
+inline constexpr std::array kSimScenarios{Choice{"two", SimScenario::kTwo},
+                                          Choice{"four", SimScenario::kFour},
+                                          Choice{"long-range", SimScenario::kLongRange},
+                                          Choice{"aggressive", SimScenario::kAggressive},
+                                          Choice{"occluded", SimScenario::kOccluded},
+                                          Choice{"static", SimScenario::kStatic}};
 
 /// A simulated world instead of devices.
 struct SimConfig {

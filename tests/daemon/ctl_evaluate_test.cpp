@@ -52,7 +52,7 @@ TEST(PairScore, ScoresTheWindowOnly) {
   EXPECT_EQ(score.rows, 2U);
   EXPECT_DOUBLE_EQ(statistics_of(score.position_errors_m).rmse, std::sqrt((0.09 + 0.16) / 2.0));
   EXPECT_NEAR(statistics_of(score.rotation_errors_rad).max, 0.3, 1e-12);
-  EXPECT_NEAR(score.median_nees, ((9.0 + 1.0) + (16.0 + 9.0)) / 2.0, 1e-9);
+  EXPECT_NEAR(median_of(score.nees), ((9.0 + 1.0) + (16.0 + 9.0)) / 2.0, 1e-9);
   EXPECT_EQ(score.max_age, 3ms);
   EXPECT_EQ(score.first_row, Duration{10ms});
   EXPECT_EQ(score.modes[static_cast<std::size_t>(PoseMode::kDirect)], 2U);
@@ -95,7 +95,25 @@ TEST(PairScore, ToldOfACovarianceThatIsNone) {
   const PairScore score = score_pair(std::vector{pose}, identity, at_ms(0), {at_ms(0), at_ms(10)});
 
   EXPECT_EQ(score.bad_covariances, 1U);
-  EXPECT_TRUE(std::isnan(score.median_nees));
+  EXPECT_TRUE(std::isnan(median_of(score.nees)));
+}
+
+TEST(PairScore, CountsASpellOfErrorsThatTheCovarianceDeniesOnce) {
+  std::vector<NeighborPose> poses;
+  const auto add = [&poses](int from_ms, int to_ms, double error_m) {
+    for (int ms = from_ms; ms < to_ms; ms += 20) poses.push_back(off_by(ms, error_m, 0.0));
+  };
+  add(0, 900, 1.1);      // ends before a second is over
+  add(900, 2000, 0.9);   // nine sigma
+  add(2000, 5000, 1.1);  // more than 10 sigma
+  add(6000, 6800, 1.1);  // after a gap, and short
+  add(6800, 7000, 0.0);
+  add(7000, 8100, -1.1);
+
+  const PairScore score = score_pair(poses, identity, at_ms(0), {at_ms(0), at_ms(9000)});
+
+  EXPECT_EQ(score.divergences, 2U);
+  EXPECT_DOUBLE_EQ(share_within(score.nees, kNees95), 10.0 / static_cast<double>(poses.size()));
 }
 
 TEST(PairScore, OfNothingIsUnavailable) {

@@ -103,40 +103,62 @@ TEST_F(SimUwbOccluded, RangesThroughThePillarAreLongOnAWeakFirstPath) {
   EXPECT_GT(through, 50);
 }
 
-TEST(SimImu, ReadsWhatTheBodyFeelsWithinItsErrors) {
-  const SimWorld world(config_of(SimScenario::kTwo));
-  const ImuConfig config;
-  SimImu imu(world, RobotId{1}, config);
-  WitMotionParser parser;
-  Eigen::Vector3d gyro_error = Eigen::Vector3d::Zero();
-  Eigen::Vector3d accel_error = Eigen::Vector3d::Zero();
-  double gyro_spread = 0.0;
-  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+struct ImuErrors {
+  Eigen::Vector3d gyro_mean = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_mean = Eigen::Vector3d::Zero();
+  double gyro_variance = 0.0;  ///< of the noise, an axis
+};
+
+/// What 2000 samples of one robot's IMU are off.
+ImuErrors imu_errors(const SimWorld& world, RobotId robot, const ImuConfig& config) {
   constexpr int kSamples = 2000;
+  SimImu imu(world, robot, config);
+  WitMotionParser parser;
+  ImuErrors errors;
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
   for (int i = 0; i < kSamples; ++i) {
     const double t = i * 0.01;
     const auto bytes = imu.sample(t);
     const auto take = [&](const ImuSample& sample) {
-      const BodyState body = world.state(RobotId{1}, t - 0.5 / config.update_rate);
+      const BodyState body = world.state(robot, t - 0.5 / config.update_rate);
       const Eigen::Vector3d error = sample.gyro_radps - body.w_W_B_B;
-      gyro_error += error / kSamples;
-      accel_error += (sample.accel_mps2 - body.specific_force()) / kSamples;
-      gyro_spread += (error - last).squaredNorm() / (6.0 * kSamples);
+      errors.gyro_mean += error / kSamples;
+      errors.accel_mean += (sample.accel_mps2 - body.specific_force()) / kSamples;
+      errors.gyro_variance += (error - last).squaredNorm() / (6.0 * kSamples);
       last = error;
     };
     parser.parse(Bytes(bytes).first(11), {}, take);
     parser.parse(Bytes(bytes).last(11), {}, take);
   }
   EXPECT_EQ(parser.counts().samples, static_cast<std::uint64_t>(kSamples));
-  EXPECT_GT(gyro_error.norm(), 1e-4);
-  EXPECT_LT(gyro_error.cwiseAbs().maxCoeff(), 4.0 * config.gyroscope_bias_sigma);
-  EXPECT_LT(accel_error.cwiseAbs().maxCoeff(),
+  return errors;
+}
+
+TEST(SimImu, ReadsWhatTheBodyFeelsWithinItsErrors) {
+  const ImuConfig config;
+  const RobotId on_wheels{2};
+
+  const ImuErrors errors = imu_errors(SimWorld(config_of(SimScenario::kFour)), on_wheels, config);
+
+  EXPECT_GT(errors.gyro_mean.norm(), 1e-4);
+  EXPECT_LT(errors.gyro_mean.cwiseAbs().maxCoeff(), 4.0 * config.gyroscope_bias_sigma);
+  EXPECT_LT(errors.accel_mean.cwiseAbs().maxCoeff(),
             4.0 * (config.accelerometer_bias_sigma + 9.81 * config.scale_sigma));
   // White noise of density s at rate f, quantized in steps of 2000/32768 deg/s.
   const double step = 2000.0 * M_PI / 180.0 / 32768.0;
   const double expected =
       std::pow(config.gyroscope_noise_density, 2) * config.update_rate + step * step / 12.0;
-  EXPECT_NEAR(gyro_spread / expected, 1.0, 0.1);
+  EXPECT_NEAR(errors.gyro_variance / expected, 1.0, 0.1);
+}
+
+TEST(SimImu, ShakesWithTheRotors) {
+  const ImuConfig config;
+  const SimWorld world(config_of(SimScenario::kFour));
+
+  const ImuErrors flying = imu_errors(world, RobotId{1}, config);
+  const ImuErrors driving = imu_errors(world, RobotId{2}, config);
+
+  EXPECT_GT(flying.gyro_variance, 2.0 * driving.gyro_variance);
 }
 
 TEST(SimSerial, FeedsTheRealReaderOnASteadyBeatAndMissesWhatIsLate) {

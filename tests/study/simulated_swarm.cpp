@@ -1,0 +1,125 @@
+#include "tests/study/simulated_swarm.hpp"
+
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "daemon/ctl/demo_swarm.hpp"
+#include "drivers/imu/witmotion.hpp"
+#include "drivers/sim/sim_imu.hpp"
+#include "drivers/sim/sim_uwb.hpp"
+#include "drivers/uwb/nlink.hpp"
+#include "tests/study/pair_bound.hpp"
+#include "tests/study/simulated_spots.hpp"
+
+namespace crepes::study {
+namespace {
+
+constexpr double kPrincipalPointSigma = 0.4;  // px
+constexpr std::uint64_t kCalibrationKey = 0x63616c69U;
+
+std::vector<ImuSample> record_imu(const SimWorld& world, const DemoRobot& robot,
+                                  double duration_s) {
+  // The robot goes by its configuration, the sensor by what it is.
+  ImuConfig sensor = robot.config.imu;
+  const SensorPriors truth;
+  sensor.gyroscope_bias_sigma = truth.gyro_bias_radps;
+  sensor.accelerometer_bias_sigma = truth.accel_bias_mps2;
+  sensor.gyroscope_random_walk = truth.gyro_walk;
+  sensor.accelerometer_random_walk = truth.accel_walk;
+  SimImu imu(world, robot.config.robot.id, sensor);
+  WitMotionParser parser;
+  std::vector<ImuSample> samples;
+  const auto keep = [&samples](const ImuSample& sample) { samples.push_back(sample); };
+  const double period_s = 1.0 / sensor.update_rate;
+  for (int i = 1; i * period_s <= duration_s; ++i) {
+    const auto bytes = imu.sample(i * period_s);
+    const Timestamp stamp = robot.clock.local(i * period_s);
+    parser.parse(Bytes(bytes).first(11), stamp, keep);
+    parser.parse(Bytes(bytes).last(11), stamp, keep);
+  }
+  return samples;
+}
+
+std::vector<UwbRange> record_ranges(const SimWorld& world, const DemoRobot& robot,
+                                    double duration_s) {
+  const Config& config = robot.config;
+  const SimUwb module = SimUwb::make(world, config.robot.id, config.swarm, config.uwb).value();
+  NlinkParser parser(uwb_modules_of(config.swarm), config.uwb.max_range_m);
+  std::vector<UwbRange> ranges;
+  // Modules take turns.
+  const double phase_s = 0.004 * config.robot.id.value;
+  for (int i = 0; i * 0.02 + phase_s <= duration_s; ++i) {
+    const double t = i * 0.02 + phase_s;
+    const auto bytes = module.sample(t);
+    parser.parse(Bytes(bytes), robot.clock.local(t),
+                 [&ranges](const UwbRange& range) { ranges.push_back(range); });
+  }
+  return ranges;
+}
+
+std::vector<SpotFrame> record_spots(const SimWorld& world, const DemoRobot& robot,
+                                    bool interference, double duration_s) {
+  const CameraConfig& camera = robot.config.cameras.front();
+  SimulatedSpots source(world, robot.config, interference);
+  std::vector<SpotFrame> frames;
+  const double period_s = 1.0 / camera.rate_hz;
+  const double phase_s = 0.0007 * robot.config.robot.id.value;
+  for (int i = 0; i * period_s + phase_s <= duration_s; ++i) {
+    const double t = i * period_s + phase_s;
+    frames.push_back({.stamp = robot.clock.local(t), .camera = 0, .spots = source.at(t)});
+  }
+  return frames;
+}
+
+/// What calibration leaves beside the camera's misalignment, which the renderer has.
+void miscalibrate(Config& config, int seed) {
+  const SeededNoise noise{kCalibrationKey, static_cast<std::uint64_t>(seed), config.robot.id.value};
+  std::vector<double>& intrinsics = config.cameras.front().intrinsics;
+  for (std::size_t i = 4; i < 6; ++i) intrinsics.at(i) += kPrincipalPointSigma * noise.gaussian(i);
+}
+
+Trajectory record_truth(const SimWorld& world, RobotId robot, double duration_s) {
+  constexpr double kStep = 0.01;    // s
+  constexpr double kMargin = 0.05;  // s, for what is interpolated at the end
+  std::vector<TruthSample> samples;
+  for (int i = 0; i * kStep <= duration_s + kMargin; ++i)
+    samples.push_back({i * kStep, world.T_W_B(robot, i * kStep)});
+  return Trajectory(std::move(samples));
+}
+
+}  // namespace
+
+Swarm simulate_swarm(const Scenario& scenario, int seed, double duration_s) {
+  SimConfig sim;
+  sim.scenario = scenario.world;
+  sim.seed = seed;
+  const SimWorld world(sim);
+  SwarmDataset dataset;
+  dataset.manifest = {.scenario = std::string(scenario.name),
+                      .duration_s = duration_s,
+                      .network = scenario.network,
+                      .robots = {}};
+  dataset.manifest.network.seed = static_cast<std::uint64_t>(seed);
+  std::map<RobotId, SwarmTruth::Robot> paths;
+  for (DemoRobot& robot : demo_swarm(sim, world.robots(), 0.0, 40000, 40100)) {
+    const RobotId id = robot.config.robot.id;
+    const std::string name = "r" + std::to_string(id.value);
+    const SwarmRobot entry{.id = id, .name = name, .dir = name, .clock = robot.clock};
+    dataset.manifest.robots.push_back(entry);
+    RobotRecording recording;
+    recording.robot = entry;
+    recording.imu = record_imu(world, robot, duration_s);
+    recording.ranges = record_ranges(world, robot, duration_s);
+    recording.cameras.push_back(
+        {.spots = record_spots(world, robot, scenario.interference, duration_s), .images = {}});
+    miscalibrate(robot.config, seed);
+    recording.config = std::move(robot.config);
+    dataset.robots.push_back(std::move(recording));
+    paths.emplace(id, SwarmTruth::Robot{entry.clock, record_truth(world, id, duration_s)});
+  }
+  return {std::move(dataset), SwarmTruth(std::move(paths))};
+}
+
+}  // namespace crepes::study

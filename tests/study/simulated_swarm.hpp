@@ -1,0 +1,38 @@
+/// Swarms of the simulated world as recordings, in memory: what the recorded data sets are like,
+/// with other luck for every seed.
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "estimator/core/config.hpp"
+#include "tests/study/pair_sightings.hpp"
+
+namespace crepes::study {
+
+/// A kind of recording.
+struct Scenario {
+  std::string_view name;
+  SimScenario world = SimScenario::kTwo;
+  NetworkModel network{.latency_ms = 3.0, .jitter_ms = 3.0, .loss = 0.02, .seed = 0};
+  bool interference = false;  ///< glints, mains lamps, mirror images in the floor
+};
+
+inline constexpr std::array kScenarios{
+    Scenario{.name = "static", .world = SimScenario::kStatic},
+    Scenario{.name = "manual", .world = SimScenario::kTwo},
+    Scenario{.name = "four", .world = SimScenario::kFour},
+    Scenario{.name = "long-range", .world = SimScenario::kLongRange},
+    Scenario{.name = "aggressive", .world = SimScenario::kAggressive},
+    Scenario{.name = "occluded", .world = SimScenario::kOccluded},
+    Scenario{.name = "interference", .world = SimScenario::kFour, .interference = true},
+    Scenario{.name = "bad-network",
+             .world = SimScenario::kFour,
+             .network = {.latency_ms = 5.0, .jitter_ms = 60.0, .loss = 0.33, .seed = 0}}};
+
+/// All errors are drawn anew from `seed`: biases and scales of both IMUs, misalignment and
+/// principal point of each camera, range bias of each pair, noise, outliers, drop-outs, the
+/// network. Magnitudes are those that SensorPriors says; spots come from projections, not pictures.
+[[nodiscard]] Swarm simulate_swarm(const Scenario& scenario, int seed, double duration_s);
+
+}  // namespace crepes::study
