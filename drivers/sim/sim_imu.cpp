@@ -11,8 +11,8 @@ constexpr std::uint64_t kGyro = 0x6779726fU;
 constexpr std::uint64_t kAccel = 0x616363656cU;
 
 // What rotors add to each sample, one sigma.
-constexpr double kGyroVibration = 0.005;  // rad/s
-constexpr double kAccelVibration = 0.2;   // m/s^2
+constexpr double kGyroVibration = 0.0052;  // rad/s
+constexpr double kAccelVibration = 0.2;    // m/s^2
 
 SeededNoise noise_of(std::uint64_t sensor, const SimWorld& world, RobotId robot) {
   return SeededNoise{sensor, static_cast<std::uint64_t>(world.seed()), robot.value};

@@ -80,15 +80,16 @@ Motion hand_held(WaveSource waves, double bearing) {
   return motion;
 }
 
-/// Still, standing almost level on a table of its own.
+/// Still, standing almost level about a place.
 Motion resting(WaveSource waves, double x, double y, double z, double yaw) {
-  const auto askew = [&waves](double around) {
-    return Wave{.offset = waves.within(around, 2.0 * kDegree)};
+  const auto near = [&waves](double place) { return Wave{.offset = waves.within(place, 0.1)}; };
+  const auto askew = [&waves](double angle) {
+    return Wave{.offset = waves.within(angle, 2.0 * kDegree)};
   };
   return {.rule = AttitudeRule::kEuler,
-          .x = {.offset = x},
-          .y = {.offset = y},
-          .z = {.offset = z},
+          .x = near(x),
+          .y = near(y),
+          .z = near(z),
           .yaw = askew(yaw),
           .pitch = askew(0.0),
           .roll = askew(0.0)};
