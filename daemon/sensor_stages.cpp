@@ -177,10 +177,27 @@ class CameraDevice final : public Device {
   FrameQueue& used_;
 };
 
-std::string_view meaning_of(Exposure exposure) {
-  return exposure == Exposure::kBright
+std::string_view diagnosis_of(const Detection& found) {
+  if (!found.failure.empty()) return found.failure;
+  return found.exposure == Exposure::kBright
              ? "the picture is bright all over: shorten the exposure or mend the infrared filter"
              : "";
+}
+
+void add(Rejected& sum, const Rejected& rejected) {
+  sum.hot += rejected.hot;
+  sum.huge += rejected.huge;
+  sum.faint += rejected.faint;
+  sum.surplus += rejected.surplus;
+}
+
+Totals counters_of(const Detection& found, const Rejected& rejected, std::uint64_t failures) {
+  return {{"threshold", static_cast<std::uint64_t>(found.threshold)},
+          {"hot", rejected.hot},
+          {"huge", rejected.huge},
+          {"faint", rejected.faint},
+          {"surplus", rejected.surplus},
+          {"failures", failures}};
 }
 
 }  // namespace
@@ -235,6 +252,8 @@ void run_vision(const VisionStage& stage, const StageContext& context,
                 const std::stop_token& stop) {
   SpotDetector detector(stage.config);
   HealthReport health(stage.camera_name + " spots", context);
+  Rejected rejected;
+  std::uint64_t failures = 0;
   while (!stop.stop_requested()) {
     context.turns.add();
     std::optional<Frame> frame = stage.frames.pop_for(milliseconds{100}, stop);
@@ -243,9 +262,10 @@ void run_vision(const VisionStage& stage, const StageContext& context,
         {frame->pixels.data(), frame->width, frame->height, std::ptrdiff_t{frame->width}});
     stage.sink(SpotFrame{frame->stamp, frame->camera, {found.spots.begin(), found.spots.end()}});
     health.count(1);
+    add(rejected, found.rejected);
+    failures += found.failure.empty() ? 0 : 1;
     if (health.is_due())
-      health.tell(std::string(meaning_of(found.exposure)),
-                  {{"threshold", static_cast<std::uint64_t>(found.threshold)}});
+      health.tell(std::string(diagnosis_of(found)), counters_of(found, rejected, failures));
     stage.used.push(std::move(*frame));
   }
 }

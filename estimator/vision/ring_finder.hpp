@@ -1,55 +1,60 @@
-/// Blobs of one image, and the boards that several of them make up.
+/// Six LEDs to one board.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace crepes {
 
-/// Sums over connected pixels, weighted by how far each rises above the threshold.
-struct Blob {
-  std::int64_t weight = 0;
-  std::int64_t u = 0, v = 0;            ///< weighted
-  std::int64_t uu = 0, uv = 0, vv = 0;  ///< weighted
-  std::int32_t area = 0;                ///< pixels
-  int u_min = 0, u_max = 0, v_min = 0, v_max = 0;
-  int peak = 0;
-  bool is_part = false;     ///< went into another blob
-  bool has_center = false;  ///< `center_u`, `center_v` replace the center of weight
-  double center_u = 0.0, center_v = 0.0;
-
-  [[nodiscard]] double mean_u() const {
-    return has_center ? center_u : static_cast<double>(u) / static_cast<double>(weight);
-  }
-  [[nodiscard]] double mean_v() const {
-    return has_center ? center_v : static_cast<double>(v) / static_cast<double>(weight);
-  }
+/// What may be a single LED.
+struct Light {
+  double u = 0.0, v = 0.0;  ///< center [px]
+  std::int32_t area = 0;    ///< [px^2]
+  int peak = 0;             ///< gray level
+  std::uint32_t blob = 0;   ///< the blob that it is, or is part of
 };
 
-/// Adds `part` to `whole`, which keeps its center of weight.
-void absorb(Blob& whole, Blob& part);
+/// A board whose LEDs are told apart.
+struct Ring {
+  double u = 0.0, v = 0.0;  ///< where the ring's center appears [px]
+  std::array<std::uint32_t, 6> lights{};
+  std::size_t count = 0;  ///< of lights
+};
 
-/// Joins the LEDs of boards so near that each LED is a blob of its own.
+/// Finds boards so near that their LEDs are lights of their own.
 ///
 /// Any three neighbors a, b, c on a regular hexagon have its center at a + c - b, and an affine
-/// view keeps that true. So every blob votes for a center with each two of its near neighbors; two
-/// votes at one place make a ring of four to six LEDs, and their mean its center, no matter which
-/// LEDs are hidden.
+/// view keeps that true. So every light votes for a center with each two of its near neighbors; two
+/// votes at one place make a ring of four to six LEDs, no matter which are hidden. The lines
+/// through opposite LEDs meet in the center under any perspective: where there are two or more, it
+/// is there.
+///
+/// Half a ring is one vote, which three robots in a row with a bend give as well. It is believed
+/// where the three are parts of one blob, or bright, alike and closer together than robots fly.
 class RingFinder {
  public:
-  /// Marks the blobs that went into others as parts. Appends nothing.
-  void join(std::vector<Blob>& blobs);
+  /// Valid until the next call. A light belongs to one ring at most.
+  [[nodiscard]] std::span<const Ring> find(std::span<const Light> lights);
 
  private:
   struct Vote {
     double u = 0.0, v = 0.0;
     double radius = 0.0;
-    std::array<std::uint32_t, 3> members{};
+    std::array<std::uint32_t, 3> lights{};
   };
 
-  std::vector<std::uint32_t> order_;
-  std::vector<Vote> votes_;
+  void vote(std::span<const Light> lights, std::uint32_t corner, std::size_t place);
+  void count_votes(std::span<const Light> lights, std::size_t seed, std::size_t least);
+  void accept_half_rings(std::span<const Light> lights);
+  [[nodiscard]] bool is_free(const Vote& vote) const;
+
+  std::vector<std::uint32_t> order_;  ///< lights by u
+  std::vector<Vote> votes_;           ///< by u
+  std::vector<std::uint8_t> is_taken_;
+  std::vector<Ring> rings_;
 };
 
 }  // namespace crepes

@@ -1,9 +1,7 @@
 #include "estimator/vision/spot_detector.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdlib>
 
 #include "estimator/core/contract.hpp"
 
@@ -11,219 +9,319 @@ namespace crepes {
 namespace {
 
 constexpr int kMaxSide = 2048;
-constexpr int kBlock = 256;  // pixels that are skipped at once
-constexpr int kPart = 64;    // and within a block that is not
-constexpr std::size_t kMaxRuns = 1U << 16U;
-constexpr int kMinContrast = 24;       // gray levels above the background
-constexpr double kSpreadSigmas = 8.0;  // noise above the background
-constexpr int kMaxGap = 3;             // px between the LEDs of one board that is far away
+constexpr int kMaxSearches = 3;
+constexpr std::size_t kMaxBlobs = 4096;  // the brightest are kept
+constexpr std::size_t kMaxHuge = 64;
+constexpr double kLeastContrast = 0.5;  // of the threshold's: what rises less is no spot
+constexpr int kNoContrastLeft = 230;    // a background as bright hides every spot
 
-/// The highest of kCount pixels, a multiple of 16, in code that compilers turn into vector
-/// instructions.
-template <int kCount>
-std::uint8_t highest(const std::uint8_t* pixels) {
-  std::array<std::uint8_t, 16> best{};
-  for (int i = 0; i < kCount; i += 16) {
-    for (int k = 0; k < 16; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      best[at] = std::max(best[at], pixels[i + k]);
-    }
-  }
-  std::uint8_t top = 0;
-  for (const std::uint8_t b : best) top = std::max(top, b);
-  return top;
+constexpr int kSaturated = 250;
+constexpr double kTooMuchSaturated = 0.25;
+constexpr int kTooBrightBackground = 192;
+
+constexpr int kMaxGap = 3;               // px between the LEDs of one board that is far away
+constexpr double kMaxElongation = 2.45;  // of a board in fragments; two side by side are longer
+constexpr int kMaxSpeck = 7;        // px; pieces of so little are one board, whatever its shape
+constexpr int kMaxFragmented = 28;  // px; on a larger board every LED stands alone
+constexpr int kSplitMinSide = 6;    // px; smaller blobs show no ring
+constexpr int kSplitMaxSide = 40;   // px; LEDs further apart do not touch
+
+constexpr double kRim = 1.25;       // of a ring's radius: what is nearer belongs to it
+constexpr double kSmallRing = 5.0;  // px radius; the center of its light is surer than that of LEDs
+constexpr double kSmallRingShift = 0.3;  // of its radius; if they differ more, LEDs are hidden
+
+int longer_side(const PixelBox& box) { return std::max(box.width(), box.height()); }
+int shorter_side(const PixelBox& box) { return std::min(box.width(), box.height()); }
+
+PixelBox grown(const PixelBox& box, int by) {
+  return {box.u_min - by, box.v_min - by, box.u_max + by, box.v_max + by};
 }
 
-double elongation_of(const Blob& blob) {
-  const auto w = static_cast<double>(blob.weight);
-  const double mean_u = static_cast<double>(blob.u) / w;
-  const double mean_v = static_cast<double>(blob.v) / w;
-  constexpr double kPixel = 1.0 / 12.0;  // variance of a single pixel's own extent
-  const double uu = static_cast<double>(blob.uu) / w - mean_u * mean_u + kPixel;
-  const double vv = static_cast<double>(blob.vv) / w - mean_v * mean_v + kPixel;
-  const double uv = static_cast<double>(blob.uv) / w - mean_u * mean_v;
-  const double middle = 0.5 * (uu + vv);
-  const double swing = std::hypot(0.5 * (uu - vv), uv);
-  return std::sqrt((middle + swing) / std::max(middle - swing, kPixel));
+Light light_of(const Blob& blob, std::uint32_t index) {
+  return {blob.mean_u(), blob.mean_v(), blob.area, blob.peak, index};
+}
+
+Exposure judge(const Detection& found, bool is_noise) {
+  if (is_noise || found.background >= kTooBrightBackground ||
+      found.saturated_share >= kTooMuchSaturated)
+    return Exposure::kBright;
+  const Rejected& r = found.rejected;
+  const bool is_empty = found.spots.empty() && r.hot + r.huge + r.faint + r.surplus == 0;
+  return is_empty ? Exposure::kDark : Exposure::kGood;
 }
 
 }  // namespace
-
-int automatic_threshold(const GrayImage& image) {
-  std::array<int, 256> histogram{};
-  int count = 0;
-  const int row_step = std::max(1, image.height / 32);
-  for (int v = row_step / 2; v < image.height; v += row_step) {
-    for (int u = 0; u < image.width; u += 4) {
-      ++histogram[image.pixels[v * image.stride + u]];
-      ++count;
-    }
-  }
-  const auto quantile = [&](double part) {
-    int below = 0;
-    int level = 0;
-    while (level < 255 && below + histogram[static_cast<std::size_t>(level)] <= part * count)
-      below += histogram[static_cast<std::size_t>(level++)];
-    return level;
-  };
-  const int median = quantile(0.5);
-  const double sigma = (quantile(0.841) - quantile(0.159)) / 2.0;
-  const int contrast = std::max(kMinContrast, static_cast<int>(std::ceil(kSpreadSigmas * sigma)));
-  return std::min(median + contrast, 250);
-}
 
 Detection SpotDetector::detect(const GrayImage& image) {
   CREPES_EXPECT(image.pixels != nullptr && image.width > 0 && image.height > 0 &&
                     image.width <= kMaxSide && image.height <= kMaxSide &&
                     image.stride >= image.width,
                 "an image of 1 to 2048 pixels a side");
-  threshold_ = config_.threshold > 0 ? config_.threshold : automatic_threshold(image);
+  const BrightnessSample sample(image);
+  const Background darkest = sample.darkest_from(0);
+  Detection found;
+  found.background = darkest.median;
+  found.threshold = config_.threshold > 0 ? config_.threshold : darkest.threshold;
+  found.saturated_share = sample.share_from(kSaturated);
   spots_.clear();
-  blobs_.clear();
+  bool is_noise = false;
   if (config_.detector == SpotDetectorKind::kHough) {
-    find_circles(image, threshold_, config_, spots_);
-    return {spots_, threshold_, spots_.empty() ? Exposure::kDark : Exposure::kGood};
+    if (const auto done = find_circles(image, found.threshold, config_, spots_); !done) {
+      failure_ = done.error().message;
+      found.failure = failure_;
+    }
+  } else {
+    is_noise = !search_levels(image, sample, found);
+    select(found.rejected);
   }
-  if (!scan(image)) return {{}, threshold_, Exposure::kBright};
-  link_rows();
-  measure(image);
-  rings_.join(blobs_);
-  join_fragments();
-  select();
-  return {spots_, threshold_, runs_.empty() ? Exposure::kDark : Exposure::kGood};
+  found.spots = spots_;
+  found.exposure = judge(found, is_noise);
+  return found;
 }
 
-/// False when there is too much light to bother.
-bool SpotDetector::scan(const GrayImage& image) {
-  runs_.clear();
-  runs_.reserve(4096);
-  std::int64_t lit = 0;
-  const std::int64_t most = static_cast<std::int64_t>(image.width) * image.height / 4;
-  for (int v = 0; v < image.height; ++v) {
-    const std::size_t before = runs_.size();
-    find_runs(image.pixels + v * image.stride, v, image.width);
-    for (std::size_t i = before; i < runs_.size(); ++i) lit += runs_[i].end - runs_[i].begin;
-    if (lit > most || runs_.size() > kMaxRuns) return false;
+/// Searches the picture, then what is huge and bright in it for spots that are brighter still.
+/// False when there is nothing but noise.
+bool SpotDetector::search_levels(const GrayImage& image, const BrightnessSample& sample,
+                                 Detection& found) {
+  candidates_.clear();
+  huge_.assign(1, {0, 0, image.width - 1, image.height - 1});
+  Background level{found.background, found.threshold};
+  for (int count = 1;; ++count) {
+    const double contrast = kLeastContrast * (level.threshold - level.median);
+    const bool is_complete = search(image, level.threshold, contrast, found.rejected);
+    if (is_complete && huge_.empty()) return true;
+    const Background next = sample.darkest_from(level.threshold);
+    if (count == kMaxSearches || config_.threshold > 0 || next.median >= kNoContrastLeft ||
+        next.threshold <= level.threshold)
+      return is_complete;
+    level = next;
+  }
+}
+
+/// Looks in the boxes of huge_ for spots and puts there what is huge at this threshold. False, and
+/// nothing changed, when all is noise.
+bool SpotDetector::search(const GrayImage& image, int threshold, double contrast,
+                          Rejected& rejected) {
+  blobs_.clear();
+  if (!finder_.find(image, threshold, config_.max_area_px2, blobs_)) return false;
+  sort_out(image, threshold, contrast, rejected);
+  find_lights(image, threshold);
+  for (const Ring& ring : ring_finder_.find(lights_))
+    if (ring.count > 3 || is_half(image, threshold, ring)) take_ring(image, threshold, ring);
+  std::erase_if(open_, [&](std::uint32_t i) { return is_open_[i] == 0; });
+  join_fragments();
+  for (const std::uint32_t i : open_) {
+    if (is_open_[i] == 0) continue;
+    const Surroundings around = surroundings_of(image, blobs_[i].box, threshold);
+    candidates_.push_back({measure_spot(image, blobs_[i], threshold, around), blobs_[i].box});
   }
   return true;
 }
 
-void SpotDetector::find_runs(const std::uint8_t* row, int v, int width) {
-  const auto threshold = static_cast<std::uint8_t>(threshold_);
-  bool is_open = false;
-  const auto visit = [&](int u) {
-    if ((row[u] >= threshold) == is_open) return;
-    if (!is_open) {
-      runs_.push_back({v, u, width, static_cast<std::uint32_t>(runs_.size())});
+/// Leaves open what may be a board or a part of one.
+void SpotDetector::sort_out(const GrayImage& image, int threshold, double contrast,
+                            Rejected& rejected) {
+  open_.clear();
+  is_open_.assign(blobs_.size(), 0);
+  const std::size_t first_huge = huge_.size();
+  std::uint64_t huge = 0;
+  for (std::uint32_t i = 0; i < blobs_.size(); ++i) {
+    const Blob& blob = blobs_[i];
+    if (blob.area > config_.max_area_px2) {
+      ++huge;
+      if (huge_.size() < first_huge + kMaxHuge) huge_.push_back(blob.box);
+    } else if (is_news(blob.box)) {
+      open_.push_back(i);
+    }
+  }
+  rejected.huge = std::max(rejected.huge, huge);
+  huge_.erase(huge_.begin(), huge_.begin() + static_cast<std::ptrdiff_t>(first_huge));
+  if (open_.size() > kMaxBlobs) {
+    std::nth_element(
+        open_.begin(), open_.begin() + kMaxBlobs, open_.end(),
+        [&](std::uint32_t a, std::uint32_t b) {
+          return blobs_[a].weight != blobs_[b].weight ? blobs_[a].weight > blobs_[b].weight : a < b;
+        });
+    rejected.surplus += open_.size() - kMaxBlobs;
+    open_.resize(kMaxBlobs);
+    std::sort(open_.begin(), open_.end());
+  }
+  std::erase_if(open_, [&](std::uint32_t i) {
+    const Blob& blob = blobs_[i];
+    const Surroundings around = surroundings_of(image, blob.box, threshold);
+    const bool is_faint = around.is_known && blob.peak - around.crest < contrast;
+    const bool is_hot = blob.area == 1 && area_of(image, blob, threshold, around) == 1;
+    rejected.faint += is_faint ? 1 : 0;
+    rejected.hot += is_hot && !is_faint ? 1 : 0;
+    return is_faint || is_hot;
+  });
+  for (const std::uint32_t i : open_) is_open_[i] = 1;
+}
+
+/// Whether it lies in what is searched, apart from the spots that are known.
+bool SpotDetector::is_news(const PixelBox& box) const {
+  const auto overlaps = [&](const PixelBox& other) { return other.overlaps(box); };
+  return std::any_of(huge_.begin(), huge_.end(), overlaps) &&
+         std::none_of(candidates_.begin(), candidates_.end(),
+                      [&](const Candidate& known) { return known.box.overlaps(box); });
+}
+
+void SpotDetector::find_lights(const GrayImage& image, int threshold) {
+  lights_.clear();
+  for (const std::uint32_t i : open_) {
+    const Blob& blob = blobs_[i];
+    if (shorter_side(blob.box) >= kSplitMinSide && longer_side(blob.box) <= kSplitMaxSide) {
+      split(image, i, threshold);
+    } else if (blob.area > 1) {
+      lights_.push_back(light_of(blob, i));
+    }
+  }
+}
+
+/// LEDs whose flanks touch are apart at a higher level.
+void SpotDetector::split(const GrayImage& image, std::uint32_t index, int threshold) {
+  constexpr int kLevels = 3;
+  const PixelBox& box = blobs_[index].box;
+  const GrayImage patch{image.row(box.v_min) + box.u_min, box.width(), box.height(), image.stride};
+  const std::size_t first = lights_.size();
+  lights_.push_back(light_of(blobs_[index], index));
+  for (int k = 1; k <= kLevels; ++k) {
+    const int level = threshold + (kSaturated - threshold) * k / kLevels;
+    cores_.clear();
+    if (level <= threshold || !splitter_.find(patch, level, config_.max_area_px2, cores_)) continue;
+    const std::size_t before = lights_.size();
+    for (const Blob& core : cores_) {
+      Light light = light_of(core, index);
+      light.u += box.u_min;
+      light.v += box.v_min;
+      const auto owner = finder_.blob_at(static_cast<int>(std::lround(light.u)),
+                                         static_cast<int>(std::lround(light.v)));
+      if (owner == index) lights_.push_back(light);
+    }
+    // The level that shows most lights counts; a blob in one piece stays one light.
+    const std::size_t shown = lights_.size() - before;
+    if (shown > before - first) {
+      lights_.erase(lights_.begin() + static_cast<std::ptrdiff_t>(first),
+                    lights_.begin() + static_cast<std::ptrdiff_t>(before));
     } else {
-      runs_.back().end = u;
+      lights_.resize(before);
     }
-    is_open = !is_open;
+  }
+}
+
+/// Whether half a ring's other half is hidden indeed, and does not just touch what was found.
+bool SpotDetector::is_half(const GrayImage& image, int threshold, const Ring& ring) const {
+  constexpr double kLong = 1.4;  // half a ring is longer than wide
+  const auto members = std::span(ring.lights).first(ring.count);
+  const std::uint32_t blob = lights_[members[0]].blob;
+  if (blob == lights_[members[1]].blob && blobs_[blob].elongation() < kLong) return false;
+  double radius = 0.0;
+  for (const std::uint32_t i : members)
+    radius = std::max(radius, std::hypot(lights_[i].u - ring.u, lights_[i].v - ring.v));
+  for (std::uint32_t i = 0; i < lights_.size(); ++i) {
+    if (std::find(members.begin(), members.end(), i) == members.end() &&
+        (lights_[i].blob == blob ||
+         std::hypot(lights_[i].u - ring.u, lights_[i].v - ring.v) < kRim * radius))
+      return false;
+  }
+  return std::all_of(members.begin(), members.end(), [&](std::uint32_t light) {
+    const auto u = static_cast<int>(std::lround(2.0 * ring.u - lights_[light].u));
+    const auto v = static_cast<int>(std::lround(2.0 * ring.v - lights_[light].v));
+    return u < 0 || v < 0 || u >= image.width || v >= image.height || image.row(v)[u] < threshold;
+  });
+}
+
+/// The blobs of a ring, and what else is in it, are accounted for.
+void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& ring) {
+  Blob whole;
+  double radius = 0.0;
+  const auto take = [&](std::uint32_t i) {
+    if (is_open_[i] == 0) return;
+    is_open_[i] = 0;
+    if (whole.area == 0) whole.box = blobs_[i].box;
+    whole.absorb(blobs_[i]);
   };
-  int u = 0;
-  for (; u + kBlock <= width; u += kBlock) {
-    if (is_open || highest<kBlock>(row + u) >= threshold) {
-      for (int part = u; part < u + kBlock; part += kPart) {
-        if (is_open || highest<kPart>(row + part) >= threshold)
-          for (int i = part; i < part + kPart; ++i) visit(i);
-      }
-    }
+  for (std::size_t k = 0; k < ring.count; ++k) {
+    const Light& light = lights_[ring.lights[k]];
+    take(light.blob);
+    radius = std::max(radius, std::hypot(light.u - ring.u, light.v - ring.v));
   }
-  for (; u < width; ++u) visit(u);
-}
-
-std::uint32_t SpotDetector::root_of(std::uint32_t run) {
-  while (runs_[run].parent != run) run = runs_[run].parent = runs_[runs_[run].parent].parent;
-  return run;
-}
-
-/// Joins runs of adjacent rows that touch, corners included.
-void SpotDetector::link_rows() {
-  std::size_t above = 0;
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    const Run& run = runs_[i];
-    while (runs_[above].row < run.row - 1 ||
-           (runs_[above].row == run.row - 1 && runs_[above].end < run.begin))
-      ++above;
-    for (std::size_t j = above; j < i && runs_[j].row == run.row - 1 && runs_[j].begin <= run.end;
-         ++j) {
-      const std::uint32_t a = root_of(static_cast<std::uint32_t>(j));
-      const std::uint32_t b = root_of(static_cast<std::uint32_t>(i));
-      runs_[std::max(a, b)].parent = std::min(a, b);
-    }
+  if (whole.area == 0) return;  // its blobs went into another ring
+  for (const std::uint32_t i : open_)
+    if (std::hypot(blobs_[i].mean_u() - ring.u, blobs_[i].mean_v() - ring.v) < kRim * radius)
+      take(i);
+  const Surroundings around = surroundings_of(image, whole.box, threshold);
+  Spot spot = measure_spot(image, whole, threshold, around);
+  const double shift = std::hypot(spot.u_px - ring.u, spot.v_px - ring.v);
+  if (radius > kSmallRing || shift > kSmallRingShift * radius) {
+    spot.u_px = ring.u;
+    spot.v_px = ring.v;
   }
+  candidates_.push_back({spot, whole.box});
 }
 
-void SpotDetector::measure(const GrayImage& image) {
-  blob_of_.assign(runs_.size(), 0);
-  for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-    const Run& run = runs_[i];
-    const std::uint32_t root = root_of(i);
-    if (root == i) {
-      blob_of_[i] = static_cast<std::uint32_t>(blobs_.size());
-      blobs_.push_back(
-          {.u_min = run.begin, .u_max = run.end - 1, .v_min = run.row, .v_max = run.row});
-    }
-    Blob& blob = blobs_[blob_of_[root]];
-    const std::uint8_t* row = image.pixels + run.row * image.stride;
-    std::int64_t weight = 0;
-    std::int64_t sum_u = 0;
-    for (int u = run.begin; u < run.end; ++u) {
-      // Zero at the threshold, so that pixels that come and go there do not move the center.
-      const int w = row[u] - threshold_ + 1;
-      weight += w;
-      sum_u += static_cast<std::int64_t>(w) * u;
-      blob.uu += static_cast<std::int64_t>(w) * u * u;
-      blob.peak = std::max<int>(blob.peak, row[u]);
-    }
-    blob.weight += weight;
-    blob.u += sum_u;
-    blob.v += weight * run.row;
-    blob.uv += sum_u * run.row;
-    blob.vv += weight * run.row * run.row;
-    blob.area += run.end - run.begin;
-    blob.u_min = std::min(blob.u_min, run.begin);
-    blob.u_max = std::max(blob.u_max, run.end - 1);
-    blob.v_max = run.row;
-  }
+std::uint32_t SpotDetector::group_of(std::uint32_t place) {
+  while (parent_[place] != place) place = parent_[place] = parent_[parent_[place]];
+  return place;
 }
 
-/// A board some meters away: LEDs a few dark pixels apart. Blobs come ordered by their first row.
+/// A board some meters away shows a few pieces with dark pixels between them. Pieces that make up
+/// something as round as a board become one blob, at the place of the first.
 void SpotDetector::join_fragments() {
-  constexpr std::size_t kMaxFragments = 4096;
-  if (blobs_.size() > kMaxFragments) return;
-  bool has_changed = true;
-  for (int round = 0; has_changed && round < 6; ++round) {
-    has_changed = false;
-    for (std::size_t i = 0; i < blobs_.size(); ++i) {
-      if (blobs_[i].is_part) continue;
-      for (std::size_t j = i + 1;
-           j < blobs_.size() && blobs_[j].v_min <= blobs_[i].v_max + kMaxGap + 1; ++j) {
-        Blob& a = blobs_[i];
-        Blob& b = blobs_[j];
-        if (b.is_part || b.u_min > a.u_max + kMaxGap + 1 || a.u_min > b.u_max + kMaxGap + 1)
-          continue;
-        absorb(a, b);
-        has_changed = true;
-      }
+  const auto count = static_cast<std::uint32_t>(open_.size());
+  parent_.resize(count);
+  groups_.resize(count);
+  for (std::uint32_t a = 0; a < count; ++a) parent_[a] = a;
+  for (std::uint32_t a = 0; a < count; ++a) {
+    const PixelBox near = grown(blobs_[open_[a]].box, kMaxGap + 1);
+    for (std::uint32_t b = a + 1; b < count && blobs_[open_[b]].box.v_min <= near.v_max; ++b) {
+      if (!near.overlaps(blobs_[open_[b]].box)) continue;
+      const std::uint32_t x = group_of(a);
+      const std::uint32_t y = group_of(b);
+      parent_[std::max(x, y)] = std::min(x, y);
+    }
+  }
+  for (std::uint32_t a = 0; a < count; ++a) {
+    const std::uint32_t root = group_of(a);  // comes before the others of its group
+    if (root == a) {
+      groups_[a] = blobs_[open_[a]];
+    } else {
+      groups_[root].absorb(blobs_[open_[a]]);
+    }
+  }
+  for (std::uint32_t a = 0; a < count; ++a) {
+    const std::uint32_t root = group_of(a);
+    const Blob& group = groups_[root];
+    const int side = longer_side(group.box);
+    if (side > kMaxFragmented || (side > kMaxSpeck && group.elongation() > kMaxElongation))
+      continue;
+    if (root == a) {
+      blobs_[open_[a]] = group;
+    } else {
+      is_open_[open_[a]] = 0;
     }
   }
 }
 
-void SpotDetector::select() {
-  for (const Blob& blob : blobs_) {
-    if (blob.is_part || blob.area < config_.min_area_px2 || blob.area > config_.max_area_px2)
-      continue;
-    spots_.push_back({.u_px = blob.mean_u(),
-                      .v_px = blob.mean_v(),
-                      .area_px2 = static_cast<double>(blob.area),
-                      .peak = static_cast<double>(blob.peak),
-                      .elongation = elongation_of(blob)});
-  }
-  std::sort(spots_.begin(), spots_.end(),
-            [](const Spot& a, const Spot& b) { return a.peak * a.area_px2 > b.peak * b.area_px2; });
+/// Candidates that are spots, brightest first.
+void SpotDetector::select(Rejected& rejected) {
+  const auto all = candidates_.size();
+  std::erase_if(candidates_, [&](const Candidate& candidate) {
+    return candidate.spot.area_px2 < config_.min_area_px2;
+  });
+  rejected.hot += all - candidates_.size();
+  std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
+    const double a_light = a.spot.peak * a.spot.area_px2;
+    const double b_light = b.spot.peak * b.spot.area_px2;
+    if (a_light != b_light) return a_light > b_light;
+    return a.box.v_min != b.box.v_min ? a.box.v_min < b.box.v_min : a.box.u_min < b.box.u_min;
+  });
   const auto most = static_cast<std::size_t>(config_.max_spots);
-  if (spots_.size() > most) spots_.resize(most);
+  if (candidates_.size() > most) {
+    rejected.surplus += candidates_.size() - most;
+    candidates_.resize(most);
+  }
+  for (const Candidate& candidate : candidates_) spots_.push_back(candidate.spot);
 }
 
 }  // namespace crepes

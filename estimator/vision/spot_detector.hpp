@@ -4,36 +4,49 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/result.hpp"
+#include "estimator/vision/blob_finder.hpp"
+#include "estimator/vision/brightness_sample.hpp"
 #include "estimator/vision/ring_finder.hpp"
+#include "estimator/vision/spot_measure.hpp"
 
 namespace crepes {
-
-/// An 8-bit image that someone else owns.
-struct GrayImage {
-  const std::uint8_t* pixels = nullptr;
-  int width = 0;
-  int height = 0;
-  std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
-};
 
 enum class Exposure : std::uint8_t {
   kGood,
   kDark,    ///< nothing stands out
-  kBright,  ///< so much does that spots cannot be told: exposure is too long; no spots are given
+  kBright,  ///< a quarter of the picture or more is saturated, all of it bright, or it is all noise
+};
+
+/// What stood out and was no spot.
+struct Rejected {
+  std::uint64_t hot = 0;      ///< smaller than min_area_px2: hot pixels
+  std::uint64_t huge = 0;     ///< larger than max_area_px2: the sun, windows
+  std::uint64_t faint = 0;    ///< crests of a bright background
+  std::uint64_t surplus = 0;  ///< more than max_spots
 };
 
 struct Detection {
   std::span<const Spot> spots;  ///< brightest first; valid until the next detect()
-  int threshold = 0;            ///< grey level from which a pixel belongs to a spot
+  int background = 0;           ///< median gray level of the darkest part of the picture
+  int threshold = 0;            ///< gray level from which a pixel there belongs to a spot
   Exposure exposure = Exposure::kGood;
+  double saturated_share = 0.0;  ///< of the picture, 0..1
+  Rejected rejected;
+  std::string_view failure;  ///< why the detector failed on this picture; empty when it did not
 };
 
-/// Finds LED boards: a ring of six LEDs is one spot, be it six blobs or one. Hot pixels and the
-/// sun are left out. Allocates nothing once it has seen a few frames.
+/// Finds LED boards: a ring of six LEDs is one spot, be it six blobs or one.
+///
+/// A picture with something huge and bright in it, as the sun or a window, is searched a second
+/// and at last a third time, for what stands out before that. Each search is bounded, and all
+/// memory is kept: nothing is allocated once it has seen a few frames.
 class SpotDetector {
  public:
   explicit SpotDetector(const VisionConfig& config) : config_(config) {}
@@ -42,35 +55,45 @@ class SpotDetector {
   [[nodiscard]] Detection detect(const GrayImage& image);
 
  private:
-  struct Run {
-    int row = 0;
-    int begin = 0;
-    int end = 0;
-    std::uint32_t parent = 0;  ///< union-find over runs
+  struct Candidate {
+    Spot spot;
+    PixelBox box;
   };
 
-  void find_runs(const std::uint8_t* row, int v, int width);
-  [[nodiscard]] bool scan(const GrayImage& image);
-  [[nodiscard]] std::uint32_t root_of(std::uint32_t run);
-  void link_rows();
-  void measure(const GrayImage& image);
+  [[nodiscard]] bool search_levels(const GrayImage& image, const BrightnessSample& sample,
+                                   Detection& found);
+  [[nodiscard]] bool search(const GrayImage& image, int threshold, double contrast,
+                            Rejected& rejected);
+  void sort_out(const GrayImage& image, int threshold, double contrast, Rejected& rejected);
+  [[nodiscard]] bool is_news(const PixelBox& box) const;
+  void find_lights(const GrayImage& image, int threshold);
+  void split(const GrayImage& image, std::uint32_t blob, int threshold);
+  [[nodiscard]] bool is_half(const GrayImage& image, int threshold, const Ring& ring) const;
+  void take_ring(const GrayImage& image, int threshold, const Ring& ring);
   void join_fragments();
-  void select();
+  [[nodiscard]] std::uint32_t group_of(std::uint32_t place);
+  void select(Rejected& rejected);
 
   VisionConfig config_;
-  int threshold_ = 0;
-  std::vector<Run> runs_;
-  std::vector<std::uint32_t> blob_of_;
+  BlobFinder finder_;
+  BlobFinder splitter_;
+  RingFinder ring_finder_;
   std::vector<Blob> blobs_;
-  RingFinder rings_;
+  std::vector<std::uint32_t> open_;  ///< blobs that are not accounted for yet, by first row
+  std::vector<std::uint8_t> is_open_;
+  std::vector<PixelBox> huge_;  ///< where to search
+  std::vector<Light> lights_;
+  std::vector<Blob> cores_;
+  std::vector<std::uint32_t> parent_;  ///< union-find over places in open_
+  std::vector<Blob> groups_;           ///< sums over its sets, at the first place of each
+  std::vector<Candidate> candidates_;
   std::vector<Spot> spots_;
+  std::string failure_;
 };
 
-/// Median and spread of a sample of the image's pixels decide what stands out.
-[[nodiscard]] int automatic_threshold(const GrayImage& image);
-
-/// The paper's pipeline: binarize, then circles by a Hough transform. Appends to `spots`.
-void find_circles(const GrayImage& image, int threshold, const VisionConfig& config,
-                  std::vector<Spot>& spots);
+/// The paper's pipeline: binarize, then circles by a Hough transform. Appends to `spots`. Fails
+/// where OpenCV does.
+[[nodiscard]] Result<void> find_circles(const GrayImage& image, int threshold,
+                                        const VisionConfig& config, std::vector<Spot>& spots);
 
 }  // namespace crepes

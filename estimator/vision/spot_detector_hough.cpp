@@ -1,12 +1,13 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string>
 
 #include "estimator/vision/spot_detector.hpp"
 
 namespace crepes {
 
-void find_circles(const GrayImage& image, int threshold, const VisionConfig& config,
-                  std::vector<Spot>& spots) {
+Result<void> find_circles(const GrayImage& image, int threshold, const VisionConfig& config,
+                          std::vector<Spot>& spots) {
   try {
     // OpenCV takes pixels as mutable; nothing here writes to them.
     const cv::Mat gray(
@@ -33,8 +34,9 @@ void find_circles(const GrayImage& image, int threshold, const VisionConfig& con
       cv::minMaxLoc(gray(box), nullptr, &peak);
       spots.push_back({.u_px = circle[0], .v_px = circle[1], .area_px2 = area, .peak = peak});
     }
-  } catch (const cv::Exception&) {
-    spots.clear();  // a frame without spots: OpenCV is the comparison, not the product
+    return {};
+  } catch (const cv::Exception& e) {
+    return fail(ErrorCode::kFormat, std::string("detector hough: ") + e.what());
   }
 }
 

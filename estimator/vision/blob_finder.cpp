@@ -1,0 +1,185 @@
+#include "estimator/vision/blob_finder.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace crepes {
+namespace {
+
+constexpr int kBlock = 256;  // pixels that are looked at together
+constexpr int kPart = 64;    // and within a block that is not all dark
+constexpr std::size_t kMaxRuns = 1U << 16U;
+
+template <class Pick>
+std::uint8_t extreme(const std::uint8_t* pixels, int count, std::uint8_t first, const Pick& pick) {
+  // In lanes, which compilers turn into vector instructions. `count` is a multiple of 16.
+  std::array<std::uint8_t, 16> best{};
+  best.fill(first);
+  for (int i = 0; i < count; i += 16)
+    for (std::size_t k = 0; k < best.size(); ++k) best[k] = pick(best[k], pixels[i + int(k)]);
+  for (const std::uint8_t b : best) first = pick(first, b);
+  return first;
+}
+
+template <int kCount>
+std::uint8_t highest(const std::uint8_t* pixels) {
+  return extreme(pixels, kCount, 0, [](std::uint8_t a, std::uint8_t b) { return a > b ? a : b; });
+}
+
+template <int kCount>
+std::uint8_t lowest(const std::uint8_t* pixels) {
+  return extreme(pixels, kCount, 255, [](std::uint8_t a, std::uint8_t b) { return a < b ? a : b; });
+}
+
+/// Adds the pixels of a run. The weight is zero just below the threshold, so that pixels that come
+/// and go there do not move the center.
+void measure(const std::uint8_t* row, int v, int begin, int end, int threshold, Blob& blob) {
+  std::int64_t weight = 0;
+  std::int64_t sum_u = 0;
+  for (int u = begin; u < end; ++u) {
+    const std::int64_t w = row[u] - threshold + 1;
+    weight += w;
+    sum_u += w * u;
+    blob.uu += w * u * u;
+    blob.peak = std::max<int>(blob.peak, row[u]);
+  }
+  blob.weight += weight;
+  blob.u += sum_u;
+  blob.v += weight * v;
+  blob.uv += sum_u * v;
+  blob.vv += weight * v * v;
+}
+
+}  // namespace
+
+bool PixelBox::overlaps(const PixelBox& other) const {
+  return u_min <= other.u_max && other.u_min <= u_max && v_min <= other.v_max &&
+         other.v_min <= v_max;
+}
+
+void PixelBox::include(const PixelBox& other) {
+  u_min = std::min(u_min, other.u_min);
+  v_min = std::min(v_min, other.v_min);
+  u_max = std::max(u_max, other.u_max);
+  v_max = std::max(v_max, other.v_max);
+}
+
+double Blob::elongation() const {
+  constexpr double kPixel = 1.0 / 12.0;  // variance of a single pixel's own extent
+  const auto w = static_cast<double>(weight);
+  const double var_uu = static_cast<double>(uu) / w - mean_u() * mean_u() + kPixel;
+  const double var_vv = static_cast<double>(vv) / w - mean_v() * mean_v() + kPixel;
+  const double var_uv = static_cast<double>(uv) / w - mean_u() * mean_v();
+  const double middle = 0.5 * (var_uu + var_vv);
+  const double swing = std::hypot(0.5 * (var_uu - var_vv), var_uv);
+  return std::sqrt((middle + swing) / std::max(middle - swing, kPixel));
+}
+
+void Blob::absorb(const Blob& part) {
+  box.include(part.box);
+  area += part.area;
+  weight += part.weight;
+  u += part.u;
+  v += part.v;
+  uu += part.uu;
+  uv += part.uv;
+  vv += part.vv;
+  peak = std::max(peak, part.peak);
+}
+
+bool BlobFinder::find(const GrayImage& image, int threshold, double max_area,
+                      std::vector<Blob>& blobs) {
+  runs_.clear();
+  runs_.reserve(4096);
+  for (int v = 0; v < image.height; ++v) {
+    find_runs(image.row(v), v, image.width, static_cast<std::uint8_t>(threshold));
+    if (runs_.size() > kMaxRuns) return false;
+  }
+  link_rows();
+  const std::size_t first = blobs.size();
+  outline(blobs);
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    Blob& blob = blobs[first + blob_of_[i]];
+    if (blob.area <= max_area)
+      measure(image.row(run.row), run.row, run.begin, run.end, threshold, blob);
+  }
+  return true;
+}
+
+std::optional<std::size_t> BlobFinder::blob_at(int u, int v) const {
+  const auto after = std::partition_point(runs_.begin(), runs_.end(), [&](const Run& run) {
+    return run.row < v || (run.row == v && run.begin <= u);
+  });
+  if (after == runs_.begin()) return std::nullopt;
+  const auto run = after - 1;
+  if (run->row != v || u >= run->end) return std::nullopt;
+  return blob_of_[static_cast<std::size_t>(run - runs_.begin())];
+}
+
+void BlobFinder::find_runs(const std::uint8_t* row, int v, int width, std::uint8_t threshold) {
+  bool is_open = false;
+  const auto visit = [&](int u) {
+    if ((row[u] >= threshold) == is_open) return;
+    if (!is_open) {
+      runs_.push_back({v, u, width, static_cast<std::uint32_t>(runs_.size())});
+    } else {
+      runs_.back().end = u;
+    }
+    is_open = !is_open;
+  };
+  int u = 0;
+  for (; u + kBlock <= width; u += kBlock) {
+    if (!is_open && highest<kBlock>(row + u) < threshold) continue;
+    for (int part = u; part < u + kBlock; part += kPart) {
+      if (is_open ? lowest<kPart>(row + part) >= threshold : highest<kPart>(row + part) < threshold)
+        continue;
+      for (int i = part; i < part + kPart; ++i) visit(i);
+    }
+  }
+  for (; u < width; ++u) visit(u);
+}
+
+std::uint32_t BlobFinder::root_of(std::uint32_t run) {
+  while (runs_[run].parent != run) run = runs_[run].parent = runs_[runs_[run].parent].parent;
+  return run;
+}
+
+/// Joins runs of adjacent rows that touch, corners included.
+void BlobFinder::link_rows() {
+  std::size_t above = 0;
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    while (runs_[above].row < run.row - 1 ||
+           (runs_[above].row == run.row - 1 && runs_[above].end < run.begin))
+      ++above;
+    for (std::size_t j = above; j < i && runs_[j].row == run.row - 1 && runs_[j].begin <= run.end;
+         ++j) {
+      const std::uint32_t a = root_of(static_cast<std::uint32_t>(j));
+      const std::uint32_t b = root_of(static_cast<std::uint32_t>(i));
+      runs_[std::max(a, b)].parent = std::min(a, b);
+    }
+  }
+}
+
+/// Appends a blob for each root, with its box and area.
+void BlobFinder::outline(std::vector<Blob>& blobs) {
+  const std::size_t first = blobs.size();
+  blob_of_.assign(runs_.size(), 0);
+  for (std::uint32_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    const PixelBox box{run.begin, run.row, run.end - 1, run.row};
+    const std::uint32_t root = root_of(i);
+    if (root == i) {
+      blob_of_[i] = static_cast<std::uint32_t>(blobs.size() - first);
+      blobs.push_back({.box = box});
+    }
+    blob_of_[i] = blob_of_[root];
+    Blob& blob = blobs[first + blob_of_[i]];
+    blob.box.include(box);
+    blob.area += run.end - run.begin;
+  }
+}
+
+}  // namespace crepes

@@ -1,0 +1,78 @@
+/// Connected bright pixels of a gray image.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace crepes {
+
+/// An 8-bit image that someone else owns.
+struct GrayImage {
+  const std::uint8_t* pixels = nullptr;
+  int width = 0;
+  int height = 0;
+  std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
+
+  [[nodiscard]] const std::uint8_t* row(int v) const { return pixels + v * stride; }
+};
+
+/// Pixels from `u_min, v_min` to `u_max, v_max`, both included.
+struct PixelBox {
+  int u_min = 0, v_min = 0;
+  int u_max = -1, v_max = -1;
+
+  [[nodiscard]] int width() const { return u_max - u_min + 1; }
+  [[nodiscard]] int height() const { return v_max - v_min + 1; }
+  [[nodiscard]] bool overlaps(const PixelBox& other) const;
+  void include(const PixelBox& other);
+};
+
+/// Sums over connected pixels, weighted by how far each rises above a level.
+struct Blob {
+  PixelBox box;
+  std::int32_t area = 0;                ///< pixels
+  std::int64_t weight = 0;              ///< 0: huge, and not measured
+  std::int64_t u = 0, v = 0;            ///< weighted
+  std::int64_t uu = 0, uv = 0, vv = 0;  ///< weighted
+  int peak = 0;
+
+  [[nodiscard]] double mean_u() const { return static_cast<double>(u) / double(weight); }
+  [[nodiscard]] double mean_v() const { return static_cast<double>(v) / double(weight); }
+  /// Ratio of the principal axes, 1 for round.
+  [[nodiscard]] double elongation() const;
+  void absorb(const Blob& part);
+};
+
+/// Finds the blobs of one image after another. Allocates nothing once it has seen the worst of
+/// them; never more than a few megabytes.
+class BlobFinder {
+ public:
+  /// Appends the 8-connected blobs of pixels at or above `threshold`, those of more than `max_area`
+  /// pixels without their sums, ordered by first row. False, and nothing appended, when the image
+  /// holds so many that it must be noise.
+  [[nodiscard]] bool find(const GrayImage& image, int threshold, double max_area,
+                          std::vector<Blob>& blobs);
+
+  /// Which of the blobs that the last find() appended has the pixel, counted from 0.
+  [[nodiscard]] std::optional<std::size_t> blob_at(int u, int v) const;
+
+ private:
+  struct Run {
+    int row = 0;
+    int begin = 0;
+    int end = 0;
+    std::uint32_t parent = 0;  ///< union-find over runs
+  };
+
+  void find_runs(const std::uint8_t* row, int v, int width, std::uint8_t threshold);
+  [[nodiscard]] std::uint32_t root_of(std::uint32_t run);
+  void link_rows();
+  void outline(std::vector<Blob>& blobs);
+
+  std::vector<Run> runs_;
+  std::vector<std::uint32_t> blob_of_;
+};
+
+}  // namespace crepes

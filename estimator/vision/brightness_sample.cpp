@@ -1,0 +1,69 @@
+#include "estimator/vision/brightness_sample.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace crepes {
+namespace {
+
+constexpr int kRows = 32;
+constexpr int kStep = 5;  // columns; odd, against pictures that repeat every second or fourth
+constexpr int kMinContrast = 16;       // gray levels above the background
+constexpr double kSpreadSigmas = 8.0;  // noise above the background
+constexpr double kDarkShare = 0.05;    // a part smaller than this is no background
+
+}  // namespace
+
+BrightnessSample::BrightnessSample(const GrayImage& image) {
+  // Two histograms: equal neighbors would wait for each other's increments.
+  std::array<int, 256> odd{};
+  const int row_step = std::max(1, image.height / kRows);
+  for (int v = row_step / 2; v < image.height; v += row_step) {
+    const std::uint8_t* row = image.row(v);
+    int u = 0;
+    for (; u + kStep < image.width; u += 2 * kStep) {
+      ++histogram_[row[u]];
+      ++odd[row[u + kStep]];
+    }
+    if (u < image.width) ++histogram_[row[u]];
+  }
+  for (std::size_t i = 0; i < histogram_.size(); ++i) histogram_[i] += odd[i];
+}
+
+int BrightnessSample::count(int first, int last) const {
+  return std::accumulate(histogram_.begin() + first, histogram_.begin() + last + 1, 0);
+}
+
+int BrightnessSample::quantile(int first, int last, double part) const {
+  const double wanted = part * count(first, last);
+  int below = 0;
+  int level = first;
+  while (level < last && below + histogram_[static_cast<std::size_t>(level)] <= wanted)
+    below += histogram_[static_cast<std::size_t>(level++)];
+  return level;
+}
+
+double BrightnessSample::share_from(int level) const {
+  return static_cast<double>(count(level, 255)) / std::max(1, count(0, 255));
+}
+
+Background BrightnessSample::darkest_from(int level) const {
+  // From the darkest pixels upwards, until what belongs to the part no longer changes.
+  constexpr int kMaxRounds = 8;
+  Background part;
+  int last = std::min(255, quantile(level, 255, kDarkShare) + kMinContrast);
+  for (int round = 0; round < kMaxRounds; ++round) {
+    part.median = quantile(level, last, 0.5);
+    const double sigma = (quantile(level, last, 0.841) - quantile(level, last, 0.159)) / 2.0;
+    part.threshold =
+        part.median + std::max(kMinContrast, static_cast<int>(std::ceil(kSpreadSigmas * sigma)));
+    const int previous = std::exchange(last, std::min(255, part.threshold - 1));
+    if (last == previous) break;
+  }
+  part.threshold = std::min(part.threshold, kHighestThreshold);
+  return part;
+}
+
+}  // namespace crepes

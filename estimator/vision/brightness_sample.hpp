@@ -1,0 +1,35 @@
+/// What counts as bright in a picture.
+#pragma once
+
+#include <array>
+
+#include "estimator/vision/blob_finder.hpp"
+
+namespace crepes {
+
+/// The brightness of one part of a picture: a dark room, say, or the window in its wall.
+struct Background {
+  int median = 0;     ///< gray level
+  int threshold = 0;  ///< at most kHighestThreshold; from here on a pixel stands out
+};
+
+/// The gray levels of a sample of a picture's pixels.
+class BrightnessSample {
+ public:
+  static constexpr int kHighestThreshold = 250;
+
+  explicit BrightnessSample(const GrayImage& image);
+
+  /// The darkest part among pixels of at least `level`.
+  [[nodiscard]] Background darkest_from(int level) const;
+  /// The part of all pixels that has at least `level`, 0..1.
+  [[nodiscard]] double share_from(int level) const;
+
+ private:
+  [[nodiscard]] int count(int first, int last) const;
+  [[nodiscard]] int quantile(int first, int last, double part) const;
+
+  std::array<int, 256> histogram_{};
+};
+
+}  // namespace crepes
