@@ -15,6 +15,7 @@
 #include "daemon/ctl/demo.hpp"
 #include "daemon/ctl/evaluate.hpp"
 #include "daemon/ctl/live_screen.hpp"
+#include "daemon/ctl/plot.hpp"
 #include "daemon/ctl/swarm_replay.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "daemon/ctl/watch.hpp"
@@ -72,6 +73,10 @@ void add_replay(CLI::App& app, ReplayOptions& options, Command& command) {
   sub->add_option_function<std::uint64_t>(
       "--seed", [&options](std::uint64_t seed) { options.seed = seed; },
       "of the simulated network, instead of swarm.yaml's");
+  sub->add_flag(
+      "--debug-innovations", options.records,
+      "also <neighbor>.innovations.csv and .calibration.csv: every measurement's residual, "
+      "sigma, NIS and verdict, and the biases that the filter believes in");
   sub->callback([&] { command = [&options] { return run_replay(options); }; });
 }
 
@@ -90,6 +95,19 @@ void add_evaluate(CLI::App& app, EvaluateOptions& options, Command& command) {
   sub->add_flag("--json", options.json, "JSON instead of a table");
   sub->callback([&] {
     command = [&options] { return evaluate(options).map([](const auto& text) { print(text); }); };
+  });
+}
+
+void add_plot(CLI::App& app, PlotOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "plot", "Draw a replay as one HTML page: errors, innovations, biases, modes, latency");
+  sub->add_option("DIR", options.results, "what replay wrote")->required();
+  sub->add_option("--truth", options.swarm, "the data set, with its truth/");
+  sub->add_option("--out", options.out, "the page; plot.html in DIR if left out");
+  sub->callback([&] {
+    command = [&options] {
+      return plot(options).map([](const auto& page) { print(page.string() + "\n"); });
+    };
   });
 }
 
@@ -187,6 +205,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   ReplayOptions replay_options;
   EvaluateOptions evaluate_options;
+  PlotOptions plot_options;
   WatchOptions watch_options;
   DemoOptions demo_options;
   CodebookOptions codebook_options;
@@ -194,6 +213,7 @@ int run(int argc, char** argv) {
   Command command;
   add_replay(app, replay_options, command);
   add_evaluate(app, evaluate_options, command);
+  add_plot(app, plot_options, command);
   add_watch(app, watch_options, command);
   add_status(app, watch_options, command);
   add_demo(app, demo_options, command);

@@ -1,7 +1,6 @@
 #include "daemon/ctl/pose_file.hpp"
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <optional>
 
@@ -16,13 +15,6 @@ constexpr std::string_view kHeader =
 constexpr std::size_t kFirstNumber = 3;
 constexpr std::size_t kFirstCovariance = 10;
 constexpr std::size_t kColumns = 31;
-
-template <class Number>
-void append_number(std::string& text, Number value) {
-  std::array<char, 32> buffer{};
-  const auto [end, status] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
-  text.append(buffer.data(), end);
-}
 
 /// Seconds with nine decimals, without a detour through floating point.
 void append_seconds(std::string& text, std::int64_t t_ns) {

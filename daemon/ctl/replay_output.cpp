@@ -1,9 +1,7 @@
 #include "daemon/ctl/replay_output.hpp"
 
-#include <cerrno>
-#include <fstream>
-
 #include "daemon/ctl/pose_file.hpp"
+#include "daemon/ctl/record_file.hpp"
 #include "estimator/core/contract.hpp"
 
 namespace crepes {
@@ -11,26 +9,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path part_of(fs::path file) { return file += ".part"; }
-
-Result<void> write_text(const fs::path& file, std::string_view text, std::ios::openmode mode) {
-  std::ofstream out(file, std::ios::binary | mode);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
-  out.close();
-  if (out) return {};
-  return fail(ErrorCode::kIo, file.string() + ": " + std::generic_category().message(errno));
-}
-
-Result<void> publish(const fs::path& file) {
-  std::error_code status;
-  fs::rename(part_of(file), file, status);
-  if (!status) return {};
-  return fail(ErrorCode::kIo, file.string() + ": " + status.message());
-}
+constexpr Duration kCalibrationPeriod = std::chrono::milliseconds(100);
 
 }  // namespace
 
-Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names) {
+Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names, Detail detail) {
   ReplayOutput output(dir, std::move(names));
   std::error_code status;
   fs::remove(dir / "report.json", status);  // the mark of a whole result goes first
@@ -40,53 +23,86 @@ Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names) {
       return fail(ErrorCode::kIo, (dir / observer_name).string() + ": " + status.message());
     for (const auto& [neighbor, neighbor_name] : output.names_) {
       if (neighbor == observer) continue;
-      PairFile file{.csv = dir / observer_name / (neighbor_name + ".csv"),
-                    .tum = dir / observer_name / (neighbor_name + ".tum"),
-                    .csv_text = {},
-                    .tum_text = {}};
-      for (const fs::path& path : {file.csv, file.tum}) {
-        fs::remove(path, status);
-        const bool is_csv = path == file.csv;
-        const std::string header = is_csv ? std::string(pose_file_header()) + '\n' : "";
-        if (auto done = write_text(part_of(path), header, std::ios::trunc); !done)
-          return tl::unexpected(done.error());
-      }
-      output.pairs_.emplace(std::pair(observer, neighbor), std::move(file));
+      auto files = create_pair(dir / observer_name / neighbor_name, detail);
+      if (!files) return tl::unexpected(files.error());
+      output.pairs_.emplace(std::pair(observer, neighbor), std::move(*files));
     }
   }
   return output;
 }
 
+Result<ReplayOutput::PairFiles> ReplayOutput::create_pair(const fs::path& stem, Detail detail) {
+  const auto create = [&stem](const char* extension, const std::string& header) {
+    fs::path file = stem;
+    return PartFile::create(file += extension, header);
+  };
+  auto csv = create(".csv", std::string(pose_file_header()) + '\n');
+  if (!csv) return tl::unexpected(csv.error());
+  auto tum = create(".tum", "");
+  if (!tum) return tl::unexpected(tum.error());
+  PairFiles files{.csv = std::move(*csv), .tum = std::move(*tum), .records = {}};
+  if (detail == Detail::kPoses) {
+    std::error_code status;
+    for (const char* extension : {".innovations.csv", ".calibration.csv"})
+      fs::remove(fs::path(stem) += extension, status);
+    return files;
+  }
+  auto innovations = create(".innovations.csv", innovation_file_header() + '\n');
+  if (!innovations) return tl::unexpected(innovations.error());
+  auto calibration = create(".calibration.csv", calibration_file_header() + '\n');
+  if (!calibration) return tl::unexpected(calibration.error());
+  files.records = RecordFiles{.innovations = std::move(*innovations),
+                              .calibration = std::move(*calibration),
+                              .last_calibration = {}};
+  return files;
+}
+
+ReplayOutput::PairFiles& ReplayOutput::files_of(RobotId observer, RobotId neighbor) {
+  const auto pair = pairs_.find({observer, neighbor});
+  CREPES_EXPECT(pair != pairs_.end(), "results of a robot that is not in the data set");
+  return pair->second;
+}
+
 void ReplayOutput::write(RobotId observer, const NeighborPose& pose) {
-  constexpr std::size_t kFlushAt = 1 << 16;
-  const auto pair = pairs_.find({observer, pose.neighbor});
-  CREPES_EXPECT(pair != pairs_.end(), "a pose of a robot that is not in the data set");
   CREPES_EXPECT(pose.T_B_N.pose.p.allFinite() && pose.T_B_N.pose.q.coeffs().allFinite() &&
                     pose.T_B_N.covariance.allFinite(),
                 "a pose that is not finite");
-  append_pose_row(pair->second.csv_text, pose);
-  append_tum_row(pair->second.tum_text, pose);
-  if (pair->second.csv_text.size() >= kFlushAt) flush(pair->second);
+  PairFiles& files = files_of(observer, pose.neighbor);
+  append_pose_row(files.csv.text(), pose);
+  files.csv.flush_if_large();
+  append_tum_row(files.tum.text(), pose);
+  files.tum.flush_if_large();
 }
 
-void ReplayOutput::flush(PairFile& file) {
-  for (auto [path, text] : {std::pair(&file.csv, &file.csv_text), {&file.tum, &file.tum_text}}) {
-    const auto done = write_text(part_of(*path), *text, std::ios::app);
-    if (!done && !failure_) failure_ = done.error();
-    text->clear();
+void ReplayOutput::write(RobotId observer, const Records& records) {
+  for (const MeasurementRecord& record : records.measurements) {
+    auto& files = files_of(observer, record.neighbor).records;
+    CREPES_EXPECT(files.has_value(), "records for an output that takes poses only");
+    append_innovation_row(files->innovations.text(), record);
+    files->innovations.flush_if_large();
+  }
+  for (const CalibrationRecord& record : records.calibrations) {
+    auto& files = files_of(observer, record.neighbor).records;
+    CREPES_EXPECT(files.has_value(), "records for an output that takes poses only");
+    if (files->last_calibration && record.stamp - *files->last_calibration < kCalibrationPeriod)
+      continue;
+    files->last_calibration = record.stamp;
+    append_calibration_row(files->calibration.text(), record);
+    files->calibration.flush_if_large();
   }
 }
 
 Result<void> ReplayOutput::finish(const ReplayReport& report) {
-  for (auto& [pair, file] : pairs_) flush(file);
-  if (failure_) return tl::unexpected(*failure_);
-  for (const auto& [pair, file] : pairs_) {
-    for (const fs::path& path : {file.csv, file.tum})
-      if (auto done = publish(path); !done) return done;
+  for (auto& [pair, files] : pairs_) {
+    if (auto done = files.csv.publish(); !done) return done;
+    if (auto done = files.tum.publish(); !done) return done;
+    if (!files.records) continue;
+    if (auto done = files.records->innovations.publish(); !done) return done;
+    if (auto done = files.records->calibration.publish(); !done) return done;
   }
-  const fs::path report_file = dir_ / "report.json";
-  return write_text(part_of(report_file), report_json(report, names_), std::ios::trunc)
-      .and_then([&] { return publish(report_file); });
+  auto file = PartFile::create(dir_ / "report.json", report_json(report, names_));
+  if (!file) return tl::unexpected(file.error());
+  return file->publish();
 }
 
 }  // namespace crepes

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/ctl/dataset_faults.hpp"
+#include "daemon/ctl/part_file.hpp"
 #include "estimator/core/outputs.hpp"
 #include "estimator/core/result.hpp"
 
@@ -45,38 +46,48 @@ struct ReplayReport {
   DatasetFaults faults;
 };
 
-/// Writes DIR/<observer>/<neighbor>.csv and .tum as poses come, and DIR/report.json at the end.
-/// Everything has its proper name only after `finish`; before, files end in ".part" and results of
-/// an earlier replay are gone.
+/// Writes DIR/<observer>/<neighbor>.csv and .tum as poses come, and DIR/report.json at the end;
+/// with records also <neighbor>.innovations.csv and .calibration.csv. Everything has its proper
+/// name only after `finish`; before, files end in ".part" and results of an earlier replay are
+/// gone.
 class ReplayOutput {
  public:
   /// One robot: what its directory is called.
   using Names = std::map<RobotId, std::string>;
+  enum class Detail { kPoses, kRecords };
 
-  [[nodiscard]] static Result<ReplayOutput> create(const std::filesystem::path& dir, Names names);
+  [[nodiscard]] static Result<ReplayOutput> create(const std::filesystem::path& dir, Names names,
+                                                   Detail detail = Detail::kPoses);
 
   /// `pose.neighbor` must be among the names. Failures of the disk are told by `finish`.
   void write(RobotId observer, const NeighborPose& pose);
+  /// Only with Detail::kRecords. Calibrations are thinned to ten a second.
+  void write(RobotId observer, const Records& records);
 
   [[nodiscard]] Result<void> finish(const ReplayReport& report);
 
  private:
-  struct PairFile {
-    std::filesystem::path csv;
-    std::filesystem::path tum;
-    std::string csv_text;
-    std::string tum_text;
+  struct RecordFiles {
+    PartFile innovations;
+    PartFile calibration;
+    std::optional<Timestamp> last_calibration;
+  };
+  struct PairFiles {
+    PartFile csv;
+    PartFile tum;
+    std::optional<RecordFiles> records;
   };
 
   ReplayOutput(std::filesystem::path dir, Names names)
       : dir_(std::move(dir)), names_(std::move(names)) {}
 
-  void flush(PairFile& file);
+  [[nodiscard]] static Result<PairFiles> create_pair(const std::filesystem::path& stem,
+                                                     Detail detail);
+  [[nodiscard]] PairFiles& files_of(RobotId observer, RobotId neighbor);
 
   std::filesystem::path dir_;
   Names names_;
-  std::map<std::pair<RobotId, RobotId>, PairFile> pairs_;
-  std::optional<Error> failure_;
+  std::map<std::pair<RobotId, RobotId>, PairFiles> pairs_;
 };
 
 /// report.json's text.

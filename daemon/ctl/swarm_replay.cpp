@@ -110,16 +110,17 @@ struct Robot {
 class SwarmReplay {
  public:
   SwarmReplay(SwarmDataset dataset, const std::optional<SwarmTruth>& truth,
-              const ReplayOptions& options, const PoseSink& on_pose)
+              const ReplayOptions& options, const ReplaySinks& sinks)
       : manifest_(std::move(dataset.manifest)),
         truth_(truth),
-        on_pose_(on_pose),
+        sinks_(sinks),
         faults_(std::move(dataset.faults)),
         network_(manifest_.network, options.seed.value_or(manifest_.network.seed)) {
     for (RobotRecording& recording : dataset.robots) {
       recording.config.graph.enabled &= options.graph;
       if (options.profile) recording.config.estimator.profile = *options.profile;
       robots_.emplace_back(std::move(recording));
+      if (sinks.on_records) robots_.back().estimator.keep_records();
     }
     for (std::size_t i = 0; i < robots_.size(); ++i) schedule_recording(i);
   }
@@ -144,7 +145,7 @@ class SwarmReplay {
 
   SwarmManifest manifest_;
   const std::optional<SwarmTruth>& truth_;
-  const PoseSink& on_pose_;
+  const ReplaySinks& sinks_;
   DatasetFaults faults_;
   SimulatedNetwork network_;
   std::deque<Robot> robots_;
@@ -230,7 +231,8 @@ void SwarmReplay::step(const Arrival& arrival, const Event& event) {
 
 void SwarmReplay::take(const Arrival& arrival, const Outputs& outputs) {
   Robot& robot = robots_[arrival.robot];
-  for (const NeighborPose& pose : outputs.poses) on_pose_(robot.id(), pose);
+  for (const NeighborPose& pose : outputs.poses) sinks_.on_pose(robot.id(), pose);
+  if (sinks_.on_records) sinks_.on_records(robot.id(), outputs.records);
   if (outputs.report) broadcast(arrival, *outputs.report);
   if (outputs.graph_problem) {
     const CpuTimer timer(robot.cpu.graph_s);
@@ -310,8 +312,8 @@ ReplayReport SwarmReplay::report(const ReplayOptions& options) const {
 }  // namespace
 
 Result<ReplayReport> replay_dataset(SwarmDataset dataset, const std::optional<SwarmTruth>& truth,
-                                    const ReplayOptions& options, const PoseSink& on_pose) {
-  SwarmReplay replay(std::move(dataset), truth, options, on_pose);
+                                    const ReplayOptions& options, const ReplaySinks& sinks) {
+  SwarmReplay replay(std::move(dataset), truth, options, sinks);
   if (auto done = replay.run(options.on_progress); !done) return tl::unexpected(done.error());
   return replay.report(options);
 }
@@ -327,17 +329,25 @@ Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
     if (!loaded) return tl::unexpected(loaded.error());
     truth = std::move(*loaded);
   }
-  auto output = ReplayOutput::create(options.out_dir, std::move(names));
+  auto output = ReplayOutput::create(
+      options.out_dir, std::move(names),
+      options.records ? ReplayOutput::Detail::kRecords : ReplayOutput::Detail::kPoses);
   if (!output) return tl::unexpected(output.error());
 
   ReplaySummary summary{.robots = dataset->robots.size(),
                         .duration_s = dataset->manifest.duration_s,
                         .faults = dataset->faults};
-  const auto report = replay_dataset(std::move(*dataset), truth, options,
-                                     [&](RobotId observer, const NeighborPose& pose) {
-                                       output->write(observer, pose);
-                                       ++summary.poses;
-                                     });
+  ReplaySinks sinks;
+  sinks.on_pose = [&](RobotId observer, const NeighborPose& pose) {
+    output->write(observer, pose);
+    ++summary.poses;
+  };
+  if (options.records) {
+    sinks.on_records = [&](RobotId observer, const Records& records) {
+      output->write(observer, records);
+    };
+  }
+  const auto report = replay_dataset(std::move(*dataset), truth, options, sinks);
   if (!report) return tl::unexpected(report.error());
   if (auto done = output->finish(*report); !done) return tl::unexpected(done.error());
   return summary;

@@ -20,6 +20,7 @@ struct ReplayOptions {
   std::filesystem::path out_dir;
   std::optional<Profile> profile;           ///< instead of what the configuration files say
   bool graph = true;                        ///< false: no pose graph, whatever the files say
+  bool records = false;                     ///< also every measurement's residual and verdict
   std::optional<std::uint64_t> seed;        ///< of the network, instead of swarm.yaml's
   std::function<void(double)> on_progress;  ///< share done, 0..1, now and then
 };
@@ -35,14 +36,17 @@ struct ReplaySummary {
 /// True time orders what reaches the robots; they see only their own clocks.
 [[nodiscard]] Result<ReplaySummary> replay_swarm(const ReplayOptions& options);
 
-/// Takes every pose as it is published.
-using PoseSink = std::function<void(RobotId observer, const NeighborPose&)>;
+/// Who takes what robots say.
+struct ReplaySinks {
+  std::function<void(RobotId observer, const NeighborPose&)> on_pose;
+  std::function<void(RobotId observer, const Records&)> on_records;  ///< empty: none are kept
+};
 
 /// The same from memory; the directories of `options` are not used. `truth` judges IDs for the
 /// report, no estimator sees it. The error of a picture that cannot be read.
 [[nodiscard]] Result<ReplayReport> replay_dataset(SwarmDataset dataset,
                                                   const std::optional<SwarmTruth>& truth,
                                                   const ReplayOptions& options,
-                                                  const PoseSink& on_pose);
+                                                  const ReplaySinks& sinks);
 
 }  // namespace crepes

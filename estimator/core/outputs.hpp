@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -112,6 +113,44 @@ inline constexpr std::size_t kMeasurementKindCount = 6;
       "bearing", "peer_bearing", "range", "peer_range", "raw_pose", "graph_pose"};
   return kNames[static_cast<std::size_t>(kind)];
 }
+
+/// How a measurement fared at a filter.
+struct Fusion {
+  static constexpr std::size_t kMaxDimension = 9;
+
+  Verdict verdict = Verdict::kDegenerate;
+  double nis = 0.0;           ///< residual^T S^-1 residual, before the correction
+  std::size_t dimension = 0;  ///< of the residual; 0 where there was none
+  std::array<double, kMaxDimension> residual{};  ///< bearings [rad], ranges [m], poses p, theta
+  std::array<double, kMaxDimension> sigma{};     ///< roots of S's diagonal
+};
+
+/// One measurement of a neighbor, for whoever wants to see inside.
+struct MeasurementRecord {
+  RobotId neighbor{};
+  Timestamp stamp{};  ///< when it was taken
+  MeasurementKind kind = MeasurementKind::kBearing;
+  Fusion fusion;
+};
+
+/// What the tight filter believes of the sensors; vectors in the order of their axes.
+struct CalibrationRecord {
+  static constexpr std::array<std::string_view, 19> kNames{
+      "gyro_B_x",     "gyro_B_y",     "gyro_B_z",     "accel_B_x",    "accel_B_y",
+      "accel_B_z",    "gyro_N_x",     "gyro_N_y",     "gyro_N_z",     "accel_N_x",
+      "accel_N_y",    "accel_N_z",    "range_bias",   "misalign_B_x", "misalign_B_y",
+      "misalign_B_z", "misalign_N_x", "misalign_N_y", "misalign_N_z"};
+
+  RobotId neighbor{};
+  Timestamp stamp{};
+  std::array<double, kNames.size()> value{};  ///< [rad/s], [m/s^2], [m], [rad]
+  std::array<double, kNames.size()> sigma{};
+};
+
+struct Records {
+  std::vector<MeasurementRecord> measurements;
+  std::vector<CalibrationRecord> calibrations;
+};
 
 using VerdictCounts = std::array<std::uint64_t, kVerdictCount>;
 

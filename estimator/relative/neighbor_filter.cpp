@@ -73,15 +73,16 @@ void NeighborFilter::advance_to(Timestamp to, const ImuHistory& imu_B, const Imu
 // first linearization alone, what the bearing does not see, the roll about the line of sight, would
 // come out as known from the next bearing on.
 template <class Linearize>
-Verdict NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
+Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
   constexpr double kLinear = 0.01;  // rad; half its square is well below any bearing's noise
   constexpr int kMaxIterations = 5;
 
   auto z = linearize(state_);
-  if (!z) return Verdict::kDegenerate;
+  if (!z) return {};
   E::Covariance P = P_;
   auto outcome = kalman_update(*z, gate_nis, P);
-  if (outcome.verdict != Verdict::kFused) return outcome.verdict;
+  const Fusion fusion = fusion_of(*z, outcome);
+  if (outcome.verdict != Verdict::kFused) return fusion;
 
   Eigen::Vector3d theta = outcome.correction.template segment<3>(E::kTheta);
   const bool is_far = theta.norm() > kLinear;
@@ -89,7 +90,7 @@ Verdict NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
     NominalState there = state_;
     inject(outcome.correction, there);
     z = linearize(there);
-    if (!z) return Verdict::kDegenerate;
+    if (!z) return {};
     z->H.template middleCols<3>(E::kTheta) =
         (z->H.template middleCols<3>(E::kTheta) * so3_right_jacobian(theta)).eval();
     z->residual += z->H * outcome.correction;
@@ -100,11 +101,11 @@ Verdict NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
   if (is_far) reset(so3_right_jacobian(theta), P);
   P_ = P;
   inject(outcome.correction, state_);
-  return outcome.verdict;
+  return fusion;
 }
 
-Verdict NeighborFilter::fuse_bearing(const DirectionReading& z, const Eigen::Vector3d& p_N_M,
-                                     double gate_nis) {
+Fusion NeighborFilter::fuse_bearing(const DirectionReading& z, const Eigen::Vector3d& p_N_M,
+                                    double gate_nis) {
   return correct(
       [&](const NominalState& state) {
         return linearize_bearing(state, z.u, z.camera, p_N_M, z.sigma_rad);
@@ -112,8 +113,8 @@ Verdict NeighborFilter::fuse_bearing(const DirectionReading& z, const Eigen::Vec
       gate_nis);
 }
 
-Verdict NeighborFilter::fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,
-                                          double gate_nis) {
+Fusion NeighborFilter::fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,
+                                         double gate_nis) {
   return correct(
       [&](const NominalState& state) {
         return linearize_peer_bearing(state, z.u, z.camera, p_B_M, z.sigma_rad);
@@ -121,8 +122,8 @@ Verdict NeighborFilter::fuse_peer_bearing(const DirectionReading& z, const Eigen
       gate_nis);
 }
 
-Verdict NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
-                                   const Eigen::Vector3d& p_N_Q, double gate_nis) {
+Fusion NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
+                                  const Eigen::Vector3d& p_N_Q, double gate_nis) {
   return correct(
       [&](const NominalState& state) {
         return linearize_range(state, p_B_U, p_N_Q, z.range_m, z.sigma_m);
@@ -130,7 +131,7 @@ Verdict NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d&
       gate_nis);
 }
 
-Verdict NeighborFilter::fuse_pose(const GaussianPose& T_B_N, double gate_nis) {
+Fusion NeighborFilter::fuse_pose(const GaussianPose& T_B_N, double gate_nis) {
   return correct(
       [&](const NominalState& state) { return std::optional(linearize_pose(state, T_B_N)); },
       gate_nis);

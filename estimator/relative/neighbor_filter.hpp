@@ -46,13 +46,13 @@ class NeighborFilter {
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
 
   /// Our camera on the neighbor's ring.
-  Verdict fuse_bearing(const DirectionReading& z, const Eigen::Vector3d& p_N_M, double gate_nis);
+  Fusion fuse_bearing(const DirectionReading& z, const Eigen::Vector3d& p_N_M, double gate_nis);
   /// The neighbor's camera on our ring.
-  Verdict fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,
-                            double gate_nis);
-  Verdict fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
-                     const Eigen::Vector3d& p_N_Q, double gate_nis);
-  Verdict fuse_pose(const GaussianPose& T_B_N, double gate_nis);
+  Fusion fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,
+                           double gate_nis);
+  Fusion fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
+                    const Eigen::Vector3d& p_N_Q, double gate_nis);
+  Fusion fuse_pose(const GaussianPose& T_B_N, double gate_nis);
 
   [[nodiscard]] const RelativeMotion& motion() const { return state_.motion; }
   [[nodiscard]] const NominalState& state() const { return state_; }
@@ -63,7 +63,7 @@ class NeighborFilter {
  private:
   /// `linearize` gives the innovation at a state, or nothing where it says nothing.
   template <class Linearize>
-  Verdict correct(const Linearize& linearize, double gate_nis);
+  Fusion correct(const Linearize& linearize, double gate_nis);
 
   Timestamp stamp_;
   NominalState state_;

@@ -152,20 +152,21 @@ void PaperFilter::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHis
 }
 
 template <int M>
-Verdict PaperFilter::correct(const Innovation<M, PaperError::kSize>& z, double gate_nis) {
+Fusion PaperFilter::correct(const Innovation<M, PaperError::kSize>& z, double gate_nis) {
   const auto outcome = kalman_update(z, gate_nis, P_);
-  if (outcome.verdict != Verdict::kFused) return outcome.verdict;
+  const Fusion fusion = fusion_of(z, outcome);
+  if (outcome.verdict != Verdict::kFused) return fusion;
   x_ = paper_plus(x_, outcome.correction);
   const PaperError::Covariance G = paper_reset(outcome.correction);
   P_ = (G * P_ * G.transpose()).eval();
-  return outcome.verdict;
+  return fusion;
 }
 
-Verdict PaperFilter::fuse(const RawPose& z, double gate_nis) {
+Fusion PaperFilter::fuse(const RawPose& z, double gate_nis) {
   return correct(paper_innovation(x_, z), gate_nis);
 }
 
-Verdict PaperFilter::fuse(const GaussianPose& T_B_N, double gate_nis) {
+Fusion PaperFilter::fuse(const GaussianPose& T_B_N, double gate_nis) {
   Innovation<6, E::kSize> z;
   z.residual = pose_difference(x_.T_B_N, T_B_N.pose);
   z.H = pose_by_error(x_);

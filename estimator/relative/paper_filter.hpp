@@ -57,9 +57,9 @@ class PaperFilter {
   /// Eq. 9 to 13, in steps of at most 10 ms. `to` may not lie before `stamp()`.
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Eq. 16 to 20.
-  Verdict fuse(const RawPose& z, double gate_nis);
+  Fusion fuse(const RawPose& z, double gate_nis);
   /// The graph's pose, as a measurement of q and p alone.
-  Verdict fuse(const GaussianPose& T_B_N, double gate_nis);
+  Fusion fuse(const GaussianPose& T_B_N, double gate_nis);
 
   [[nodiscard]] const RelativeMotion& motion() const { return x_; }
   /// Of T_B_N, in GaussianPose's convention.
@@ -67,7 +67,7 @@ class PaperFilter {
 
  private:
   template <int M>
-  Verdict correct(const Innovation<M, PaperError::kSize>& z, double gate_nis);
+  Fusion correct(const Innovation<M, PaperError::kSize>& z, double gate_nis);
 
   Timestamp stamp_;
   RelativeMotion x_;

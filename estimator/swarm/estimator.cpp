@@ -54,6 +54,13 @@ bool is_a_team(const GraphProblem& problem) {
 
 Duration period_of(double rate_hz) { return from_seconds(1.0 / rate_hz); }
 
+void append(const Records& more, Records& all) {
+  all.measurements.insert(all.measurements.end(), more.measurements.begin(),
+                          more.measurements.end());
+  all.calibrations.insert(all.calibrations.end(), more.calibrations.begin(),
+                          more.calibrations.end());
+}
+
 std::vector<BlinkTracker> make_trackers(const Config& config) {
   const auto library = IdLibrary::from(config.swarm);
   CREPES_EXPECT(library.has_value(), "validated: every member has a code of its own");
@@ -190,6 +197,7 @@ Outputs Estimator::State::on(const Tick& tick) {
   std::vector<NeighborEstimate> estimates;
   for (auto& [robot, neighbor] : neighbors) {
     neighbor.tick(tick.stamp, self);
+    append(neighbor.take_records(), outputs.records);
     if (auto estimate = neighbor.estimate()) estimates.push_back(*estimate);
     if (auto pose = neighbor.improved_pose()) outputs.poses.push_back(std::move(*pose));
   }
@@ -212,6 +220,10 @@ Estimator::~Estimator() = default;
 
 Outputs Estimator::step(const Event& event) {
   return std::visit([this](const auto& e) { return state_->on(e); }, event);
+}
+
+void Estimator::keep_records() {
+  for (auto& [robot, neighbor] : state_->neighbors) neighbor.keep_records();
 }
 
 EstimatorStatus Estimator::status() const {

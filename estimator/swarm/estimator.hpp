@@ -17,6 +17,7 @@ struct Outputs {
   std::optional<Report> report;               ///< to broadcast
   std::optional<GraphProblem> graph_problem;  ///< to solve; the answer comes back as an Event
   std::vector<Bearing> bearings;              ///< what the cameras identified
+  Records records;                            ///< at a Tick, if they are kept
 };
 
 /// Events in order of arrival in, poses out. A pure function of the events so far: same events,
@@ -32,6 +33,8 @@ class Estimator {
   ~Estimator();
 
   [[nodiscard]] Outputs step(const Event& event);
+  /// From now on `Outputs::records` tells of every measurement. Changes nothing else.
+  void keep_records();
   [[nodiscard]] EstimatorStatus status() const;
 
  private:

@@ -42,7 +42,7 @@ void Neighbor::take_range(const UwbRange& range, MeasurementKind kind) {
   const bool plausible = range.range_m > 0.0 && range.range_m <= settings_.max_range_m;
   const bool late_path = range.received_dbm - range.first_path_dbm > settings_.late_path_db;
   if (!plausible || late_path) {
-    count(kind, Verdict::kGated);
+    note(range.stamp, kind, {.verdict = Verdict::kGated});
     return;
   }
   last_range_ = std::max(last_range_, range.stamp);
@@ -80,7 +80,7 @@ void Neighbor::take_peer_bearing(const Bearing& bearing, double clock_sigma_s,
     start_or_feed(bearing.stamp, *raw);
   } else {
     raw_reason_ = std::get<NoPoseReason>(result);
-    count(MeasurementKind::kRawPose, Verdict::kDegenerate);
+    note(bearing.stamp, MeasurementKind::kRawPose, {.verdict = Verdict::kDegenerate});
   }
 }
 
@@ -96,7 +96,7 @@ void Neighbor::start_or_feed(Timestamp stamp, const RawPose& raw) {
     track_.emplace(stamp, raw, settings_);
     correction_.reset();
     ++starts_;
-    count(MeasurementKind::kRawPose, Verdict::kFused);
+    note(stamp, MeasurementKind::kRawPose, {.verdict = Verdict::kFused});
     return;
   }
   if (settings_.profile == Profile::kPaper) {
@@ -119,7 +119,7 @@ void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
   if (!track_ || !track_->is_certain()) {
     track_.emplace(stamp, pose, settings_);
     ++starts_;
-    count(MeasurementKind::kGraphPose, Verdict::kFused);
+    note(stamp, MeasurementKind::kGraphPose, {.verdict = Verdict::kFused});
     return;
   }
   enqueue({stamp, MeasurementKind::kGraphPose, pose.T_B_N});
@@ -127,14 +127,16 @@ void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
 
 void Neighbor::enqueue(Measurement measurement) {
   const MeasurementKind kind = measurement.kind;
+  const Timestamp stamp = measurement.stamp;
   const bool poses_only = settings_.profile == Profile::kPaper;
   if (poses_only && kind != MeasurementKind::kRawPose && kind != MeasurementKind::kGraphPose)
     return;
-  if (!sequencer_.push(std::move(measurement))) count(kind, Verdict::kLate);
+  if (!sequencer_.push(std::move(measurement))) note(stamp, kind, {.verdict = Verdict::kLate});
 }
 
-void Neighbor::count(MeasurementKind kind, Verdict verdict) {
-  ++status_.measurements[static_cast<std::size_t>(kind)][static_cast<std::size_t>(verdict)];
+void Neighbor::note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion) {
+  ++status_.measurements[static_cast<std::size_t>(kind)][static_cast<std::size_t>(fusion.verdict)];
+  if (keeps_records_) records_.measurements.push_back({member_.id, stamp, kind, fusion});
 }
 
 void Neighbor::tick(Timestamp now, const RobotState& self) {
@@ -142,6 +144,10 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
   if (now - last_heard_ > settings_.forget) track_.reset();
   release(now, self);
   look_ahead(now, self);
+  if (const auto calibration = keeps_records_ && track_ ? track_->calibration() : std::nullopt) {
+    records_.calibrations.push_back(*calibration);
+    records_.calibrations.back().neighbor = member_.id;
+  }
   reason_ = pose_ ? NoPoseReason::kNone : reason(now, self);
 }
 
@@ -150,11 +156,12 @@ void Neighbor::release(Timestamp now, const RobotState& self) {
     const bool usable =
         track_ && measurement->stamp >= track_->stamp() && !self.imu.empty() && !body_.imu.empty();
     if (!usable) {
-      count(measurement->kind, Verdict::kNoState);
+      note(measurement->stamp, measurement->kind, {.verdict = Verdict::kNoState});
       continue;
     }
     track_->advance_to(measurement->stamp, self.imu, body_.imu);
-    count(measurement->kind, track_->fuse(*measurement, mounting_, settings_.gates));
+    note(measurement->stamp, measurement->kind,
+         track_->fuse(*measurement, mounting_, settings_.gates));
   }
   // Without readings the filter follows all the same: no further behind than IMU samples are kept,
   // and looking ahead costs no more as a silence grows.

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/outputs.hpp"
@@ -36,6 +37,11 @@ class Neighbor {
   /// The last pose with the graph's correction, where there is a fresh one.
   [[nodiscard]] std::optional<NeighborPose> improved_pose() const;
 
+  /// Keeps what became of each measurement, and what the filter believes of the sensors at each
+  /// tick, until `take_records`.
+  void keep_records() { keeps_records_ = true; }
+  [[nodiscard]] Records take_records() { return std::exchange(records_, {}); }
+
   [[nodiscard]] const RobotState& body() const { return body_; }
   [[nodiscard]] Timestamp last_heard() const { return last_heard_; }
   [[nodiscard]] NeighborStatus status() const;
@@ -45,7 +51,7 @@ class Neighbor {
   void take_peer_bearing(const Bearing& bearing, double clock_sigma_s, const RobotState& self);
   void start_or_feed(Timestamp stamp, const RawPose& raw);
   void enqueue(Measurement measurement);
-  void count(MeasurementKind kind, Verdict verdict);
+  void note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion);
   void release(Timestamp now, const RobotState& self);
   void look_ahead(Timestamp now, const RobotState& self);
   [[nodiscard]] bool needs_start(Timestamp stamp) const;
@@ -80,6 +86,9 @@ class Neighbor {
   Timestamp last_range_ = kNever;
   NoPoseReason raw_reason_ = NoPoseReason::kNotSeen;
   NeighborStatus status_;
+
+  bool keeps_records_ = false;
+  Records records_;
 };
 
 }  // namespace crepes

@@ -30,8 +30,8 @@ std::variant<NeighborFilter, PaperFilter> make_filter(Timestamp stamp, const Fir
   }
 }
 
-Verdict fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounting& mounting,
-                   const Gates& gates) {
+Fusion fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounting& mounting,
+                  const Gates& gates) {
   switch (m.kind) {
     case MeasurementKind::kBearing:
       return filter.fuse_bearing(std::get<DirectionReading>(m.reading), mounting.p_N_M,
@@ -48,10 +48,10 @@ Verdict fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMount
     case MeasurementKind::kRawPose:
       break;
   }
-  return Verdict::kNoState;  // a raw pose only starts this filter
+  return {.verdict = Verdict::kNoState};  // a raw pose only starts this filter
 }
 
-Verdict fuse_paper(PaperFilter& filter, const Measurement& m, const Gates& gates) {
+Fusion fuse_paper(PaperFilter& filter, const Measurement& m, const Gates& gates) {
   if (m.kind == MeasurementKind::kRawPose) {
     return filter.fuse(std::get<RawPose>(m.reading), gates.raw_pose);
   }
@@ -80,16 +80,16 @@ void NeighborTrack::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuH
   std::visit([&](auto& filter) { filter.advance_to(to, imu_B, imu_N); }, filter_);
 }
 
-Verdict NeighborTrack::fuse(const Measurement& measurement, const PairMounting& mounting,
-                            const Gates& gates) {
+Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& mounting,
+                           const Gates& gates) {
   auto* tight = std::get_if<NeighborFilter>(&filter_);
-  const Verdict verdict = tight != nullptr
-                              ? fuse_tight(*tight, measurement, mounting, gates)
-                              : fuse_paper(std::get<PaperFilter>(filter_), measurement, gates);
-  if (verdict == Verdict::kFused) {
+  const Fusion fusion = tight != nullptr
+                            ? fuse_tight(*tight, measurement, mounting, gates)
+                            : fuse_paper(std::get<PaperFilter>(filter_), measurement, gates);
+  if (fusion.verdict == Verdict::kFused) {
     last_[static_cast<std::size_t>(measurement.kind)] = measurement.stamp;
   }
-  return verdict;
+  return fusion;
 }
 
 RelativeMotion NeighborTrack::motion() const {
@@ -102,6 +102,24 @@ GaussianPose NeighborTrack::pose() const {
         return GaussianPose{filter.motion().T_B_N, filter.pose_covariance()};
       },
       filter_);
+}
+
+std::optional<CalibrationRecord> NeighborTrack::calibration() const {
+  const auto* tight = std::get_if<NeighborFilter>(&filter_);
+  if (tight == nullptr) return std::nullopt;
+  const NominalState& x = tight->state();
+  Eigen::Matrix<double, 19, 1> value;
+  value << x.bias_B.gyro_radps, x.bias_B.accel_mps2, x.bias_N.gyro_radps, x.bias_N.accel_mps2,
+      x.range_bias_m, x.misalignment_B, x.misalignment_N;
+  CalibrationRecord record;
+  record.stamp = tight->stamp();
+  for (int i = 0; i < value.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const int row = ErrorState::kGyroB + i;  // both list the same states in the same order
+    record.value.at(k) = value(i);
+    record.sigma.at(k) = std::sqrt(tight->covariance()(row, row));
+  }
+  return record;
 }
 
 bool NeighborTrack::is_certain() const {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <variant>
 
 #include "estimator/relative/neighbor_filter.hpp"
@@ -33,12 +34,14 @@ class NeighborTrack {
   [[nodiscard]] Timestamp stamp() const;
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Corrects with a reading taken at `stamp()`.
-  Verdict fuse(const Measurement& measurement, const PairMounting& mounting, const Gates& gates);
+  Fusion fuse(const Measurement& measurement, const PairMounting& mounting, const Gates& gates);
 
   [[nodiscard]] RelativeMotion motion() const;
   [[nodiscard]] GaussianPose pose() const;
   /// Its own covariance says at most 1 m and 20 deg, one sigma, in any direction.
   [[nodiscard]] bool is_certain() const;
+  /// What the tight filter believes of the sensors; nothing of the paper's.
+  [[nodiscard]] std::optional<CalibrationRecord> calibration() const;
   /// When a reading of this kind was last used; kNever if never.
   [[nodiscard]] Timestamp last(MeasurementKind kind) const {
     return last_[static_cast<std::size_t>(kind)];

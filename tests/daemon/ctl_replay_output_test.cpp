@@ -8,6 +8,7 @@
 
 #include "daemon/ctl/csv_file.hpp"
 #include "daemon/ctl/pose_file.hpp"
+#include "daemon/ctl/record_file.hpp"
 #include "daemon/ctl/replay_output.hpp"
 #include "daemon/ctl/scratch_directory.hpp"
 
@@ -40,6 +41,87 @@ NeighborPose a_pose(std::int64_t t_ns) {
 Result<std::vector<NeighborPose>> read_text(const fs::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
   return read_pose_file(file, RobotId{2});
+}
+
+MeasurementRecord a_measurement() {
+  MeasurementRecord record;
+  record.neighbor = RobotId{2};
+  record.stamp = Timestamp{Duration{123'456'789'012}};
+  record.kind = MeasurementKind::kPeerBearing;
+  record.fusion = {.verdict = Verdict::kGated,
+                   .nis = 31.25,
+                   .dimension = 2,
+                   .residual = {0.1, -0.3},
+                   .sigma = {0.02, 0.06}};
+  return record;
+}
+
+CalibrationRecord a_calibration() {
+  CalibrationRecord record;
+  record.neighbor = RobotId{2};
+  for (std::size_t i = 0; i < record.value.size(); ++i) {
+    record.value.at(i) = 0.1 * static_cast<double>(i);
+    record.sigma.at(i) = 1.0 / (1.0 + static_cast<double>(i));
+  }
+  return record;
+}
+
+TEST(RecordFile, ReadsBackWhatItWrote) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  std::string innovations = innovation_file_header() + "\n";
+  append_innovation_row(innovations, a_measurement());
+  append_innovation_row(innovations, {.fusion = {.verdict = Verdict::kLate}});
+  std::string calibration = calibration_file_header() + "\n";
+  append_calibration_row(calibration, a_calibration());
+  std::ofstream(scratch.path() / "i.csv") << innovations;
+  std::ofstream(scratch.path() / "c.csv") << calibration;
+
+  const auto measurements = read_innovation_file(scratch.path() / "i.csv");
+  const auto calibrations = read_calibration_file(scratch.path() / "c.csv");
+
+  ASSERT_TRUE(measurements) << measurements.error().message;
+  ASSERT_EQ(measurements->size(), 2U);
+  EXPECT_EQ(measurements->front().stamp, a_measurement().stamp);
+  EXPECT_EQ(measurements->front().kind, MeasurementKind::kPeerBearing);
+  EXPECT_EQ(measurements->front().fusion.verdict, Verdict::kGated);
+  EXPECT_EQ(measurements->front().fusion.residual, a_measurement().fusion.residual);
+  EXPECT_EQ(measurements->front().fusion.sigma, a_measurement().fusion.sigma);
+  EXPECT_EQ(measurements->back().fusion.dimension, 0U);
+  ASSERT_TRUE(calibrations) << calibrations.error().message;
+  EXPECT_EQ(calibrations->front().value, a_calibration().value);
+  EXPECT_EQ(calibrations->front().sigma, a_calibration().sigma);
+}
+
+TEST(RecordFile, RefusesAKindThatIsNone) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  std::string text = innovation_file_header() + "\n";
+  append_innovation_row(text, a_measurement());
+  text.replace(text.find("peer_bearing"), 4, "pear");
+  std::ofstream(scratch.path() / "i.csv") << text;
+
+  const auto read = read_innovation_file(scratch.path() / "i.csv");
+
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().message.find("i.csv:2: unknown kind"), std::string::npos)
+      << read.error().message;
+}
+
+TEST(ReplayOutput, WritesRecordsWhenAskedAndTakesThemAwayWhenNot) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const fs::path file = scratch.path() / "r1/r2.innovations.csv";
+  const ReplayOutput::Names names{{RobotId{1}, "r1"}, {RobotId{2}, "r2"}};
+  {
+    auto output = ReplayOutput::create(scratch.path(), names, ReplayOutput::Detail::kRecords);
+    output->write(RobotId{1}, Records{.measurements = {a_measurement()},
+                                      .calibrations = {a_calibration(), a_calibration()}});
+    ASSERT_TRUE(output->finish({}));
+  }
+  EXPECT_EQ(read_innovation_file(file)->size(), 1U);
+  // Two within a tenth of a second are one.
+  EXPECT_EQ(read_calibration_file(scratch.path() / "r1/r2.calibration.csv")->size(), 1U);
+
+  ASSERT_TRUE(ReplayOutput::create(scratch.path(), names)->finish({}));
+  EXPECT_FALSE(fs::exists(file));
 }
 
 TEST(PoseFile, ReadsBackEveryBit) {

@@ -94,10 +94,11 @@ Result<Quality> replay_quality(const Swarm& swarm, Profile profile, double after
   options.profile = profile;
   options.graph = false;
   std::map<Pair, std::vector<NeighborPose>> poses;
-  const auto report = replay_dataset(swarm.dataset, std::nullopt, options,
-                                     [&poses](RobotId observer, const NeighborPose& pose) {
-                                       poses[{observer, pose.neighbor}].push_back(pose);
-                                     });
+  ReplaySinks sinks;
+  sinks.on_pose = [&poses](RobotId observer, const NeighborPose& pose) {
+    poses[{observer, pose.neighbor}].push_back(pose);
+  };
+  const auto report = replay_dataset(swarm.dataset, std::nullopt, options, sinks);
   if (!report) return tl::unexpected(report.error());
 
   Quality quality;

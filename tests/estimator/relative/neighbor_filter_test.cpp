@@ -158,9 +158,15 @@ TEST(NeighborFilter, AGatedOrDegenerateReadingChangesNothing) {
   DirectionReading behind = pair.bearing(filter.stamp());
   behind.u = -behind.u;
 
-  EXPECT_EQ(filter.fuse_range(outlier, pair.mounting_B.antenna, pair.mounting_N.antenna, 10.8),
-            Verdict::kGated);
-  EXPECT_EQ(filter.fuse_bearing(behind, pair.mounting_N.led, 13.8), Verdict::kDegenerate);
+  const Fusion far =
+      filter.fuse_range(outlier, pair.mounting_B.antenna, pair.mounting_N.antenna, 10.8);
+  EXPECT_EQ(far.verdict, Verdict::kGated);
+  ASSERT_EQ(far.dimension, 1U);
+  EXPECT_NEAR(far.residual[0], 3.0, 0.5);
+  EXPECT_NEAR(far.nis, std::pow(far.residual[0] / far.sigma[0], 2), 1e-9);
+  const Fusion nowhere = filter.fuse_bearing(behind, pair.mounting_N.led, 13.8);
+  EXPECT_EQ(nowhere.verdict, Verdict::kDegenerate);
+  EXPECT_EQ(nowhere.dimension, 0U);
   EXPECT_EQ(filter.covariance(), P);
   EXPECT_EQ(filter.motion().T_B_N.p, T_B_N.p);
   EXPECT_EQ(filter.motion().T_B_N.q.coeffs(), T_B_N.q.coeffs());
@@ -172,7 +178,7 @@ TEST(NeighborFilter, AGraphPoseDrawsItInByTheirCovariances) {
   const Vector6d before = pose_error(pair, filter);
   const GaussianPose sharp{pair.truth(filter.stamp()).motion.T_B_N, 1e-8 * Matrix6d::Identity()};
 
-  EXPECT_EQ(filter.fuse_pose(sharp, kNoGate), Verdict::kFused);
+  EXPECT_EQ(filter.fuse_pose(sharp, kNoGate).verdict, Verdict::kFused);
 
   EXPECT_LT(pose_error(pair, filter).norm(), 0.01 * before.norm());
 }
@@ -211,7 +217,7 @@ TEST(PaperFilter, IsAtLeastAsAccurateAsTheRawPosesItIsFed) {
     for (Timestamp t{70ms}; t <= Timestamp{4s}; t += 20ms) {
       pair.sample_imus(t);
       filter.advance_to(t, pair.imu_B, pair.imu_N);
-      EXPECT_EQ(filter.fuse(regular(t), kNoGate), Verdict::kFused);
+      EXPECT_EQ(filter.fuse(regular(t), kNoGate).verdict, Verdict::kFused);
     }
     return pose_error(pair, filter);
   });

@@ -104,6 +104,40 @@ TEST(Estimator, GivesTheSameOutputsToTheBitForTheSameEvents) {
   expect_same_to_the_bit(a, b);
 }
 
+TEST(Estimator, TellsOfEveryMeasurementIfAskedAndGivesTheSamePoses) {
+  const std::vector<Event> events = two_seconds();
+  Estimator silent(two_robots());
+  Estimator open(two_robots());
+  open.keep_records();
+
+  std::vector<NeighborPose> poses;
+  Records records;
+  for (const Event& event : events) {
+    const Outputs outputs = open.step(event);
+    poses.insert(poses.end(), outputs.poses.begin(), outputs.poses.end());
+    for (const MeasurementRecord& one : outputs.records.measurements)
+      records.measurements.push_back(one);
+    for (const CalibrationRecord& one : outputs.records.calibrations)
+      records.calibrations.push_back(one);
+  }
+
+  expect_same_to_the_bit(poses, poses_of(silent, events));
+  const NeighborStatus status = open.status().neighbors.at(0);
+  std::array<VerdictCounts, kMeasurementKindCount> told{};
+  for (const MeasurementRecord& one : records.measurements) {
+    EXPECT_EQ(one.neighbor, kOther);
+    ++told.at(static_cast<std::size_t>(one.kind)).at(static_cast<std::size_t>(one.fusion.verdict));
+    if (one.kind == MeasurementKind::kRange && one.fusion.verdict == Verdict::kFused) {
+      EXPECT_EQ(one.fusion.dimension, 1U);
+      EXPECT_GT(one.fusion.sigma[0], 0.0);
+    }
+  }
+  EXPECT_EQ(told, status.measurements);
+  ASSERT_FALSE(records.calibrations.empty());
+  // The first belief is the prior.
+  EXPECT_NEAR(records.calibrations.front().sigma[0], ImuConfig{}.gyroscope_bias_sigma, 1e-3);
+}
+
 TEST(Estimator, CountsReportsOfUnknownSendersAndIgnoresThem) {
   Estimator estimator(two_robots());
   ReceivedReport stranger;

@@ -1,0 +1,194 @@
+#include "daemon/ctl/plot.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "daemon/ctl/part_file.hpp"
+#include "daemon/ctl/plot_pair.hpp"
+#include "daemon/ctl/pose_file.hpp"
+#include "daemon/ctl/record_file.hpp"
+#include "daemon/ctl/svg_chart.hpp"
+#include "daemon/ctl/swarm_manifest.hpp"
+#include "daemon/ctl/truth.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kStyle = R"(
+body{font:14px/1.45 system-ui,sans-serif;color:#222;background:#fff;max-width:1100px;margin:24px auto;padding:0 16px}
+h1{font-size:22px}h2{font-size:18px;border-bottom:1px solid #ddd;margin-top:40px}h3{font-size:15px;margin-bottom:4px}
+p{margin:4px 0 8px;color:#555}table{border-collapse:collapse;margin:12px 0}td,th{padding:3px 10px;text-align:right;border-bottom:1px solid #e4e4e4}
+td:first-child,th:first-child{text-align:left}th{font-weight:600;background:#f5f6f8}nav a{margin-right:14px;white-space:nowrap}a{color:#1f4e9c}
+.charts{display:flex;flex-wrap:wrap;gap:8px 16px}svg{max-width:100%;height:auto;font-family:inherit}
+.title{font-size:12px;font-weight:600}.tick{font-size:10px;fill:#444}.axis{font-size:11px;fill:#222}
+.grid{stroke:#e6e8ec;fill:none}.frame{fill:none;stroke:#9aa0a8}
+)";
+
+/// The names of a pair, as its files have them.
+struct PairName {
+  std::string observer;
+  std::string neighbor;
+};
+
+/// Every DIR/<observer>/<neighbor>.csv, in order.
+std::vector<PairName> pairs_in(const fs::path& results) {
+  std::vector<PairName> pairs;
+  std::error_code status;
+  for (const auto& dir : fs::directory_iterator(results, status)) {
+    if (!dir.is_directory(status)) continue;
+    for (const auto& file : fs::directory_iterator(dir.path(), status)) {
+      const fs::path stem = file.path().stem();
+      if (file.path().extension() == ".csv" && !stem.has_extension())
+        pairs.push_back({dir.path().filename().string(), stem.string()});
+    }
+  }
+  std::sort(pairs.begin(), pairs.end(), [](const PairName& a, const PairName& b) {
+    return std::tie(a.observer, a.neighbor) < std::tie(b.observer, b.neighbor);
+  });
+  return pairs;
+}
+
+struct Recording {
+  SwarmManifest manifest;
+  SwarmTruth truth;
+};
+
+Result<Recording> load_recording(const fs::path& swarm) {
+  auto manifest = load_manifest(swarm);
+  if (!manifest) return tl::unexpected(manifest.error());
+  auto truth = SwarmTruth::load(swarm, *manifest);
+  if (!truth) return tl::unexpected(truth.error());
+  return Recording{std::move(*manifest), std::move(*truth)};
+}
+
+Result<SwarmRobot> robot_named(const Recording& recording, const std::string& name,
+                               const PlotOptions& options) {
+  for (const SwarmRobot& robot : recording.manifest.robots)
+    if (robot.name == name) return robot;
+  return fail(ErrorCode::kNotFound, options.swarm.string() + ": no robot '" + name +
+                                        "', of which there are results in " +
+                                        options.results.string());
+}
+
+/// Records are there or not; what is there must be good.
+template <class Record>
+Result<std::vector<Record>> optional_records(Result<std::vector<Record>> records) {
+  if (!records && records.error().code == ErrorCode::kNotFound) return std::vector<Record>{};
+  return records;
+}
+
+Result<PairData> load_pair(const PlotOptions& options, const PairName& name) {
+  const fs::path stem = options.results / name.observer / name.neighbor;
+  const auto file = [&stem](const char* extension) { return fs::path(stem) += extension; };
+  auto poses = read_pose_file(file(".csv"), {});
+  if (!poses) return tl::unexpected(poses.error());
+  auto measurements = optional_records(read_innovation_file(file(".innovations.csv")));
+  if (!measurements) return tl::unexpected(measurements.error());
+  auto calibrations = optional_records(read_calibration_file(file(".calibration.csv")));
+  if (!calibrations) return tl::unexpected(calibrations.error());
+  return PairData{.observer = name.observer,
+                  .neighbor = name.neighbor,
+                  .poses = std::move(*poses),
+                  .measurements = std::move(*measurements),
+                  .calibrations = std::move(*calibrations),
+                  .truth = {},
+                  .seconds = {},
+                  .duration_s = 0.0};
+}
+
+/// Seconds of true time where it is known, else since the observer's first row.
+Result<void> put_on_time(const std::optional<Recording>& recording, const PlotOptions& options,
+                         PairData& pair) {
+  if (!recording) {
+    const Timestamp start = pair.poses.empty() ? Timestamp{} : pair.poses.front().stamp;
+    pair.seconds = [start](Timestamp t) { return to_seconds(t - start); };
+    pair.duration_s = pair.poses.empty() ? 1.0 : pair.seconds(pair.poses.back().stamp) + 0.02;
+    return {};
+  }
+  const auto observer = robot_named(*recording, pair.observer, options);
+  if (!observer) return tl::unexpected(observer.error());
+  const auto neighbor = robot_named(*recording, pair.neighbor, options);
+  if (!neighbor) return tl::unexpected(neighbor.error());
+  pair.truth = [&recording, B = observer->id, N = neighbor->id](Timestamp local) {
+    return recording->truth.relative(B, N, local);
+  };
+  pair.seconds = [clock = observer->clock](Timestamp local) { return clock.true_s(local); };
+  pair.duration_s = recording->manifest.duration_s;
+  return {};
+}
+
+std::string anchor(const PairData& pair) { return pair.observer + "-" + pair.neighbor; }
+
+std::string table_row(const std::vector<std::string>& cells, const char* tag,
+                      const std::string& link = {}) {
+  std::string row = "<tr>";
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::string text = xml_escaped(cells[i]);
+    const bool linked = i == 0 && !link.empty();
+    row += std::string("<") + tag + ">" +
+           (linked ? "<a href=\"#" + xml_escaped(link) + "\">" + text + "</a>" : text) + "</" +
+           tag + ">";
+  }
+  return row + "</tr>\n";
+}
+
+std::string page_of(const PlotOptions& options, const std::vector<PairData>& pairs) {
+  const std::string title = "CREPES replay " + xml_escaped(options.results.string());
+  std::string html = "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" +
+                     title + "</title>\n<style>" + std::string(kStyle) + "</style></head><body>\n";
+  html += "<h1>" + title + "</h1>\n";
+  html += options.swarm.empty()
+              ? "<p>Without truth: uncertainties only.</p>\n"
+              : "<p>Against the truth of " + xml_escaped(options.swarm.string()) + ".</p>\n";
+  html +=
+      "<p>B observes N. Position in B's axes, orientation as a rotation vector in N's. All rows "
+      "are scored, the first seconds included.</p>\n<nav>";
+  for (const PairData& pair : pairs) {
+    html += "<a href=\"#" + xml_escaped(anchor(pair)) + "\">" + xml_escaped(pair.observer) + " → " +
+            xml_escaped(pair.neighbor) + "</a>";
+  }
+  html += "</nav>\n<table>" + table_row(summary_header(), "th");
+  for (const PairData& pair : pairs) html += table_row(summary_row(pair), "td", anchor(pair));
+  html += "</table>\n";
+  for (const PairData& pair : pairs) {
+    html += "<h2 id=\"" + xml_escaped(anchor(pair)) + "\">" + xml_escaped(pair.neighbor) +
+            " as seen by " + xml_escaped(pair.observer) + "</h2>\n" + pair_charts(pair);
+  }
+  return html + "</body></html>\n";
+}
+
+}  // namespace
+
+Result<fs::path> plot(const PlotOptions& options) {
+  const std::vector<PairName> names = pairs_in(options.results);
+  if (names.empty()) {
+    return fail(ErrorCode::kNotFound,
+                options.results.string() + ": no <observer>/<neighbor>.csv of a replay");
+  }
+  std::optional<Recording> recording;
+  if (!options.swarm.empty()) {
+    auto loaded = load_recording(options.swarm);
+    if (!loaded) return tl::unexpected(loaded.error());
+    recording = std::move(*loaded);
+  }
+  std::vector<PairData> pairs;
+  for (const PairName& name : names) {
+    auto pair = load_pair(options, name);
+    if (!pair) return tl::unexpected(pair.error());
+    if (auto done = put_on_time(recording, options, *pair); !done)
+      return tl::unexpected(done.error());
+    pairs.push_back(std::move(*pair));
+  }
+  const fs::path out = options.out.empty() ? options.results / "plot.html" : options.out;
+  auto page = PartFile::create(out, page_of(options, pairs));
+  if (!page) return tl::unexpected(page.error());
+  return page->publish().map([&out] { return out; });
+}
+
+}  // namespace crepes
