@@ -132,15 +132,15 @@ std::string table_row(const std::vector<std::string>& cells, const char* tag,
     const std::string text = xml_escaped(cells[i]);
     const bool linked = i == 0 && !link.empty();
     row += std::string("<") + tag + ">" +
-           (linked ? "<a href=\"#" + xml_escaped(link) + "\">" + text + "</a>" : text) + "</" +
-           tag + ">";
+           (linked ? "<a href='#" + xml_escaped(link) + "'>" + text + "</a>" : text) + "</" + tag +
+           ">";
   }
   return row + "</tr>\n";
 }
 
 std::string page_of(const PlotOptions& options, const std::vector<PairData>& pairs) {
   const std::string title = "CREPES replay " + xml_escaped(options.results.string());
-  std::string html = "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" +
+  std::string html = "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><title>" +
                      title + "</title>\n<style>" + std::string(kStyle) + "</style></head><body>\n";
   html += "<h1>" + title + "</h1>\n";
   html += options.swarm.empty()
@@ -150,14 +150,14 @@ std::string page_of(const PlotOptions& options, const std::vector<PairData>& pai
       "<p>B observes N. Position in B's axes, orientation as a rotation vector in N's. All rows "
       "are scored, the first seconds included.</p>\n<nav>";
   for (const PairData& pair : pairs) {
-    html += "<a href=\"#" + xml_escaped(anchor(pair)) + "\">" + xml_escaped(pair.observer) + " → " +
+    html += "<a href='#" + xml_escaped(anchor(pair)) + "'>" + xml_escaped(pair.observer) + " → " +
             xml_escaped(pair.neighbor) + "</a>";
   }
   html += "</nav>\n<table>" + table_row(summary_header(), "th");
   for (const PairData& pair : pairs) html += table_row(summary_row(pair), "td", anchor(pair));
   html += "</table>\n";
   for (const PairData& pair : pairs) {
-    html += "<h2 id=\"" + xml_escaped(anchor(pair)) + "\">" + xml_escaped(pair.neighbor) +
+    html += "<h2 id='" + xml_escaped(anchor(pair)) + "'>" + xml_escaped(pair.neighbor) +
             " as seen by " + xml_escaped(pair.observer) + "</h2>\n" + pair_charts(pair);
   }
   return html + "</body></html>\n";
@@ -185,10 +185,11 @@ Result<fs::path> plot(const PlotOptions& options) {
       return tl::unexpected(done.error());
     pairs.push_back(std::move(*pair));
   }
-  const fs::path out = options.out.empty() ? options.results / "plot.html" : options.out;
+  fs::path out = options.out.empty() ? options.results / "plot.html" : options.out;
   auto page = PartFile::create(out, page_of(options, pairs));
   if (!page) return tl::unexpected(page.error());
-  return page->publish().map([&out] { return out; });
+  if (auto done = page->publish(); !done) return tl::unexpected(done.error());
+  return out;
 }
 
 }  // namespace crepes

@@ -27,7 +27,7 @@ std::string heading(const std::string& text, const std::string& remark = {}) {
 }
 
 std::string group(const std::vector<SvgChart>& charts) {
-  std::string html = "<div class=\"charts\">\n";
+  std::string html = "<div class='charts'>\n";
   for (const SvgChart& chart : charts) html += chart.svg() + "\n";
   return html + "</div>\n";
 }

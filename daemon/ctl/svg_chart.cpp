@@ -30,7 +30,7 @@ std::string px(double value) { return text_of("%.1f", value); }
 std::string tick_text(double value) { return text_of("%g", std::abs(value) < 1e-12 ? 0.0 : value); }
 
 std::string label(double x, double y, std::string_view attributes, std::string_view text) {
-  return "<text x=\"" + px(x) + "\" y=\"" + px(y) + "\" " + std::string(attributes) + ">" +
+  return "<text x='" + px(x) + "' y='" + px(y) + "' " + std::string(attributes) + ">" +
          xml_escaped(text) + "</text>";
 }
 
@@ -84,6 +84,9 @@ std::string xml_escaped(std::string_view text) {
         break;
       case '"':
         escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
         break;
       default:
         escaped += c;
@@ -184,12 +187,12 @@ std::string SvgChart::drawn(const Layer& layer, const Frame& frame) const {
   const Series& s = layer.series;
   switch (layer.kind) {
     case Kind::kLine:
-      out = "<path fill=\"none\" stroke=\"" + layer.color + "\" stroke-width=\"1.2\" d=\"";
+      out = "<path fill='none' stroke='" + layer.color + "' stroke-width='1.2' d='";
       for (std::size_t i = 0; i < s.size(); ++i)
         out += (i == 0 || s[i].x - s[i - 1].x > gap_ ? "M" : "L") + frame.at(s[i].x, s[i].y);
-      return out + "\"/>";
+      return out + "'/>";
     case Kind::kBand: {
-      out = "<path fill=\"" + layer.color + "\" fill-opacity=\"0.18\" d=\"";
+      out = "<path fill='" + layer.color + "' fill-opacity='0.18' d='";
       for (std::size_t first = 0; first < s.size();) {
         std::size_t last = first + 1;
         while (last < s.size() && s[last].x - s[last - 1].x <= gap_) ++last;
@@ -200,21 +203,20 @@ std::string SvgChart::drawn(const Layer& layer, const Frame& frame) const {
         out += "Z";
         first = last;
       }
-      return out + "\"/>";
+      return out + "'/>";
     }
     case Kind::kPoints:
       // Round caps of lines without length: a dot costs a dozen characters.
-      out = "<path fill=\"none\" stroke-linecap=\"round\" stroke-width=\"2.6\" stroke=\"" +
-            layer.color + "\" d=\"";
+      out = "<path fill='none' stroke-linecap='round' stroke-width='2.6' stroke='" + layer.color +
+            "' d='";
       for (const ChartPoint& point : s) out += "M" + frame.at(point.x, point.y) + "h0";
-      return out + "\"/>";
+      return out + "'/>";
     case Kind::kLevel:
-      return "<path stroke=\"" + layer.color + "\" stroke-dasharray=\"5 3\" d=\"M" +
-             frame.at(frame.x.low, layer.value) + "L" + frame.at(frame.x.high, layer.value) +
-             "\"/>";
+      return "<path stroke='" + layer.color + "' stroke-dasharray='5 3' d='M" +
+             frame.at(frame.x.low, layer.value) + "L" + frame.at(frame.x.high, layer.value) + "'/>";
     case Kind::kBars:
     case Kind::kSpans:
-      out = "<path fill=\"" + layer.color + "\" d=\"";
+      out = "<path fill='" + layer.color + "' d='";
       for (const ChartPoint& p : s) {
         const bool bars = layer.kind == Kind::kBars;
         const double right = bars ? p.x + layer.value : p.y;
@@ -223,47 +225,44 @@ std::string SvgChart::drawn(const Layer& layer, const Frame& frame) const {
         out += "M" + frame.at(p.x, low) + "L" + frame.at(p.x, high) + "L" + frame.at(right, high) +
                "L" + frame.at(right, low) + "Z";
       }
-      return out + "\"/>";
+      return out + "'/>";
   }
   return out;
 }
 
 std::string SvgChart::svg() const {
   const Frame f = frame();
-  std::string out = text_of("<svg viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" role=\"img\">",
+  std::string out = text_of("<svg viewBox='0 0 %d %d' width='%d' height='%d' role='img'>",
                             size_.width, size_.height, size_.width, size_.height);
-  out += label(kLeft, 13, "class=\"title\"", labels_.title);
+  out += label(kLeft, 13, "class='title'", labels_.title);
   const bool has_y = !labels_.y.empty();
   if (has_y) {
     for (const double tick : nice_ticks(f.y.low, f.y.high, 5)) {
       const std::string v = px(f.v(tick));
-      out += "<path class=\"grid\" d=\"M" + px(f.left) + "," + v + "H" + px(f.right) + "\"/>";
-      out +=
-          label(f.left - 5, f.v(tick) + 3.5, "class=\"tick\" text-anchor=\"end\"", tick_text(tick));
+      out += "<path class='grid' d='M" + px(f.left) + "," + v + "H" + px(f.right) + "'/>";
+      out += label(f.left - 5, f.v(tick) + 3.5, "class='tick' text-anchor='end'", tick_text(tick));
     }
-    out += "<text class=\"axis\" transform=\"translate(12," + px(0.5 * (f.top + f.bottom)) +
-           ") rotate(-90)\" text-anchor=\"middle\">" + xml_escaped(labels_.y) + "</text>";
+    out += "<text class='axis' transform='translate(12," + px(0.5 * (f.top + f.bottom)) +
+           ") rotate(-90)' text-anchor='middle'>" + xml_escaped(labels_.y) + "</text>";
   }
   for (const double tick : nice_ticks(f.x.low, f.x.high, 8)) {
     const std::string u = px(f.u(tick));
-    out += "<path class=\"grid\" d=\"M" + u + "," + px(f.top) + "V" + px(f.bottom) + "\"/>";
-    out +=
-        label(f.u(tick), f.bottom + 13, "class=\"tick\" text-anchor=\"middle\"", tick_text(tick));
+    out += "<path class='grid' d='M" + u + "," + px(f.top) + "V" + px(f.bottom) + "'/>";
+    out += label(f.u(tick), f.bottom + 13, "class='tick' text-anchor='middle'", tick_text(tick));
   }
-  out += label(0.5 * (f.left + f.right), size_.height - 5.0,
-               "class=\"axis\" text-anchor=\"middle\"", labels_.x);
+  out += label(0.5 * (f.left + f.right), size_.height - 5.0, "class='axis' text-anchor='middle'",
+               labels_.x);
   double legend = kLeft;
   for (const Layer& layer : layers_) {
     out += drawn(layer, f);
     if (layer.name.empty()) continue;
-    out += "<rect x=\"" + px(legend) + "\" y=\"" + px(kTop - 14) +
-           "\" width=\"9\" height=\"9\" fill=\"" + layer.color + "\"" +
-           (layer.kind == Kind::kBand ? " fill-opacity=\"0.35\"" : "") + "/>";
-    out += label(legend + 12, kTop - 6, "class=\"tick\"", layer.name);
+    out += "<rect x='" + px(legend) + "' y='" + px(kTop - 14) + "' width='9' height='9' fill='" +
+           layer.color + "'" + (layer.kind == Kind::kBand ? " fill-opacity='0.35'" : "") + "/>";
+    out += label(legend + 12, kTop - 6, "class='tick'", layer.name);
     legend += kLegendStep + 14.0 + 5.6 * static_cast<double>(layer.name.size());
   }
-  out += "<rect class=\"frame\" x=\"" + px(f.left) + "\" y=\"" + px(f.top) + "\" width=\"" +
-         px(f.right - f.left) + "\" height=\"" + px(f.bottom - f.top) + "\"/>";
+  out += "<rect class='frame' x='" + px(f.left) + "' y='" + px(f.top) + "' width='" +
+         px(f.right - f.left) + "' height='" + px(f.bottom - f.top) + "'/>";
   return out + "</svg>";
 }
 

@@ -110,11 +110,9 @@ std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
               {RobotId{3}, multirotor(waves(3), 3.5, kPi, 1.4)},
               {RobotId{4}, ground_robot(waves(4), 3.5, -kPi / 2.0)}};
     case SimScenario::kLongRange: {
-      Motion near = multirotor(waves(1), 0.0, kPi, 1.4);
       Motion far = multirotor(waves(2), 0.0, 0.0, 1.4);
-      near.x = {};
       far.x = excursion();
-      return {{RobotId{1}, near}, {RobotId{2}, far}};
+      return {{RobotId{1}, resting(waves(1), 0.0, 0.0, 1.2, 0.0)}, {RobotId{2}, far}};
     }
     case SimScenario::kAggressive:
       return {{RobotId{1}, hand_held(waves(1), 0.0)}, {RobotId{2}, hand_held(waves(2), kPi)}};

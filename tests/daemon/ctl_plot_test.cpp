@@ -51,7 +51,7 @@ TEST(SvgChart, BreaksALineAtAGapAndClipsPointsToItsBorder) {
 
   const std::string svg = chart.svg();
 
-  const auto line = svg.substr(svg.find("stroke=\"#123456\""), 120);
+  const auto line = svg.substr(svg.find("stroke='#123456'"), 120);
   EXPECT_EQ(count_of(line.substr(0, line.find("/>")), "M"), 2U) << line;
   EXPECT_NE(svg.find("a &lt; b"), std::string::npos);
   EXPECT_NE(svg.find(",38.0h0"), std::string::npos) << svg;  // at the upper border

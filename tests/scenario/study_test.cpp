@@ -6,8 +6,10 @@
 #include <filesystem>
 #include <numbers>
 
+#include "daemon/ctl/scratch_directory.hpp"
 #include "tests/study/imu_noise.hpp"
 #include "tests/study/simulated_swarm.hpp"
+#include "tests/study/swarm_writer.hpp"
 
 namespace crepes::study {
 namespace {
@@ -23,6 +25,12 @@ const Scenario& scenario(std::string_view name) {
   return *found;
 }
 
+Swarm load(const fs::path& dir) {
+  auto dataset = load_swarm(dir).value();
+  auto truth = SwarmTruth::load(dir, dataset.manifest).value();
+  return {std::move(dataset), std::move(truth)};
+}
+
 struct Published {
   const char* set;
   double position_m;
@@ -36,9 +44,7 @@ class PublishedBound : public testing::TestWithParam<Published> {};
 TEST_P(PublishedBound, IsReproduced) {
   const fs::path dir = fs::path(CREPES_SOURCE_DIR) / "../shared/datasets" / GetParam().set;
   if (!fs::exists(dir)) GTEST_SKIP() << "no recording at " << dir;
-  auto dataset = load_swarm(dir).value();
-  auto truth = SwarmTruth::load(dir, dataset.manifest).value();
-  const Swarm swarm{std::move(dataset), std::move(truth)};
+  const Swarm swarm = load(dir);
   const RobotId r1 = swarm.dataset.manifest.robots.front().id;
   double position2 = 0.0;
   double rotation2 = 0.0;
@@ -120,6 +126,21 @@ TEST(SimulatedSwarm, DrawsItsErrorsAnewFromEverySeed) {
 
   EXPECT_EQ(bias_of(1), bias_of(1));
   EXPECT_GT((bias_of(1) - bias_of(2)).norm(), 1e-3);
+}
+
+TEST(SimulatedSwarm, IsADataSetOnDiskWithTheSameBound) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const Swarm swarm = simulate_swarm(scenario("interference"), 1, 6.0);
+
+  ASSERT_TRUE(write_swarm(scratch.path(), swarm));
+
+  const Swarm read = load(scratch.path());
+  EXPECT_TRUE(read.dataset.faults.empty()) << read.dataset.faults.list().front();
+  EXPECT_EQ(read.dataset.robots.at(2).cameras.at(0).spots.size(),
+            swarm.dataset.robots.at(2).cameras.at(0).spots.size());
+  const PairBound there = pair_bound(read, RobotId{1}, RobotId{2}, {}, kAfter);
+  const PairBound here = pair_bound(swarm, RobotId{1}, RobotId{2}, {}, kAfter);
+  EXPECT_NEAR(there.position_rms_m / here.position_rms_m, 1.0, 1e-6);
 }
 
 /// The full study is a command; this is what a few seconds can show of it.

@@ -8,6 +8,7 @@
 
 #include "tests/study/simulated_swarm.hpp"
 #include "tests/study/study.hpp"
+#include "tests/study/swarm_writer.hpp"
 
 namespace crepes::study {
 namespace {
@@ -19,6 +20,7 @@ struct Options {
   int first_seed = 1;
   double duration_s = 40.0;
   double after_s = 5.0;
+  std::string write_dir;
 };
 
 Result<Swarm> load(const std::string& dir) {
@@ -69,7 +71,14 @@ int run(const Options& options) {
     if (!all && std::find(wanted.begin(), wanted.end(), scenario.name) == wanted.end()) continue;
     for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
       const std::string name = std::string(scenario.name) + " " + std::to_string(seed);
-      if (!study.add(simulate_swarm(scenario, seed, options.duration_s), name)) return 1;
+      const Swarm swarm = simulate_swarm(scenario, seed, options.duration_s);
+      const std::string dir =
+          options.write_dir + "/" + std::string(scenario.name) + "-" + std::to_string(seed);
+      if (!options.write_dir.empty() && !write_swarm(dir, swarm)) {
+        std::fprintf(stderr, "pair_study: %s: cannot be written\n", dir.c_str());
+        return 1;
+      }
+      if (!study.add(swarm, name)) return 1;
     }
     study.print();
   }
@@ -96,6 +105,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1.0, 600.0));
   app.add_option("--after", options.after_s, "seconds at the start that are not scored")
       ->capture_default_str();
+  app.add_option("--write", options.write_dir,
+                 "also leave every simulated swarm as a data set, DIR/<scenario>-<seed>");
   CLI11_PARSE(app, argc, argv);
   return crepes::study::run(options);
 }
