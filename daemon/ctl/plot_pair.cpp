@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr std::size_t kBuckets = 220;  // of a line; the page stays small
-constexpr std::size_t kMostPoints = 500;
+constexpr std::size_t kSlow = 100;     // points of a line that hardly moves
+constexpr std::size_t kMostPoints = 400;
 constexpr double kGap = 0.3;  // s; a longer one breaks a line
 constexpr std::array kAxes{"x", "y", "z"};
 constexpr std::array kAxisColors{"#c0392b", "#27853b", "#2464b4"};
@@ -103,16 +104,16 @@ SvgChart mode_strip(const PairData& pair) {
 
 SvgChart age_histogram(const PairData& pair) {
   constexpr double kBin = 1.0;  // ms
-  constexpr double kMost = 25.0;
-  Series bars;
-  for (double ms = 0.0; ms < kMost; ms += kBin) bars.push_back({ms, 0.0});
+  constexpr std::size_t kBins = 25;
+  Series bars(kBins);
+  for (std::size_t i = 0; i < kBins; ++i) bars[i].x = kBin * static_cast<double>(i);
   for (const NeighborPose& pose : pair.poses) {
     const double ms = 1e3 * to_seconds(pose.published - pose.stamp);
-    const double bin = std::clamp(std::floor(ms / kBin), 0.0, kMost / kBin - 1.0);
+    const double bin = std::clamp(std::floor(ms / kBin), 0.0, kBins - 1.0);
     bars[static_cast<std::size_t>(bin)].y += 1.0;
   }
   SvgChart chart({.title = "age of the state when it leaves", .x = "age [ms]", .y = "poses"});
-  chart.set_x_range(0.0, kMost);
+  chart.set_x_range(0.0, kBin * kBins);
   chart.add_bars(bars, 0.9 * kBin, "#6b8fc7");
   return chart;
 }
@@ -186,7 +187,7 @@ constexpr std::array kCalibrationGroups{
 
 SvgChart calibration_chart(const PairData& pair, const CalibrationGroup& group) {
   SvgChart chart({.title = group.title, .x = "time [s]", .y = group.unit_name});
-  chart.set_gap(kGap);
+  chart.set_gap(std::max(kGap, 3.0 * pair.duration_s / static_cast<double>(kSlow)));
   chart.set_x_range(0.0, pair.duration_s);
   for (std::size_t k = 0; k < group.count; ++k) {
     Series value;
@@ -196,8 +197,8 @@ SvgChart calibration_chart(const PairData& pair, const CalibrationGroup& group) 
       value.push_back({t, group.unit * record.value.at(group.first + k)});
       half_width.push_back({t, 3.0 * group.unit * record.sigma.at(group.first + k)});
     }
-    value = thinned(value, kBuckets);
-    half_width = thinned(half_width, kBuckets);
+    value = thinned(value, kSlow);
+    half_width = thinned(half_width, kSlow);
     chart.add_band(value, half_width, kAxisColors.at(k), {});
     chart.add_line(value, kAxisColors.at(k), group.count == 1 ? "estimate" : kAxes.at(k));
   }
@@ -207,6 +208,7 @@ SvgChart calibration_chart(const PairData& pair, const CalibrationGroup& group) 
 std::string calibration_charts(const PairData& pair) {
   if (pair.calibrations.empty()) return {};
   std::vector<SvgChart> charts;
+  charts.reserve(kCalibrationGroups.size());
   for (const CalibrationGroup& one : kCalibrationGroups)
     charts.push_back(calibration_chart(pair, one));
   return heading("What the filter believes of the sensors", "Bands are 3 sigma.") + group(charts);
