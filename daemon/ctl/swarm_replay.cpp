@@ -135,7 +135,7 @@ class SwarmReplay {
   void schedule_at(Timestamp local, std::size_t robot, Happening what) {
     schedule(robots_[robot].clock().true_s(local), robot, std::move(what));
   }
-  void schedule_recording(std::size_t robot);
+  void schedule_recording(std::size_t index);
   [[nodiscard]] Result<void> arrive(const Arrival& arrival);
   void step(const Arrival& arrival, const Event& event);
   void take(const Arrival& arrival, const Outputs& outputs);
