@@ -7,6 +7,9 @@
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <utility>
+
+#include "estimator/vision/camera_model.hpp"
 
 namespace crepes {
 namespace {
@@ -133,23 +136,6 @@ void check_members(const Config& config, Faults& faults) {
   }
 }
 
-/// Usenko, Demmel, Cremers 2018: xi in (-1, 1), alpha in [0, 1], positive focal lengths.
-void check_double_sphere(const std::string& key, const CameraConfig& camera, Faults& faults) {
-  const std::vector<double>& v = camera.intrinsics;
-  if (v.size() != 6) {
-    faults.push_back(
-        {key, "ds has 6 intrinsics (xi, alpha, fx, fy, cx, cy), not " + std::to_string(v.size())});
-    return;
-  }
-  if (!(v[0] > -1 && v[0] < 1)) faults.push_back({key, "xi, the first, is outside (-1, 1)"});
-  if (!(v[1] >= 0 && v[1] <= 1)) faults.push_back({key, "alpha, the second, is outside [0, 1]"});
-  if (!(v[2] > 0 && v[3] > 0))
-    faults.push_back({key, "fx and fy, third and fourth, must be positive"});
-  const auto [width, height] = camera.resolution;
-  if (width > 0 && !(v[4] >= 0 && v[4] <= width && v[5] >= 0 && v[5] <= height))
-    faults.push_back({key, "cx, cy, the last two, lie outside the resolution"});
-}
-
 void check_cameras(const std::vector<CameraConfig>& cameras, Faults& faults) {
   if (cameras.empty())
     faults.push_back({"cameras", "is empty: without a camera nobody is recognized"});
@@ -158,7 +144,8 @@ void check_cameras(const std::vector<CameraConfig>& cameras, Faults& faults) {
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const std::string key = item("cameras", i);
     check_name(key + ".name", cameras[i].name, faults);
-    check_double_sphere(key + ".intrinsics", cameras[i], faults);
+    for (CalibrationFault& fault : calibration_faults(cameras[i]))
+      faults.push_back({key + "." + std::string(fault.key), std::move(fault.reason)});
     if (cameras[i].driver == CameraDriver::kFolder && cameras[i].folder.empty())
       faults.push_back({key + ".folder", "driver folder needs the directory of the pictures"});
   }

@@ -27,7 +27,8 @@ std::string library_text(const CodebookOptions& options, const Codebook& book) {
                      "recognized.\nswarm:\n  members:\n";
   for (std::size_t i = 0; i < book.patterns.size(); ++i) {
     const std::string id = text_of(i + 1);
-    text += "    - {id: " + id + ", name: r" + id + ", pattern: \"" + book.patterns[i] + "\"}\n";
+    text.append("    - {id: ").append(id).append(", name: r").append(id);
+    text.append(", pattern: \"").append(book.patterns[i]).append("\"}\n");
   }
   return text;
 }

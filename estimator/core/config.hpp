@@ -85,8 +85,13 @@ struct SwarmConfig {
   }
 };
 
-enum class CameraModelKind : std::uint8_t { kDoubleSphere };
-inline constexpr std::array kCameraModels{Choice{"ds", CameraModelKind::kDoubleSphere}};
+enum class CameraModelKind : std::uint8_t { kDoubleSphere, kPinhole };
+inline constexpr std::array kCameraModels{Choice{"ds", CameraModelKind::kDoubleSphere},
+                                          Choice{"pinhole", CameraModelKind::kPinhole}};
+
+enum class DistortionModel : std::uint8_t { kNone, kEquidistant };
+inline constexpr std::array kDistortionModels{Choice{"none", DistortionModel::kNone},
+                                              Choice{"equidistant", DistortionModel::kEquidistant}};
 
 enum class CameraDriver : std::uint8_t { kNone, kFolder };
 inline constexpr std::array kCameraDrivers{Choice{"none", CameraDriver::kNone},
@@ -96,7 +101,9 @@ inline constexpr std::array kCameraDrivers{Choice{"none", CameraDriver::kNone},
 struct CameraConfig {
   std::string name;
   CameraModelKind camera_model = CameraModelKind::kDoubleSphere;
-  std::vector<double> intrinsics;  ///< ds: xi, alpha, fx, fy, cx, cy
+  std::vector<double> intrinsics;  ///< ds: xi, alpha, fx, fy, cx, cy; pinhole: fu, fv, pu, pv
+  DistortionModel distortion_model = DistortionModel::kNone;
+  std::vector<double> distortion_coeffs;  ///< equidistant (Kannala-Brandt): k1, k2, k3, k4
   std::array<int, 2> resolution{};
   double rate_hz = 200.0;
   Pose T_cam_imu;
@@ -107,9 +114,13 @@ struct CameraConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v.required("name", name, "camera name");
-    v.choice("camera_model", camera_model, kCameraModels, "projection model, Kalibr's name");
+    v.choice("camera_model", camera_model, kCameraModels,
+             "projection model, Kalibr's name; ds: Double Sphere");
     v.required("intrinsics", intrinsics,
-               "the camera's calibration, ds: [xi, alpha, fx, fy, cx, cy]");
+               "ds: [xi, alpha, fx, fy, cx, cy]; pinhole: [fu, fv, pu, pv]");
+    v.choice("distortion_model", distortion_model, kDistortionModels,
+             "ds: none; pinhole: equidistant (Kannala-Brandt)");
+    v.field("distortion_coeffs", distortion_coeffs, "equidistant: [k1, k2, k3, k4]; ds: []");
     v.required("resolution", resolution, Bounds{16, 2048}, "[width, height] in pixels");
     v.field("rate_hz", rate_hz, Bounds{10, 1000}, "frames a second");
     v.required("T_cam_imu", T_cam_imu, "4x4, maps body coordinates to camera coordinates (Kalibr)");

@@ -3,23 +3,35 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/result.hpp"
+#include "estimator/vision/double_sphere.hpp"
+#include "estimator/vision/kannala_brandt.hpp"
 
 namespace crepes {
 
-/// The Double Sphere model of one camera (Usenko, Demmel, Cremers 2018, "The Double Sphere Camera
-/// Model", section III-D). Pixel centers have integer coordinates.
+/// What is wrong with a camera's calibration: one of its keys, and why.
+struct CalibrationFault {
+  std::string_view key;
+  std::string reason;
+};
+[[nodiscard]] std::vector<CalibrationFault> calibration_faults(const CameraConfig& config);
+
+/// One camera: a lens, focal lengths and a sensor. Pixel centers have integer coordinates.
 class CameraModel {
  public:
   using ProjectionJacobian = Eigen::Matrix<double, 2, 3>;    ///< d uv / d p_C [px/m]
   using UnprojectionJacobian = Eigen::Matrix<double, 3, 2>;  ///< d u_C / d uv [1/px]
 
-  /// Refuses intrinsics of the wrong number, not finite or outside the model's domain.
+  /// Refuses a calibration that has faults.
   [[nodiscard]] static Result<CameraModel> from(const CameraConfig& config);
 
-  /// The pixel that sees `p_C`, which may lie beyond the image's border. Empty where the model has
+  /// The pixel that sees `p_C`, which may lie beyond the image's border. Empty where the lens has
   /// no unique projection: behind the camera and at its center.
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p_C,
                                                        ProjectionJacobian* J = nullptr) const;
@@ -35,16 +47,15 @@ class CameraModel {
   [[nodiscard]] int height() const { return height_; }
 
  private:
-  CameraModel() = default;
+  using Lens = std::variant<DoubleSphere, KannalaBrandt>;
 
-  double xi_ = 0.0;
-  double alpha_ = 0.0;
-  Eigen::Vector2d focal_ = Eigen::Vector2d::Ones();
-  Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
-  double min_cos_ = 0.0;      ///< -w2 of eq. 43: least z / |p_C| that projects
-  double max_radius2_ = 0.0;  ///< eq. 51: greatest r^2 that unprojects
-  int width_ = 0;
-  int height_ = 0;
+  CameraModel(const Lens& lens, const Eigen::Vector4d& pinhole, std::array<int, 2> resolution);
+
+  Lens lens_;
+  Eigen::Vector2d focal_;
+  Eigen::Vector2d center_;
+  int width_;
+  int height_;
 };
 
 }  // namespace crepes

@@ -118,8 +118,8 @@ TEST(ConfigFile, SaysThatACameraIsWithoutCalibration) {
       replaced("    intrinsics: [-0.17, 0.59, 316.7, 316.6, 637.6, 512.6]\n", "");
 
   EXPECT_EQ(faults_of(text),
-            "f:7: cameras[0].intrinsics: is missing: the camera's calibration, ds: [xi, alpha, fx, "
-            "fy, cx, cy]");
+            "f:7: cameras[0].intrinsics: is missing: ds: [xi, alpha, fx, fy, cx, cy]; pinhole: "
+            "[fu, fv, pu, pv]");
 }
 
 TEST(ConfigFile, RefusesIntrinsicsThatAreNoDoubleSphere) {
@@ -128,7 +128,38 @@ TEST(ConfigFile, RefusesIntrinsicsThatAreNoDoubleSphere) {
   EXPECT_EQ(faults_of(replaced("0.59", "1.59")),
             "f:8: cameras[0].intrinsics: alpha, the second, is outside [0, 1]");
   EXPECT_EQ(faults_of(replaced("637.6", "1637.6")),
-            "f:8: cameras[0].intrinsics: cx, cy, the last two, lie outside the resolution");
+            "f:8: cameras[0].intrinsics: the center, the last two, lies outside the resolution");
+}
+
+constexpr const char* kDoubleSphere = "    intrinsics: [-0.17, 0.59, 316.7, 316.6, 637.6, 512.6]";
+
+TEST(ConfigFile, ReadsACameraOfKannalaAndBrandtAsKalibrWritesIt) {
+  const CheckedConfig checked =
+      check_config_text(replaced(kDoubleSphere,
+                                 "    camera_model: pinhole\n"
+                                 "    intrinsics: [316.7, 316.6, 637.6, 512.6]\n"
+                                 "    distortion_model: equidistant\n"
+                                 "    distortion_coeffs: [-0.01, 0.02, -0.017, 0.004]"),
+                        "f");
+
+  ASSERT_TRUE(checked.faults.empty()) << to_string(checked.faults.front());
+  const CameraConfig& camera = checked.config.cameras.at(0);
+  EXPECT_EQ(camera.camera_model, CameraModelKind::kPinhole);
+  EXPECT_EQ(camera.distortion_coeffs, (std::vector<double>{-0.01, 0.02, -0.017, 0.004}));
+}
+
+TEST(ConfigFile, RefusesDistortionThatDoesNotFitTheCameraModel) {
+  EXPECT_EQ(faults_of(replaced(kDoubleSphere, std::string(kDoubleSphere) +
+                                                  "\n    distortion_model: equidistant\n"
+                                                  "    distortion_coeffs: [0, 0, 0, 0]")),
+            "f:9: cameras[0].distortion_model: ds has no distortion: must be none\n"
+            "f:10: cameras[0].distortion_coeffs: ds has no distortion: must be empty");
+  EXPECT_EQ(faults_of(replaced(kDoubleSphere,
+                               "    camera_model: pinhole\n    intrinsics: [316.7, 316.6, 637.6]\n"
+                               "    distortion_model: equidistant\n"
+                               "    distortion_coeffs: [0, 0, 0]")),
+            "f:9: cameras[0].intrinsics: pinhole has 4 intrinsics (fu, fv, pu, pv), not 3\n"
+            "f:11: cameras[0].distortion_coeffs: equidistant has 4 (k1, k2, k3, k4), not 3");
 }
 
 TEST(ConfigFile, RefusesATransformThatIsNotRigid) {
