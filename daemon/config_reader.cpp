@@ -122,6 +122,14 @@ std::string read_value(const YAML::Node& node, std::vector<double>& value) {
   });
 }
 
+std::string read_value(const YAML::Node& node, std::vector<std::array<int, 2>>& value) {
+  if (!node.IsSequence()) return expected("a list of pairs", node);
+  value.resize(node.size());
+  return read_numbers(node, "pairs", node.size(), [&](std::size_t i, const YAML::Node& element) {
+    return read_value(element, value[i]);
+  });
+}
+
 std::string read_value(const YAML::Node& node, std::vector<std::string>& value) {
   if (!node.IsSequence()) return expected("a list of texts", node);
   value.resize(node.size());

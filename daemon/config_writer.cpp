@@ -53,9 +53,9 @@ std::string yaml_of(const std::array<int, 2>& value) { return flow_list(value); 
 std::string yaml_of(const std::vector<double>& value) { return flow_list(value); }
 std::string yaml_of(const std::vector<std::string>& value) { return flow_list(value); }
 
-/// Rotations are rounded to 1e-12, so that quarter turns are written as such.
+/// Rotations are rounded to 1e-14, so that quarter turns are written as such.
 std::string yaml_of(const Pose& value) {
-  constexpr double kPerUnit = 1e12;
+  constexpr double kPerUnit = 1e14;
   Eigen::Matrix<double, 3, 4> top;
   top << ((value.R() * kPerUnit).array().round() / kPerUnit + 0.0).matrix(), value.p;
   std::string text = "[";

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <string>
@@ -14,6 +15,7 @@
 #include "daemon/ctl/codebook.hpp"
 #include "daemon/ctl/demo.hpp"
 #include "daemon/ctl/evaluate.hpp"
+#include "daemon/ctl/import_calibration.hpp"
 #include "daemon/ctl/live_screen.hpp"
 #include "daemon/ctl/plot.hpp"
 #include "daemon/ctl/swarm_replay.hpp"
@@ -200,6 +202,22 @@ void add_codebook(CLI::App& app, CodebookOptions& options, std::string& out, Com
   sub->callback([&] { command = [&] { return run_codebook(options, out); }; });
 }
 
+void add_import_calibration(CLI::App& app, std::vector<std::filesystem::path>& files,
+                            std::string& out, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "import-calibration",
+      "Read calibrations of Kalibr (camchain-imucam.yaml, imu.yaml) or Basalt (calibration.json) "
+      "and write the sections cameras and imu of a configuration");
+  sub->add_option("FILE", files, "calibration files; together one robot's")->required();
+  sub->add_option("--out", out, "file; left out: standard output");
+  sub->callback([&] {
+    command = [&] {
+      return import_calibration(files).and_then(
+          [&](const std::string& text) { return deliver(text, out); });
+    };
+  });
+}
+
 int run(int argc, char** argv) {
   CLI::App app("crepesctl: replay, score and watch relative localization of robot swarms");
   app.require_subcommand(1);
@@ -209,6 +227,7 @@ int run(int argc, char** argv) {
   WatchOptions watch_options;
   DemoOptions demo_options;
   CodebookOptions codebook_options;
+  std::vector<std::filesystem::path> calibration_files;
   std::string out;
   Command command;
   add_replay(app, replay_options, command);
@@ -218,6 +237,7 @@ int run(int argc, char** argv) {
   add_status(app, watch_options, command);
   add_demo(app, demo_options, command);
   add_codebook(app, codebook_options, out, command);
+  add_import_calibration(app, calibration_files, out, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -101,10 +101,11 @@ CameraModel::CameraModel(const Lens& lens, const Eigen::Vector4d& pinhole,
       height_(resolution[1]) {}
 
 Result<CameraModel> CameraModel::from(const CameraConfig& config) {
-  if (const Faults faults = calibration_faults(config); !faults.empty())
-    return fail(ErrorCode::kConfig, "camera " + config.name + ": " +
-                                        std::string(faults.front().key) + ": " +
-                                        faults.front().reason);
+  if (const Faults faults = calibration_faults(config); !faults.empty()) {
+    const CalibrationFault& first = faults.front();
+    return fail(ErrorCode::kConfig,
+                "camera " + config.name + ": " + std::string(first.key) + ": " + first.reason);
+  }
   const Lens lens = config.camera_model == CameraModelKind::kDoubleSphere
                         ? Lens(DoubleSphere(config.intrinsics[0], config.intrinsics[1]))
                         : Lens(kannala_brandt_of(config.distortion_coeffs));
@@ -122,7 +123,7 @@ std::optional<Eigen::Vector2d> CameraModel::project(const Eigen::Vector3d& p_C,
 std::optional<Eigen::Vector3d> CameraModel::unproject(const Eigen::Vector2d& uv,
                                                       UnprojectionJacobian* J) const {
   const Eigen::Vector2d m = (uv - center_).cwiseQuotient(focal_);
-  const auto u_C = std::visit([&](const auto& lens) { return lens.unproject(m, J); }, lens_);
+  auto u_C = std::visit([&](const auto& lens) { return lens.unproject(m, J); }, lens_);
   if (u_C && J != nullptr) *J = *J * focal_.cwiseInverse().asDiagonal();
   return u_C;
 }

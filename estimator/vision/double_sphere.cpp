@@ -23,7 +23,8 @@ double denominator_of(double alpha, double rho2, double c, double d2) {
 }
 
 /// r(theta) = sin / D,  D = alpha d2 + (1 - alpha) c,  c = xi + cos,  d2^2 = 1 + 2 xi cos + xi^2:
-/// equations 40 to 42 on the unit sphere, and the derivative by the angle theta.
+/// equations 40 to 42 on the unit sphere, and the derivative by the angle theta, by which D
+/// shrinks.
 struct Radius {
   double value;
   double slope;
@@ -33,8 +34,8 @@ Radius radius_at(double xi, double alpha, double theta) {
   const double cosine = std::cos(theta);
   const double d2 = std::sqrt(1.0 + 2.0 * xi * cosine + xi * xi);
   const double D = denominator_of(alpha, sine * sine, xi + cosine, d2);
-  const double minus_dD = sine * (alpha * xi / d2 + 1.0 - alpha);
-  return {sine / D, (cosine * D + sine * minus_dD) / (D * D)};
+  const double shrinkage = sine * (alpha * xi / d2 + 1.0 - alpha);
+  return {sine / D, (cosine * D + sine * shrinkage) / (D * D)};
 }
 
 }  // namespace

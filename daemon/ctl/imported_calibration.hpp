@@ -1,0 +1,41 @@
+/// What calibration files of other programs say, in our words.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/config_reader.hpp"
+#include "estimator/core/config.hpp"
+
+namespace crepes {
+
+struct ImportedCalibration {
+  std::vector<CameraConfig> cameras;
+  std::optional<ImuConfig> imu;  ///< the keys of Kalibr's imu.yaml alone
+};
+
+/// Kalibr's camchain.yaml, camchain-imucam.yaml and imu.yaml. Faults go to the log.
+[[nodiscard]] bool is_kalibr(const YAML::Node& root);
+[[nodiscard]] ImportedCalibration read_kalibr(const YAML::Node& root, ReadLog& log);
+
+/// Basalt's calibration.json. Faults go to the log.
+[[nodiscard]] bool is_basalt(const YAML::Node& root);
+[[nodiscard]] ImportedCalibration read_basalt(const YAML::Node& root, ReadLog& log);
+
+/// Reads a struct with a `visit()` from the mapping at `path`; keys that it does not list are
+/// ignored. Whether it is free of faults.
+template <class Item>
+[[nodiscard]] bool read_item(const YAML::Node& node, const std::string& path, Item& item,
+                             ReadLog& log) {
+  const std::size_t faults_before = log.faults.size();
+  log.lines.emplace(path, std::max(line_of(node), 1));
+  ConfigReader reader(node, path, log);
+  item.visit(reader);
+  reader.ignore_unknown_keys();
+  reader.finish();
+  return log.faults.size() == faults_before;
+}
+
+}  // namespace crepes

@@ -1,0 +1,95 @@
+#include <string>
+
+#include "daemon/ctl/imported_calibration.hpp"
+#include "estimator/vision/camera_model.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr std::size_t kMaxCameras = 16;
+
+/// One camera of a camchain; what is not listed (rostopic, cam_overlaps, ...) is ignored.
+struct KalibrCamera {
+  CameraConfig config;
+  std::optional<Pose> T_cam_imu;
+  std::optional<Pose> T_cn_cnm1;  ///< from the camera before to this one
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.choice("camera_model", config.camera_model, kCameraModels, "");
+    v.required("intrinsics", config.intrinsics, "projection parameters");
+    v.choice("distortion_model", config.distortion_model, kDistortionModels, "");
+    v.field("distortion_coeffs", config.distortion_coeffs, "");
+    v.required("resolution", config.resolution, "[width, height]");
+    v.field("T_cam_imu", T_cam_imu, "");
+    v.field("T_cn_cnm1", T_cn_cnm1, "");
+    v.field("timeshift_cam_imu", config.timeshift_cam_imu, "");
+  }
+};
+
+struct KalibrImu {
+  ImuConfig config;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.required("update_rate", config.update_rate, "samples a second");
+    v.required("accelerometer_noise_density", config.accelerometer_noise_density, "white noise");
+    v.required("gyroscope_noise_density", config.gyroscope_noise_density, "white noise");
+    v.required("accelerometer_random_walk", config.accelerometer_random_walk, "bias diffusion");
+    v.required("gyroscope_random_walk", config.gyroscope_random_walk, "bias diffusion");
+  }
+};
+
+std::string camera_name(std::size_t i) { return "cam" + std::to_string(i); }
+
+/// T_cam_imu, or by way of the camera before: T_cn_imu = T_cn_cnm1 T_cnm1_imu.
+std::optional<Pose> pose_of(const KalibrCamera& camera, const std::vector<CameraConfig>& before) {
+  if (camera.T_cam_imu) return camera.T_cam_imu;
+  if (!camera.T_cn_cnm1 || before.empty()) return std::nullopt;
+  return *camera.T_cn_cnm1 * before.back().T_cam_imu;
+}
+
+void read_cameras(const YAML::Node& root, std::vector<CameraConfig>& cameras, ReadLog& log) {
+  for (std::size_t i = 0; i < kMaxCameras && root[camera_name(i)]; ++i) {
+    const std::string name = camera_name(i);
+    KalibrCamera camera;
+    if (!read_item(root[name], name, camera, log)) return;
+    if (!log.lines.contains(name + ".camera_model")) {
+      log.fault(name, "camera_model is missing");
+      return;
+    }
+    camera.config.name = name;
+    for (CalibrationFault& fault : calibration_faults(camera.config))
+      log.fault(name + "." + std::string(fault.key), std::move(fault.reason));
+    const std::optional<Pose> T_cam_imu = pose_of(camera, cameras);
+    if (!T_cam_imu) {
+      log.fault(name,
+                "no T_cam_imu: a camchain of kalibr_calibrate_cameras does not know the IMU; "
+                "give that of kalibr_calibrate_imu_camera");
+      return;
+    }
+    camera.config.T_cam_imu = *T_cam_imu;
+    cameras.push_back(std::move(camera.config));
+  }
+}
+
+}  // namespace
+
+bool is_kalibr(const YAML::Node& root) {
+  return root.IsMap() && (root["cam0"] || root["imu0"] || root["update_rate"] ||
+                          root["accelerometer_noise_density"]);
+}
+
+ImportedCalibration read_kalibr(const YAML::Node& root, ReadLog& log) {
+  ImportedCalibration calibration;
+  if (root["cam0"]) read_cameras(root, calibration.cameras, log);
+  // What Kalibr takes is flat; what it writes has the same below imu0.
+  KalibrImu imu;
+  const bool is_flat = !root["imu0"];
+  if (is_flat && root["cam0"]) return calibration;
+  if (is_flat ? read_item(root, "", imu, log) : read_item(root["imu0"], "imu0", imu, log))
+    calibration.imu = imu.config;
+  return calibration;
+}
+
+}  // namespace crepes
