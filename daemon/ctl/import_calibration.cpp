@@ -23,21 +23,13 @@ ImportedCalibration read_root(const YAML::Node& root, ReadLog& log) {
   return {};
 }
 
-ImportedCalibration read_file(const std::filesystem::path& file, std::vector<ConfigFault>& faults) {
+ImportedCalibration read_text(const std::string& text, const std::string& file,
+                              std::vector<ConfigFault>& faults) {
   ReadLog log;
-  log.file = file.string();
+  log.file = file;
   ImportedCalibration calibration;
-  const Result<std::string> text = read_text_file(file);
-  if (!text) {
-    faults.push_back({log.file, 0, "", text.error().message});
-    return {};
-  }
-  if (text->size() > kMaxFileBytes) {
-    faults.push_back({log.file, 0, "", "is larger than 1 MiB"});
-    return {};
-  }
   try {
-    calibration = read_root(YAML::Load(*text), log);  // JSON is YAML, too
+    calibration = read_root(YAML::Load(text), log);  // JSON is YAML, too
   } catch (const YAML::Exception& e) {
     log.faults.push_back(
         {log.file, e.mark.is_null() ? 1 : e.mark.line + 1, "", "not YAML or JSON: " + e.msg});
@@ -111,7 +103,11 @@ Result<std::string> import_calibration(const std::vector<std::filesystem::path>&
   std::vector<ConfigFault> faults;
   std::string names;
   for (const std::filesystem::path& file : files) {
-    join(all, read_file(file, faults), file.string(), faults);
+    const Result<std::string> text = read_text_file(file);
+    if (!text) return tl::unexpected(text.error());
+    if (text->size() > kMaxFileBytes)
+      return fail(ErrorCode::kFormat, file.string() + ": is larger than 1 MiB");
+    join(all, read_text(*text, file.string(), faults), file.string(), faults);
     names += (names.empty() ? "" : ", ") + file.filename().string();
   }
   const std::string sections = sections_text(all);
