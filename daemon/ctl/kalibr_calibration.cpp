@@ -12,7 +12,7 @@ constexpr std::size_t kMaxCameras = 16;
 struct KalibrCamera {
   CameraConfig config;
   std::optional<Pose> T_cam_imu;
-  std::optional<Pose> T_cn_cnm1;  ///< from the camera before to this one
+  std::optional<Pose> T_cam_before;  ///< from the camera before to this one
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -22,7 +22,7 @@ struct KalibrCamera {
     v.field("distortion_coeffs", config.distortion_coeffs, "");
     v.required("resolution", config.resolution, "[width, height]");
     v.field("T_cam_imu", T_cam_imu, "");
-    v.field("T_cn_cnm1", T_cn_cnm1, "");
+    v.field("T_cn_cnm1", T_cam_before, "");
     v.field("timeshift_cam_imu", config.timeshift_cam_imu, "");
   }
 };
@@ -45,8 +45,8 @@ std::string camera_name(std::size_t i) { return "cam" + std::to_string(i); }
 /// T_cam_imu, or by way of the camera before: T_cn_imu = T_cn_cnm1 T_cnm1_imu.
 std::optional<Pose> pose_of(const KalibrCamera& camera, const std::vector<CameraConfig>& before) {
   if (camera.T_cam_imu) return camera.T_cam_imu;
-  if (!camera.T_cn_cnm1 || before.empty()) return std::nullopt;
-  return *camera.T_cn_cnm1 * before.back().T_cam_imu;
+  if (!camera.T_cam_before || before.empty()) return std::nullopt;
+  return *camera.T_cam_before * before.back().T_cam_imu;
 }
 
 void read_cameras(const YAML::Node& root, std::vector<CameraConfig>& cameras, ReadLog& log) {
