@@ -7,29 +7,35 @@
 namespace crepes {
 namespace {
 
-constexpr int kBlock = 256;  // pixels that are looked at together
-constexpr int kPart = 64;    // and within a block that is not all dark
-constexpr std::size_t kMaxRuns = 1U << 16U;
+// Pixels that are looked at together, and within those that are not all alike.
+constexpr int kBlock = 256;
+constexpr int kPart = 64;
+constexpr int kChunk = 16;
+constexpr std::size_t kUsualRuns = 1U << 12U;
+constexpr std::size_t kMaxRuns = 1U << 15U;
 
-template <class Pick>
-std::uint8_t extreme(const std::uint8_t* pixels, int count, std::uint8_t first, const Pick& pick) {
-  // In lanes, which compilers turn into vector instructions. `count` is a multiple of 16.
-  std::array<std::uint8_t, 16> best{};
-  best.fill(first);
-  for (int i = 0; i < count; i += 16)
-    for (std::size_t k = 0; k < best.size(); ++k) best[k] = pick(best[k], pixels[i + int(k)]);
+/// The extreme of kCount pixels by `pick`, in lanes that compilers turn into vector instructions:
+/// many lanes, or each would wait for the one before.
+template <int kCount, class Pick>
+std::uint8_t extreme(const std::uint8_t* pixels, const Pick& pick) {
+  constexpr std::size_t kLanes = std::min(kCount, 64);
+  std::array<std::uint8_t, kLanes> best{};
+  for (std::size_t k = 0; k < kLanes; ++k) best[k] = pixels[k];
+  for (int i = kLanes; i < kCount; i += static_cast<int>(kLanes))
+    for (std::size_t k = 0; k < kLanes; ++k)
+      best[k] = pick(best[k], pixels[i + static_cast<int>(k)]);
+  std::uint8_t first = best[0];
   for (const std::uint8_t b : best) first = pick(first, b);
   return first;
 }
 
+/// Whether no run begins or ends in these pixels.
 template <int kCount>
-std::uint8_t highest(const std::uint8_t* pixels) {
-  return extreme(pixels, kCount, 0, [](std::uint8_t a, std::uint8_t b) { return a > b ? a : b; });
-}
-
-template <int kCount>
-std::uint8_t lowest(const std::uint8_t* pixels) {
-  return extreme(pixels, kCount, 255, [](std::uint8_t a, std::uint8_t b) { return a < b ? a : b; });
+bool is_uniform(const std::uint8_t* pixels, bool is_open, std::uint8_t threshold) {
+  using Level = std::uint8_t;
+  return is_open
+             ? extreme<kCount>(pixels, [](Level a, Level b) { return a < b ? a : b; }) >= threshold
+             : extreme<kCount>(pixels, [](Level a, Level b) { return a > b ? a : b; }) < threshold;
 }
 
 /// Adds the pixels of a run. The weight is zero just below the threshold, so that pixels that come
@@ -88,10 +94,14 @@ void Blob::absorb(const Blob& part) {
   peak = std::max(peak, part.peak);
 }
 
+BlobFinder::BlobFinder() {
+  runs_.reserve(kUsualRuns);
+  blob_of_.reserve(kUsualRuns);
+}
+
 bool BlobFinder::find(const GrayImage& image, int threshold, double max_area,
                       std::vector<Blob>& blobs) {
   runs_.clear();
-  runs_.reserve(4096);
   for (int v = 0; v < image.height; ++v) {
     find_runs(image.row(v), v, image.width, static_cast<std::uint8_t>(threshold));
     if (runs_.size() > kMaxRuns) return false;
@@ -129,15 +139,19 @@ void BlobFinder::find_runs(const std::uint8_t* row, int v, int width, std::uint8
     }
     is_open = !is_open;
   };
+  const auto search_part = [&](int begin) {
+    if (is_uniform<kPart>(row + begin, is_open, threshold)) return;
+    for (int chunk = begin; chunk < begin + kPart; chunk += kChunk) {
+      if (is_uniform<kChunk>(row + chunk, is_open, threshold)) continue;
+      for (int u = chunk; u < chunk + kChunk; ++u) visit(u);
+    }
+  };
   int u = 0;
   for (; u + kBlock <= width; u += kBlock) {
-    if (!is_open && highest<kBlock>(row + u) < threshold) continue;
-    for (int part = u; part < u + kBlock; part += kPart) {
-      if (is_open ? lowest<kPart>(row + part) >= threshold : highest<kPart>(row + part) < threshold)
-        continue;
-      for (int i = part; i < part + kPart; ++i) visit(i);
-    }
+    if (is_uniform<kBlock>(row + u, is_open, threshold)) continue;
+    for (int part = u; part < u + kBlock; part += kPart) search_part(part);
   }
+  for (; u + kPart <= width; u += kPart) search_part(u);
   for (; u < width; ++u) visit(u);
 }
 

@@ -45,10 +45,11 @@ struct Blob {
   void absorb(const Blob& part);
 };
 
-/// Finds the blobs of one image after another. Allocates nothing once it has seen the worst of
-/// them; never more than a few megabytes.
+/// Finds the blobs of one image after another.
 class BlobFinder {
  public:
+  BlobFinder();
+
   /// Appends the 8-connected blobs of pixels at or above `threshold`, those of more than `max_area`
   /// pixels without their sums, ordered by first row. False, and nothing appended, when the image
   /// holds so many that it must be noise.

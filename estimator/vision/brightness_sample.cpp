@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 namespace crepes {
 namespace {
 
-constexpr int kRows = 32;
-constexpr int kStep = 5;  // columns; odd, against pictures that repeat every second or fourth
+constexpr int kRows = 16;
+constexpr int kStep = 9;  // columns; odd, against pictures that repeat every second or fourth
 constexpr int kMinContrast = 16;       // gray levels above the background
 constexpr double kSpreadSigmas = 8.0;  // noise above the background
 constexpr double kDarkShare = 0.05;    // a part smaller than this is no background
@@ -18,35 +17,33 @@ constexpr double kDarkShare = 0.05;    // a part smaller than this is no backgro
 
 BrightnessSample::BrightnessSample(const GrayImage& image) {
   // Two histograms: equal neighbors would wait for each other's increments.
+  std::array<int, 256> even{};
   std::array<int, 256> odd{};
   const int row_step = std::max(1, image.height / kRows);
   for (int v = row_step / 2; v < image.height; v += row_step) {
     const std::uint8_t* row = image.row(v);
     int u = 0;
     for (; u + kStep < image.width; u += 2 * kStep) {
-      ++histogram_[row[u]];
+      ++even[row[u]];
       ++odd[row[u + kStep]];
     }
-    if (u < image.width) ++histogram_[row[u]];
+    if (u < image.width) ++even[row[u]];
   }
-  for (std::size_t i = 0; i < histogram_.size(); ++i) histogram_[i] += odd[i];
+  for (std::size_t i = 0; i < even.size(); ++i) below_[i + 1] = below_[i] + even[i] + odd[i];
 }
 
-int BrightnessSample::count(int first, int last) const {
-  return std::accumulate(histogram_.begin() + first, histogram_.begin() + last + 1, 0);
-}
-
+/// The level that `part` of the samples from `first` to `last` are below.
 int BrightnessSample::quantile(int first, int last, double part) const {
-  const double wanted = part * count(first, last);
-  int below = 0;
-  int level = first;
-  while (level < last && below + histogram_[static_cast<std::size_t>(level)] <= wanted)
-    below += histogram_[static_cast<std::size_t>(level++)];
-  return level;
+  const int before = below_[static_cast<std::size_t>(first)];
+  const double wanted = before + part * (below_[static_cast<std::size_t>(last) + 1] - before);
+  const auto above =
+      std::upper_bound(below_.begin() + first + 1, below_.begin() + last + 1, wanted);
+  return std::min(last, static_cast<int>(above - below_.begin()) - 1);
 }
 
 double BrightnessSample::share_from(int level) const {
-  return static_cast<double>(count(level, 255)) / std::max(1, count(0, 255));
+  const int all = below_.back();
+  return static_cast<double>(all - below_[static_cast<std::size_t>(level)]) / std::max(1, all);
 }
 
 Background BrightnessSample::darkest_from(int level) const {

@@ -26,10 +26,9 @@ class BrightnessSample {
   [[nodiscard]] double share_from(int level) const;
 
  private:
-  [[nodiscard]] int count(int first, int last) const;
   [[nodiscard]] int quantile(int first, int last, double part) const;
 
-  std::array<int, 256> histogram_{};
+  std::array<int, 257> below_{};  ///< samples below each level
 };
 
 }  // namespace crepes

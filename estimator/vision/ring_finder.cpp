@@ -94,6 +94,14 @@ bool is_half_ring(const Light& a, const Light& b, const Light& c) {
 
 }  // namespace
 
+RingFinder::RingFinder() {
+  constexpr std::size_t kVotes = kNeighbors * (kNeighbors - 1) / 2;
+  order_.reserve(kMaxLights);
+  votes_.reserve(kMaxLights * kVotes);
+  is_taken_.reserve(kMaxLights);
+  rings_.reserve(kMaxLights / 3);
+}
+
 std::span<const Ring> RingFinder::find(std::span<const Light> lights) {
   rings_.clear();
   order_.clear();

@@ -36,6 +36,8 @@ struct Ring {
 /// where the three are parts of one blob, or bright, alike and closer together than robots fly.
 class RingFinder {
  public:
+  RingFinder();
+
   /// Valid until the next call. A light belongs to one ring at most.
   [[nodiscard]] std::span<const Ring> find(std::span<const Light> lights);
 

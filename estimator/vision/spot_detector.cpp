@@ -11,6 +11,7 @@ namespace {
 constexpr int kMaxSide = 2048;
 constexpr int kMaxSearches = 3;
 constexpr std::size_t kMaxBlobs = 4096;  // the brightest are kept
+constexpr std::size_t kUsualBlobs = 1024;
 constexpr std::size_t kMaxHuge = 64;
 constexpr double kLeastContrast = 0.5;  // of the threshold's: what rises less is no spot
 constexpr int kNoContrastLeft = 230;    // a background as bright hides every spot
@@ -37,6 +38,8 @@ PixelBox grown(const PixelBox& box, int by) {
   return {box.u_min - by, box.v_min - by, box.u_max + by, box.v_max + by};
 }
 
+double distance(double u, double v) { return std::sqrt(u * u + v * v); }
+
 Light light_of(const Blob& blob, std::uint32_t index) {
   return {blob.mean_u(), blob.mean_v(), blob.area, blob.peak, index};
 }
@@ -51,6 +54,19 @@ Exposure judge(const Detection& found, bool is_noise) {
 }
 
 }  // namespace
+
+SpotDetector::SpotDetector(const VisionConfig& config) : config_(config) {
+  blobs_.reserve(kUsualBlobs);
+  open_.reserve(kUsualBlobs);
+  is_open_.reserve(kUsualBlobs);
+  huge_.reserve(2 * kMaxHuge);
+  lights_.reserve(kUsualBlobs);
+  cores_.reserve(kUsualBlobs);
+  parent_.reserve(kUsualBlobs);
+  groups_.reserve(kUsualBlobs);
+  candidates_.reserve(kUsualBlobs);
+  spots_.reserve(kUsualBlobs);
+}
 
 Detection SpotDetector::detect(const GrayImage& image) {
   CREPES_EXPECT(image.pixels != nullptr && image.width > 0 && image.height > 0 &&
@@ -217,11 +233,11 @@ bool SpotDetector::is_half(const GrayImage& image, int threshold, const Ring& ri
   if (blob == lights_[members[1]].blob && blobs_[blob].elongation() < kLong) return false;
   double radius = 0.0;
   for (const std::uint32_t i : members)
-    radius = std::max(radius, std::hypot(lights_[i].u - ring.u, lights_[i].v - ring.v));
+    radius = std::max(radius, distance(lights_[i].u - ring.u, lights_[i].v - ring.v));
   for (std::uint32_t i = 0; i < lights_.size(); ++i) {
     if (std::find(members.begin(), members.end(), i) == members.end() &&
         (lights_[i].blob == blob ||
-         std::hypot(lights_[i].u - ring.u, lights_[i].v - ring.v) < kRim * radius))
+         distance(lights_[i].u - ring.u, lights_[i].v - ring.v) < kRim * radius))
       return false;
   }
   return std::all_of(members.begin(), members.end(), [&](std::uint32_t light) {
@@ -244,15 +260,14 @@ void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& 
   for (std::size_t k = 0; k < ring.count; ++k) {
     const Light& light = lights_[ring.lights[k]];
     take(light.blob);
-    radius = std::max(radius, std::hypot(light.u - ring.u, light.v - ring.v));
+    radius = std::max(radius, distance(light.u - ring.u, light.v - ring.v));
   }
   if (whole.area == 0) return;  // its blobs went into another ring
   for (const std::uint32_t i : open_)
-    if (std::hypot(blobs_[i].mean_u() - ring.u, blobs_[i].mean_v() - ring.v) < kRim * radius)
-      take(i);
+    if (distance(blobs_[i].mean_u() - ring.u, blobs_[i].mean_v() - ring.v) < kRim * radius) take(i);
   const Surroundings around = surroundings_of(image, whole.box, threshold);
   Spot spot = measure_spot(image, whole, threshold, around);
-  const double shift = std::hypot(spot.u_px - ring.u, spot.v_px - ring.v);
+  const double shift = distance(spot.u_px - ring.u, spot.v_px - ring.v);
   if (radius > kSmallRing || shift > kSmallRingShift * radius) {
     spot.u_px = ring.u;
     spot.v_px = ring.v;

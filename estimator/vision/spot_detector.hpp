@@ -49,7 +49,7 @@ struct Detection {
 /// memory is kept: nothing is allocated once it has seen a few frames.
 class SpotDetector {
  public:
-  explicit SpotDetector(const VisionConfig& config) : config_(config) {}
+  explicit SpotDetector(const VisionConfig& config);
 
   /// `image` must be at most 2048 x 2048.
   [[nodiscard]] Detection detect(const GrayImage& image);
