@@ -184,13 +184,6 @@ std::string_view diagnosis_of(const Detection& found) {
              : "";
 }
 
-void add(Rejected& sum, const Rejected& rejected) {
-  sum.hot += rejected.hot;
-  sum.huge += rejected.huge;
-  sum.faint += rejected.faint;
-  sum.surplus += rejected.surplus;
-}
-
 Totals counters_of(const Detection& found, const Rejected& rejected, std::uint64_t failures) {
   return {{"threshold", static_cast<std::uint64_t>(found.threshold)},
           {"hot", rejected.hot},
@@ -262,7 +255,7 @@ void run_vision(const VisionStage& stage, const StageContext& context,
         {frame->pixels.data(), frame->width, frame->height, std::ptrdiff_t{frame->width}});
     stage.sink(SpotFrame{frame->stamp, frame->camera, {found.spots.begin(), found.spots.end()}});
     health.count(1);
-    add(rejected, found.rejected);
+    rejected += found.rejected;
     failures += found.failure.empty() ? 0 : 1;
     if (health.is_due())
       health.tell(std::string(diagnosis_of(found)), counters_of(found, rejected, failures));

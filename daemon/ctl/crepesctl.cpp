@@ -18,6 +18,7 @@
 #include "daemon/ctl/import_calibration.hpp"
 #include "daemon/ctl/live_screen.hpp"
 #include "daemon/ctl/plot.hpp"
+#include "daemon/ctl/spots.hpp"
 #include "daemon/ctl/swarm_replay.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "daemon/ctl/watch.hpp"
@@ -218,12 +219,44 @@ void add_import_calibration(CLI::App& app, std::vector<std::filesystem::path>& f
   });
 }
 
+Result<void> run_spots(SpotsOptions options) {
+  const bool shows_progress = ::isatty(STDERR_FILENO) == 1;
+  options.on_text = [](const std::string& text) { print(text); };
+  options.on_fault = [](const std::string& fault) {
+    std::fprintf(stderr, "refused: %s\n", fault.c_str());
+  };
+  if (shows_progress)
+    options.on_progress = [](double share) { std::fprintf(stderr, "\r%3.0f %%\r", 100.0 * share); };
+  return inspect_spots(options).map([](const SpotsSummary&) {});
+}
+
+void add_spots(CLI::App& app, SpotsOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "spots",
+      "Show what the detector and the tracker find in recorded pictures: for setting up exposure "
+      "and threshold");
+  sub->add_option("IMAGE_OR_FOLDER", options.source,
+                  "a picture, a data set's cam0, or any folder of pictures")
+      ->required();
+  sub->add_option("--config", options.config, "crepesd.yaml of the robot that took them")
+      ->required();
+  sub->add_option("--out", options.out, "directory for PNGs with spots, robots and their trails");
+  sub->add_option("--every", options.every, "draw one picture in so many")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
+  sub->add_option("--camera", options.camera,
+                  "its name in the configuration; left out: that of cam0, cam1, ... in the path");
+  sub->add_flag("--json", options.json, "one JSON object a picture, and one for all");
+  sub->callback([&] { command = [&options] { return run_spots(options); }; });
+}
+
 int run(int argc, char** argv) {
   CLI::App app("crepesctl: replay, score and watch relative localization of robot swarms");
   app.require_subcommand(1);
   ReplayOptions replay_options;
   EvaluateOptions evaluate_options;
   PlotOptions plot_options;
+  SpotsOptions spots_options;
   WatchOptions watch_options;
   DemoOptions demo_options;
   CodebookOptions codebook_options;
@@ -238,6 +271,7 @@ int run(int argc, char** argv) {
   add_demo(app, demo_options, command);
   add_codebook(app, codebook_options, out, command);
   add_import_calibration(app, calibration_files, out, command);
+  add_spots(app, spots_options, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

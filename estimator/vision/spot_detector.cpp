@@ -55,6 +55,14 @@ Exposure judge(const Detection& found, bool is_noise) {
 
 }  // namespace
 
+Rejected& Rejected::operator+=(const Rejected& other) {
+  hot += other.hot;
+  huge += other.huge;
+  faint += other.faint;
+  surplus += other.surplus;
+  return *this;
+}
+
 SpotDetector::SpotDetector(const VisionConfig& config) : config_(config) {
   blobs_.reserve(kUsualBlobs);
   open_.reserve(kUsualBlobs);

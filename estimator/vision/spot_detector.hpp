@@ -30,6 +30,8 @@ struct Rejected {
   std::uint64_t huge = 0;     ///< larger than max_area_px2: the sun, windows
   std::uint64_t faint = 0;    ///< crests of a bright background
   std::uint64_t surplus = 0;  ///< more than max_spots
+
+  Rejected& operator+=(const Rejected& other);
 };
 
 struct Detection {
