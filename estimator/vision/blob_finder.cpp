@@ -20,7 +20,7 @@ template <int kCount, class Pick>
 std::uint8_t extreme(const std::uint8_t* pixels, const Pick& pick) {
   constexpr std::size_t kLanes = std::min(kCount, 64);
   std::array<std::uint8_t, kLanes> best{};
-  for (std::size_t k = 0; k < kLanes; ++k) best[k] = pixels[k];
+  std::copy_n(pixels, kLanes, best.begin());
   for (int i = kLanes; i < kCount; i += static_cast<int>(kLanes))
     for (std::size_t k = 0; k < kLanes; ++k)
       best[k] = pick(best[k], pixels[i + static_cast<int>(k)]);

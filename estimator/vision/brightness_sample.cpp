@@ -36,7 +36,7 @@ BrightnessSample::BrightnessSample(const GrayImage& image) {
 int BrightnessSample::quantile(int first, int last, double part) const {
   const int before = below_[static_cast<std::size_t>(first)];
   const double wanted = before + part * (below_[static_cast<std::size_t>(last) + 1] - before);
-  const auto above =
+  const auto* const above =
       std::upper_bound(below_.begin() + first + 1, below_.begin() + last + 1, wanted);
   return std::min(last, static_cast<int>(above - below_.begin()) - 1);
 }

@@ -43,7 +43,11 @@ double length(Vec a) { return std::sqrt(dot(a, a)); }
 /// The point nearest to the lines through opposite LEDs; (u, v) itself if there are less than two.
 Vec meeting_of_diagonals(std::span<const Light> lights, const Ring& ring) {
   constexpr double kOpposite = -0.94;  // cosine of 160 degrees
-  double a_uu = 0.0, a_uv = 0.0, a_vv = 0.0, b_u = 0.0, b_v = 0.0;
+  double a_uu = 0.0;
+  double a_uv = 0.0;
+  double a_vv = 0.0;
+  double b_u = 0.0;
+  double b_v = 0.0;
   int lines = 0;
   for (std::size_t i = 0; i < ring.count; ++i) {
     for (std::size_t j = i + 1; j < ring.count; ++j) {
@@ -180,7 +184,7 @@ void RingFinder::count_votes(std::span<const Light> lights, std::size_t seed_ind
         seed.radius > kSpacingTolerance * vote.radius || !is_free(vote))
       return;
     for (const std::uint32_t light : vote.lights) {
-      const auto end = ring.lights.begin() + static_cast<std::ptrdiff_t>(ring.count);
+      auto* const end = ring.lights.begin() + static_cast<std::ptrdiff_t>(ring.count);
       if (std::find(ring.lights.begin(), end, light) != end) continue;
       if (ring.count == ring.lights.size()) return;
       ring.lights[ring.count++] = light;

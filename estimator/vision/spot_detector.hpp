@@ -69,7 +69,7 @@ class SpotDetector {
   void sort_out(const GrayImage& image, int threshold, double contrast, Rejected& rejected);
   [[nodiscard]] bool is_news(const PixelBox& box) const;
   void find_lights(const GrayImage& image, int threshold);
-  void split(const GrayImage& image, std::uint32_t blob, int threshold);
+  void split(const GrayImage& image, std::uint32_t index, int threshold);
   [[nodiscard]] bool is_half(const GrayImage& image, int threshold, const Ring& ring) const;
   void take_ring(const GrayImage& image, int threshold, const Ring& ring);
   void join_fragments();

@@ -89,7 +89,7 @@ Pixels salt(unsigned seed) {
 Pixels sparse_salt(unsigned seed) {
   std::mt19937 random(seed);
   Pixels pixels(kWidth * kHeight);
-  for (auto& p : pixels) p = random() % 22U == 0 ? 255 : 4;
+  for (auto& p : pixels) p = random() % 50U == 0 ? 255 : 4;
   return pixels;
 }
 
