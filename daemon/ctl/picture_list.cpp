@@ -59,6 +59,7 @@ std::optional<std::vector<RecordedPicture>> by_name(const std::vector<fs::path>&
 
 std::vector<RecordedPicture> by_rate(const std::vector<fs::path>& files, double rate_hz) {
   std::vector<RecordedPicture> list;
+  list.reserve(files.size());
   for (const fs::path& file : files)
     list.push_back({Timestamp{from_seconds(static_cast<double>(list.size()) / rate_hz)}, file});
   return list;
