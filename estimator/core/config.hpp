@@ -210,7 +210,8 @@ struct VisionConfig {
   double bearing_sigma_px = 0.3;
   double gate_px = 8.0;
   double track_timeout_ms = 150.0;
-  double min_confidence = 0.99;
+  double max_wrong_id = 5e-7;
+  double max_false_robot = 1e-5;
   double flip_rate = 0.02;
 
   template <class Visitor>
@@ -226,8 +227,10 @@ struct VisionConfig {
     v.field("gate_px", gate_px, Bounds{1, 100},
             "a spot this far from a track's prediction is another's");
     v.field("track_timeout_ms", track_timeout_ms, Bounds{10, 5000}, "a track dark for longer ends");
-    v.field("min_confidence", min_confidence, Bounds{0.5, 0.999999},
-            "an ID below this is undecided");
+    v.field("max_wrong_id", max_wrong_id, Bounds{1e-12, 0.1},
+            "an ID is given once the probability of all others is below this");
+    v.field("max_false_robot", max_false_robot, Bounds{1e-12, 0.1},
+            "... and the probability that the source is no board, below this");
     v.field("flip_rate", flip_rate, Bounds{1e-6, 0.3},
             "part of the frames that show the wrong state");
   }

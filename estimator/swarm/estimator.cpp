@@ -68,7 +68,7 @@ std::vector<BlinkTracker> make_trackers(const Config& config) {
   for (const CameraConfig& camera : config.cameras) {
     const auto model = CameraModel::from(camera);
     CREPES_EXPECT(model.has_value(), "validated: every camera has a calibration");
-    trackers.emplace_back(camera, *model, config.vision, *library);
+    trackers.emplace_back(camera, *model, config.vision, *library, config.robot.id);
   }
   return trackers;
 }

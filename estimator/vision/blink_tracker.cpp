@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace crepes {
 namespace {
@@ -15,6 +16,10 @@ constexpr double kGyroSigma = 0.02;    // what the gyro leaves of own rotation [
 constexpr double kGateSigmas = 4.0;
 constexpr double kMergePx = 3.0;            // beside the blobs' own radii
 constexpr double kMinLitProbability = 0.3;  // below it, an absence was to be expected
+constexpr double kLitProbability = 0.8;     // of a track whose code is unknown
+constexpr double kNewSources = 0.1;         // a frame and steradian
+constexpr double kNewness = 2.0;            // a track of a few frames may have been a flicker
+constexpr double kLeastBenefit = 1e-3;      // what lies within the gate is not left alone
 
 /// Squared chord, which is the squared angle for directions that are near.
 double distance2(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -23,15 +28,16 @@ double distance2(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 
 }  // namespace
 
-BlinkTracker::BlinkTracker(const CameraConfig& camera, const CameraModel& model,
-                           const VisionConfig& config, const IdLibrary& library)
+BlinkTracker::BlinkTracker(const CameraConfig& camera, CameraModel model,
+                           const VisionConfig& config, const IdLibrary& library,
+                           std::optional<RobotId> own)
     : config_(config),
-      model_(model),
+      model_(std::move(model)),
       T_B_C_(camera.T_cam_imu.inverse()),
       T_C_B_(camera.T_cam_imu),
       timeshift_(from_seconds(camera.timeshift_cam_imu)),
-      timeout_(from_seconds(config.track_timeout_ms * 1e-3)),
-      decoder_(library, config.flip_rate, config.min_confidence) {
+      decoder_(library, config, camera.rate_hz, own) {
+  timeout_ = std::max(from_seconds(config.track_timeout_ms * 1e-3), decoder_.longest_dark());
   for (const auto& [id, code] : library.entries()) counts_.decodes[id] = 0;
 }
 
@@ -46,22 +52,20 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
     return {};
   }
   predict(stamp);
-  const std::vector<Sighting> sightings = look(frame);
-  const std::vector<Pairing> pairings = assign(sightings, stamp);
-
-  std::vector<bool> is_paired(tracks_.size(), false);
-  std::vector<bool> is_taken(sightings.size(), false);
-  for (const Pairing& pairing : pairings) is_paired[pairing.track] = true;
-  std::vector<bool> is_unclear(tracks_.size(), false);
+  look(frame);
+  const Pairing& sighting_of = assign(stamp);
 
   std::vector<Bearing> bearings;
-  for (const auto& [t, s, cost] : pairings) {
-    is_taken[s] = true;
+  unclear_.clear();
+  is_taken_.assign(sightings_.size(), false);
+  for (std::size_t t = 0; t < tracks_.size(); ++t) {
+    if (!sighting_of[t]) continue;
     Track& track = tracks_[t];
-    const Sighting& sighting = sightings[s];
-    if (hides_another(t, sighting, is_paired, stamp)) {
+    const Sighting& sighting = sightings_[*sighting_of[t]];
+    is_taken_[*sighting_of[t]] = true;
+    if (hides_another(t, sighting_of, stamp)) {
       ++counts_.merged_spots;
-      is_unclear[t] = true;
+      unclear_.push_back(*sighting_of[t]);
       track.last_seen = stamp;
       continue;
     }
@@ -74,59 +78,36 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
                           .sigma_rad = config_.bearing_sigma_px * sighting.px_rad});
     }
   }
-  for (std::size_t t = 0; t < is_paired.size(); ++t) {
-    if (!is_paired[t]) {
-      const bool is_hidden = std::any_of(pairings.begin(), pairings.end(), [&](const Pairing& p) {
-        return is_unclear[p.track] &&
-               distance2(sightings[p.sighting].u_B, tracks_[t].u_B) <
-                   std::pow(gate_of(tracks_[t]) + sightings[p.sighting].radius_rad, 2);
-      });
-      if (!is_hidden) observe_absence(tracks_[t], stamp);
-    }
-  }
+  for (std::size_t t = 0; t < tracks_.size(); ++t)
+    if (!sighting_of[t] && !is_hidden(tracks_[t])) observe_absence(tracks_[t], stamp);
   retire(stamp);
+  for (std::size_t s = 0; s < sightings_.size(); ++s)
+    if (!is_taken_[s]) begin(sightings_[s], stamp);
 
-  for (std::size_t s = 0; s < sightings.size(); ++s) {
-    if (is_taken[s]) continue;
-    if (tracks_.size() >= kMaxTracks) {
-      ++counts_.refused_spots;
-      continue;
-    }
-    Track track;
-    track.u_B = sightings[s].u_B;
-    track.variance = std::pow(config_.bearing_sigma_px * sightings[s].px_rad, 2);
-    track.rate_variance = kRateSigma * kRateSigma;
-    track.seen = sightings[s];
-    track.last_seen = stamp;
-    track.hits = 1;
-    decoder_.observe_lit(track.evidence, stamp);
-    tracks_.push_back(std::move(track));
-  }
   std::stable_sort(bearings.begin(), bearings.end(),
                    [](const Bearing& a, const Bearing& b) { return a.neighbor < b.neighbor; });
   return bearings;
 }
 
-std::vector<BlinkTracker::Sighting> BlinkTracker::look(const SpotFrame& frame) {
-  std::vector<Sighting> sightings;
+void BlinkTracker::look(const SpotFrame& frame) {
+  sightings_.clear();
   for (const Spot& spot : frame.spots) {
     CameraModel::UnprojectionJacobian J;
     const auto u_C = model_.unproject({spot.u_px, spot.v_px}, &J);
     if (!u_C || !(spot.area_px2 >= 0.0) || !std::isfinite(spot.area_px2) ||
-        sightings.size() >= static_cast<std::size_t>(config_.max_spots)) {
+        sightings_.size() >= static_cast<std::size_t>(config_.max_spots)) {
       ++counts_.refused_spots;
       continue;
     }
     const double px_rad = std::sqrt(0.5 * J.squaredNorm());
-    sightings.push_back({.u_B = T_B_C_.q * *u_C,
-                         .radius_rad = std::sqrt(spot.area_px2 / std::numbers::pi) * px_rad,
-                         .px_rad = px_rad});
+    sightings_.push_back({.u_B = T_B_C_.q * *u_C,
+                          .radius_rad = std::sqrt(spot.area_px2 / std::numbers::pi) * px_rad,
+                          .px_rad = px_rad});
   }
   // Not the order of the file but of the world: ties are broken alike for every order of spots.
-  std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
+  std::sort(sightings_.begin(), sightings_.end(), [](const Sighting& a, const Sighting& b) {
     return std::lexicographical_compare(a.u_B.begin(), a.u_B.end(), b.u_B.begin(), b.u_B.end());
   });
-  return sightings;
 }
 
 /// Constant rate beside own rotation:  u <- R_B1_B0 (u + rate dt), white acceleration of density
@@ -153,39 +134,32 @@ double BlinkTracker::gate_of(const Track& track) const {
                   2.0 * config_.gate_px * track.seen.px_rad);
 }
 
-/// Greedy, the likeliest pair first. The cost is the negative log likelihood of finding the track
-/// there and lit, so of two tracks the one that is surer of its place or due to be lit wins.
-std::vector<BlinkTracker::Pairing> BlinkTracker::assign(const std::vector<Sighting>& sightings,
-                                                        Timestamp stamp) const {
-  std::vector<Pairing> candidates;
+/// The pairing of the greatest likelihood. A pair's benefit is the log likelihood of finding the
+/// track there and lit, against a new source there and the track dark:
+///   ln p / (1 - p)  -  d^2 / 2 s^2  -  ln 2 pi s^2 n,   n new sources a steradian.
+const BlinkTracker::Pairing& BlinkTracker::assign(Timestamp stamp) {
+  pairs_.clear();
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     const Track& track = tracks_[t];
-    const double gate2 = std::pow(gate_of(track), 2);
-    const double lit = decoder_.lit_probability(track.evidence, stamp).value_or(0.8);
-    for (std::size_t s = 0; s < sightings.size(); ++s) {
-      const double d2 = distance2(track.u_B, sightings[s].u_B);
-      if (d2 > gate2) continue;
+    const double gate = gate_of(track);
+    const double lit = decoder_.lit_probability(track.evidence, stamp).value_or(kLitProbability);
+    const double log_odds = std::log(lit / (1.0 - lit));
+    const double newness = track.hits < kEstablishedHits ? kNewness : 0.0;
+    const auto first = std::partition_point(
+        sightings_.begin(), sightings_.end(),
+        [&](const Sighting& sighting) { return sighting.u_B.x() < track.u_B.x() - gate; });
+    for (auto it = first; it != sightings_.end() && it->u_B.x() <= track.u_B.x() + gate; ++it) {
+      const double d2 = distance2(track.u_B, it->u_B);
+      if (d2 > gate * gate) continue;
       // A pixel's worth of model error: maneuvers, and centers that shift as LEDs come and go.
-      const double variance = track.variance + std::pow(sightings[s].px_rad, 2);
-      const double newness = track.hits < kEstablishedHits ? 2.0 : 0.0;
-      candidates.push_back({t, s,
-                            0.5 * d2 / variance +
-                                std::log(variance / std::pow(sightings[s].px_rad, 2)) -
-                                std::log(lit) + newness});
+      const double variance = track.variance + it->px_rad * it->px_rad;
+      const double density = std::log(2.0 * std::numbers::pi * variance * kNewSources);
+      pairs_.push_back(
+          {t, static_cast<std::size_t>(it - sightings_.begin()),
+           std::max(kLeastBenefit, log_odds - 0.5 * d2 / variance - density - newness)});
     }
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Pairing& a, const Pairing& b) { return a.cost < b.cost; });
-  std::vector<bool> has_sighting(tracks_.size(), false);
-  std::vector<bool> has_track(sightings.size(), false);
-  std::vector<Pairing> pairings;
-  for (const Pairing& pairing : candidates) {
-    if (has_sighting[pairing.track] || has_track[pairing.sighting]) continue;
-    has_sighting[pairing.track] = true;
-    has_track[pairing.sighting] = true;
-    pairings.push_back(pairing);
-  }
-  return pairings;
+  return assignment_.solve(tracks_.size(), sightings_.size(), pairs_);
 }
 
 bool BlinkTracker::is_established(const Track& track, Timestamp stamp) const {
@@ -193,16 +167,25 @@ bool BlinkTracker::is_established(const Track& track, Timestamp stamp) const {
 }
 
 /// Whether another board that may well be lit has no spot of its own but could be in this one.
-bool BlinkTracker::hides_another(std::size_t track, const Sighting& sighting,
-                                 const std::vector<bool>& is_paired, Timestamp stamp) const {
-  for (std::size_t t = 0; t < is_paired.size(); ++t) {
+bool BlinkTracker::hides_another(std::size_t track, const Pairing& sighting_of,
+                                 Timestamp stamp) const {
+  const Sighting& sighting = sightings_[*sighting_of[track]];
+  for (std::size_t t = 0; t < tracks_.size(); ++t) {
     const Track& other = tracks_[t];
-    if (t == track || is_paired[t] || !is_established(other, stamp)) continue;
+    if (t == track || sighting_of[t] || !is_established(other, stamp)) continue;
     const double lit = decoder_.lit_probability(other.evidence, stamp).value_or(1.0);
     const double reach = other.seen.radius_rad + sighting.radius_rad + kMergePx * sighting.px_rad;
     if (lit > kMinLitProbability && distance2(other.u_B, sighting.u_B) < reach * reach) return true;
   }
   return false;
+}
+
+/// Whether it may be one of two boards in one spot.
+bool BlinkTracker::is_hidden(const Track& track) const {
+  return std::any_of(unclear_.begin(), unclear_.end(), [&](std::size_t s) {
+    const double reach = gate_of(track) + sightings_[s].radius_rad;
+    return distance2(sightings_[s].u_B, track.u_B) < reach * reach;
+  });
 }
 
 void BlinkTracker::observe(Track& track, const Sighting& sighting, Timestamp stamp) {
@@ -222,7 +205,8 @@ void BlinkTracker::observe(Track& track, const Sighting& sighting, Timestamp sta
   ++track.hits;
 
   const bool was_assigned = track.evidence.assigned.has_value();
-  decoder_.observe_lit(track.evidence, stamp);
+  decoder_.observe_lit(track.evidence, stamp, phases_);
+  decoder_.learn(track.evidence, stamp, phases_);
   if (!was_assigned && track.evidence.assigned)
     ++counts_.decodes[decoder_.code_id(*track.evidence.assigned)];
   if (was_assigned && !track.evidence.assigned) ++counts_.lost_ids;
@@ -234,11 +218,34 @@ void BlinkTracker::observe_absence(Track& track, Timestamp stamp) const {
 }
 
 void BlinkTracker::retire(Timestamp stamp) {
-  std::erase_if(tracks_, [&](const Track& track) {
+  std::erase_if(tracks_, [&](Track& track) {
     const Duration patience =
         track.hits < kEstablishedHits ? std::min(decoder_.longest_dark(), timeout_) : timeout_;
-    return stamp - track.last_seen > patience;
+    if (stamp - track.last_seen <= patience) return false;
+    track.evidence.forget();
+    retired_.push_back(std::move(track.evidence));
+    return true;
   });
+}
+
+void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp) {
+  if (tracks_.size() >= kMaxTracks) {
+    ++counts_.refused_spots;
+    return;
+  }
+  Track track;
+  if (!retired_.empty()) {
+    track.evidence = std::move(retired_.back());
+    retired_.pop_back();
+  }
+  track.u_B = sighting.u_B;
+  track.variance = std::pow(config_.bearing_sigma_px * sighting.px_rad, 2);
+  track.rate_variance = kRateSigma * kRateSigma;
+  track.seen = sighting;
+  track.last_seen = stamp;
+  track.hits = 1;
+  decoder_.observe_lit(track.evidence, stamp, phases_);
+  tracks_.push_back(std::move(track));
 }
 
 TrackerStatus BlinkTracker::status() const {

@@ -10,6 +10,7 @@
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
+#include "estimator/vision/assignment.hpp"
 #include "estimator/vision/camera_model.hpp"
 #include "estimator/vision/gyro_history.hpp"
 #include "estimator/vision/id_decoder.hpp"
@@ -34,8 +35,9 @@ struct TrackerStatus {
 /// the estimator to decide.
 class BlinkTracker {
  public:
-  BlinkTracker(const CameraConfig& camera, const CameraModel& model, const VisionConfig& config,
-               const IdLibrary& library);
+  /// `own`: the robot that looks. It sees itself in mirrors only, and is never reported.
+  BlinkTracker(const CameraConfig& camera, CameraModel model, const VisionConfig& config,
+               const IdLibrary& library, std::optional<RobotId> own = std::nullopt);
 
   void add_imu(const ImuSample& sample);
   /// The identified robots that are lit in `frame`, ordered by ID; stamps are body time.
@@ -60,23 +62,21 @@ class BlinkTracker {
     int hits = 0;
     BlinkEvidence evidence;
   };
-  struct Pairing {
-    std::size_t track = 0;
-    std::size_t sighting = 0;
-    double cost = 0.0;
-  };
+  /// The sighting of each track, for those that have one.
+  using Pairing = std::vector<std::optional<std::size_t>>;
 
-  [[nodiscard]] std::vector<Sighting> look(const SpotFrame& frame);
+  void look(const SpotFrame& frame);
   void predict(Timestamp stamp);
   [[nodiscard]] double gate_of(const Track& track) const;
-  [[nodiscard]] std::vector<Pairing> assign(const std::vector<Sighting>& sightings,
-                                            Timestamp stamp) const;
+  [[nodiscard]] const Pairing& assign(Timestamp stamp);
   [[nodiscard]] bool is_established(const Track& track, Timestamp stamp) const;
-  [[nodiscard]] bool hides_another(std::size_t track, const Sighting& sighting,
-                                   const std::vector<bool>& is_paired, Timestamp stamp) const;
+  [[nodiscard]] bool hides_another(std::size_t track, const Pairing& sighting_of,
+                                   Timestamp stamp) const;
+  [[nodiscard]] bool is_hidden(const Track& track) const;
   void observe(Track& track, const Sighting& sighting, Timestamp stamp);
   void observe_absence(Track& track, Timestamp stamp) const;
   void retire(Timestamp stamp);
+  void begin(const Sighting& sighting, Timestamp stamp);
 
   VisionConfig config_;
   CameraModel model_;
@@ -86,9 +86,18 @@ class BlinkTracker {
   Duration timeout_{};
   IdDecoder decoder_;
   GyroHistory gyro_;
+  PhaseMemory phases_;
   std::vector<Track> tracks_;
   std::optional<Timestamp> now_;
   TrackerStatus counts_;
+
+  // Of the frame at hand; kept for their memory.
+  Assignment assignment_;
+  std::vector<PairBenefit> pairs_;
+  std::vector<Sighting> sightings_;
+  std::vector<bool> is_taken_;          ///< sightings that have a track
+  std::vector<std::size_t> unclear_;    ///< sightings of two boards at once
+  std::vector<BlinkEvidence> retired_;  ///< for tracks to come
 };
 
 }  // namespace crepes

@@ -1,32 +1,49 @@
 #include "estimator/vision/id_decoder.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
-#include <span>
+
+#include "estimator/core/contract.hpp"
 
 namespace crepes {
 namespace {
 
 using namespace std::chrono_literals;
 
+// What a camera can tell.
 constexpr Duration kPhaseStep = 625us;
-constexpr Duration kEdgeBlur = 200us;  // exposure and switching
-constexpr Duration kDarkSlack = 12ms;  // the frames at both edges of a dark stretch
-constexpr Duration kMinCheck = 150ms;
 constexpr std::size_t kMaxPhases = 320;
-constexpr std::size_t kMaxWindow = 320;  // observations; keeps a score within 16 bits
-constexpr std::int64_t kWindowPeriods = 4;
+constexpr Duration kEdgeBlur = 500us;  // half an exposure: a frame that straddles an edge is open
+constexpr double kDarkFrames = 6.0;    // beside a dark stretch: its edges, and faults in a row
+constexpr std::int64_t kWindowPeriods = 6;
+constexpr Duration kMinWindow = 1200ms;
 constexpr double kMinFlipRate = 0.02;  // lower ones trust single frames too much
 constexpr double kMaxFlipRate = 0.3;
-// Neighboring frames share their faults, so each counts less than an independent one would.
-constexpr double kTemper = 0.75;
-constexpr double kUnitsPerNat = 32.0;
-constexpr double kClutterOdds = 10.0;  // sources that are no boards, for each that is one
-constexpr double kLostPosterior = 0.01;
+constexpr double kUnitsPerNat = 24.0;  // a full window of the least likely frames fits 16 bits
 
-// A board that matches may err in so many frames of a check; at twice as many the ID is lost.
-double tolerated(double frames) { return 1.0 + 0.06 * frames; }
+// What is likely beforehand.
+constexpr double kMarkovOdds = 1.0;    // sources that change like a Markov chain, for each board
+constexpr double kLampOdds = 1.0;      // lamps on the mains, for each board
+constexpr double kMirrorShare = 0.01;  // boards that are the observer's own in a mirror
+constexpr double kReturnOdds = 100.0;  // boards that were seen before and not now, on their beat
+constexpr double kImageOdds = 0.1;     // second images of boards that are in sight
+constexpr Duration kInSight = 200ms;   // a board that was seen later than that is
+constexpr double kMaxSkew = 200e-6;    // of two crystals against each other
+constexpr Duration kPhaseError = 2500us;
+constexpr Duration kOldPhase = 30s;  // an older one tells too little
+constexpr std::int64_t kPeriodsToLearn = 2;
+constexpr double kImpossible = -1e9;
+constexpr double kNegligible = 40.0;  // nats
+
+// When a track changes hands, a new board of the library differs in a fifth of its frames.
+constexpr double kOtherDiffers = 0.2;
+const double kDoubted = std::log(60.0);
+const double kLost = std::log(20'000.0);
+
+// Lamps on the mains flash twice a cycle; in steps of duty that a camera hardly tells apart.
+constexpr std::array kLampRatesHz{100.0, 120.0};
+constexpr std::array kLampDuties{0.1, 0.25, 0.4, 0.55, 0.7, 0.85};
 
 void add_scaled(std::span<std::int16_t> sum, const std::int16_t* weight, int sign) {
   if (sign > 0) {
@@ -44,6 +61,29 @@ std::int16_t highest(std::span<const std::int16_t> scores) {
   return best;
 }
 
+/// The log likelihood over all phases: the best score, by how many are within a nat of it.
+double log_mean(std::span<const std::int16_t> scores, std::int16_t top) {
+  const auto nearly = static_cast<std::int16_t>(top - kUnitsPerNat);
+  std::int16_t like_top = 0;
+  for (const std::int16_t s : scores)
+    like_top = static_cast<std::int16_t>(like_top + (s >= nearly ? 1 : 0));
+  return top / kUnitsPerNat +
+         std::log(static_cast<double>(like_top) / static_cast<double>(scores.size()));
+}
+
+/// The middle of the phases that fit best and equally well.
+std::size_t best_phase(std::span<const std::int16_t> scores) {
+  const std::size_t n = scores.size();
+  const std::int16_t top = highest(scores);
+  const auto at =
+      static_cast<std::size_t>(std::find(scores.begin(), scores.end(), top) - scores.begin());
+  std::size_t after = 0;
+  std::size_t before = 0;
+  while (after + 1 < n && scores[(at + after + 1) % n] == top) ++after;
+  while (before + after + 1 < n && scores[(at + n - before - 1) % n] == top) ++before;
+  return (at + n - before + (before + after) / 2) % n;
+}
+
 Duration longest_dark_of(const BlinkCode& code) {
   constexpr Duration kStep = 500us;
   Duration longest{};
@@ -57,48 +97,79 @@ Duration longest_dark_of(const BlinkCode& code) {
 
 }  // namespace
 
-IdDecoder::IdDecoder(const IdLibrary& library, double flip_rate, double min_confidence)
-    : flip_rate_(std::clamp(flip_rate, kMinFlipRate, kMaxFlipRate)),
-      min_confidence_(min_confidence) {
-  for (const auto& [id, blink] : library.entries()) {
-    Code code;
-    code.id = id;
-    code.period = blink.period();
-    code.check_span = code.period * ((kMinCheck - 1ns) / code.period + 1);
-    code.phases =
-        std::clamp<std::size_t>(static_cast<std::size_t>(code.period / kPhaseStep), 8, kMaxPhases);
-    code.first_score = score_count_;
-    score_count_ += code.phases;
+void BlinkEvidence::forget() {
+  window.clear();
+  pending_dark.clear();
+  score.clear();
+  last_lit.reset();
+  assigned.reset();
+  confidence = 0.0;
+  doubt = 0.0;
+}
 
-    const std::size_t steps = code.phases * kFine;
-    const auto step_count = static_cast<std::int64_t>(steps);
-    // A step stands for all phases and times that are rounded to it.
-    const Duration spread =
-        code.period * 3 / (4 * static_cast<std::int64_t>(code.phases)) + kEdgeBlur;
-    for (std::int64_t i = 0; i < step_count; ++i) {
-      const Duration t = code.period * (2 * i + 1) / (2 * step_count);
-      const double lit = blink.lit_fraction(t - spread, t + spread);
-      code.p_lit.push_back(flip_rate_ + (1.0 - 2.0 * flip_rate_) * lit);
+void PhaseMemory::learn(const CodeMatch& match, Timestamp now) {
+  if (match.code >= phases_.size()) phases_.resize(match.code + 1);
+  if (!phases_[match.code]) ++known_;
+  phases_[match.code] = {match.phase, now};
+}
+
+IdDecoder::IdDecoder(const IdLibrary& library, const VisionConfig& config, double rate_hz,
+                     std::optional<RobotId> own)
+    : max_wrong_id_(config.max_wrong_id), max_false_robot_(config.max_false_robot) {
+  const double flip_rate = std::clamp(config.flip_rate, kMinFlipRate, kMaxFlipRate);
+  boards_ = library.entries().size();
+  for (const auto& [id, blink] : library.entries()) {
+    if (id == own) own_ = codes_.size();
+    const double share = id == own ? kMirrorShare : 1.0;
+    add_code(make_code(blink, flip_rate), share / static_cast<double>(boards_));
+    codes_.back().id = id;
+    window_ = std::max({window_, kMinWindow, kWindowPeriods * blink.period()});
+    longest_dark_ = std::max(longest_dark_, longest_dark_of(blink));
+  }
+  longest_dark_ += from_seconds(kDarkFrames / rate_hz);
+  constexpr double kShare =
+      kLampOdds / static_cast<double>(kLampRatesHz.size() * kLampDuties.size());
+  for (const double hz : kLampRatesHz) {
+    for (const double duty : kLampDuties) {
+      const auto lamp = BlinkCode::from_duty(duty, from_seconds(1.0 / hz));
+      CREPES_EXPECT(lamp.has_value(), "duties of lamps lie between 0 and 1");
+      add_code(make_code(*lamp, flip_rate), kShare);
     }
-    for (const std::size_t lit : {0U, 1U}) {
-      for (std::size_t offset = 0; offset < kFine; ++offset) {
-        for (std::size_t k = 0; k < 2 * code.phases; ++k) {
-          const double p = code.p_lit[(k * kFine + offset) % steps];
-          code.weight[lit][offset].push_back(static_cast<std::int16_t>(
-              std::lround(kTemper * kUnitsPerNat * std::log(lit != 0 ? p : 1.0 - p))));
-        }
+  }
+}
+
+void IdDecoder::add_code(Code code, double share) {
+  code.first_score = score_count_;
+  score_count_ += code.phases;
+  code.log_share = std::log(share);
+  codes_.push_back(std::move(code));
+}
+
+IdDecoder::Code IdDecoder::make_code(const BlinkCode& blink, double flip_rate) {
+  Code code;
+  code.period = blink.period();
+  code.phases =
+      std::clamp<std::size_t>(static_cast<std::size_t>(code.period / kPhaseStep), 8, kMaxPhases);
+  const std::size_t steps = code.phases * kFine;
+  const auto step_count = static_cast<std::int64_t>(steps);
+  // A step stands for all phases and times that are rounded to it.
+  const Duration spread =
+      code.period * 3 / (4 * static_cast<std::int64_t>(code.phases)) + kEdgeBlur;
+  for (std::int64_t i = 0; i < step_count; ++i) {
+    const Duration t = code.period * (2 * i + 1) / (2 * step_count);
+    const double lit = blink.lit_fraction(t - spread, t + spread);
+    code.p_lit.push_back(flip_rate + (1.0 - 2.0 * flip_rate) * lit);
+  }
+  for (const std::size_t lit : {0U, 1U}) {
+    for (std::size_t offset = 0; offset < kFine; ++offset) {
+      for (std::size_t k = 0; k < 2 * code.phases; ++k) {
+        const double p = code.p_lit[(k * kFine + offset) % steps];
+        code.weight[lit][offset].push_back(static_cast<std::int16_t>(
+            std::lround(kUnitsPerNat * std::log(lit != 0 ? p : 1.0 - p))));
       }
     }
-    window_ = std::max(window_, std::max(kWindowPeriods * code.period, 2 * code.check_span));
-    longest_dark_ = std::max(longest_dark_, longest_dark_of(blink) + kDarkSlack);
-    codes_.push_back(std::move(code));
   }
-  log_gamma_half_.push_back(0.5 * std::log(std::numbers::pi));
-  log_factorial_.push_back(0.0);
-  for (std::size_t n = 1; n <= kMaxWindow; ++n) {
-    log_gamma_half_.push_back(log_gamma_half_.back() + std::log(static_cast<double>(n) - 0.5));
-    log_factorial_.push_back(log_factorial_.back() + std::log(static_cast<double>(n)));
-  }
+  return code;
 }
 
 std::size_t IdDecoder::fine_index(const Code& code, Timestamp stamp) {
@@ -111,9 +182,17 @@ double IdDecoder::p_lit(const Code& code, std::size_t phase, Timestamp stamp) {
   return code.p_lit[(fine_index(code, stamp) + phase * kFine) % code.p_lit.size()];
 }
 
-void IdDecoder::score(BlinkEvidence& evidence, BlinkEvidence::Observation observation,
-                      int sign) const {
-  for (const Code& code : codes_) {
+std::span<const std::int16_t> IdDecoder::scores_of(const BlinkEvidence& evidence,
+                                                   const Code& code) {
+  return std::span(evidence.score).subspan(code.first_score, code.phases);
+}
+
+/// Of all codes while it may be anyone, then of the one that it is.
+void IdDecoder::score(BlinkEvidence& evidence, BlinkObservation observation, int sign) const {
+  const std::size_t first = evidence.assigned ? evidence.assigned->code : 0;
+  const std::size_t end = evidence.assigned ? first + 1 : codes_.size();
+  for (std::size_t c = first; c < end; ++c) {
+    const Code& code = codes_[c];
     const std::size_t fine = fine_index(code, observation.stamp);
     const auto& weight = code.weight[observation.lit ? 1 : 0][fine % kFine];
     add_scaled(std::span(evidence.score).subspan(code.first_score, code.phases),
@@ -121,123 +200,127 @@ void IdDecoder::score(BlinkEvidence& evidence, BlinkEvidence::Observation observ
   }
 }
 
-void IdDecoder::add(BlinkEvidence& evidence, BlinkEvidence::Observation observation) const {
-  if (!evidence.window.empty())
-    ++evidence.steps[evidence.window.back().lit ? 1 : 0][observation.lit ? 1 : 0];
-  evidence.window.push_back(observation);
+void IdDecoder::add(BlinkEvidence& evidence, BlinkObservation observation) const {
+  forget_old(evidence, observation.stamp);
+  evidence.window.push(observation);
   if (!evidence.score.empty()) {
     score(evidence, observation, 1);
   } else if (!observation.lit) {
     // A source that was never dark needs no scores: most lamps and reflections end here.
     evidence.score.assign(score_count_, 0);
-    for (const auto& past : evidence.window) score(evidence, past, 1);
+    for (std::size_t i = 0; i < evidence.window.size(); ++i) score(evidence, evidence.window[i], 1);
   }
+  if (evidence.assigned) confirm(evidence, observation);
 }
 
 void IdDecoder::forget_old(BlinkEvidence& evidence, Timestamp now) const {
   auto& window = evidence.window;
-  while (!window.empty() && (window.front().stamp < now - window_ || window.size() >= kMaxWindow)) {
-    if (!evidence.score.empty()) score(evidence, window.front(), -1);
-    if (window.size() > 1) --evidence.steps[window[0].lit ? 1 : 0][window[1].lit ? 1 : 0];
-    window.pop_front();
+  while (window.is_full() || (window.size() > 0 && window[0].stamp < now - window_)) {
+    if (!evidence.score.empty()) score(evidence, window[0], -1);
+    window.pop();
   }
 }
 
 void IdDecoder::observe_dark(BlinkEvidence& evidence, Timestamp stamp) const {
   if (evidence.last_lit && stamp - *evidence.last_lit <= longest_dark_ &&
-      evidence.pending_dark.size() < kMaxWindow / 2)
+      evidence.pending_dark.size() < BlinkWindow::kCapacity / 2)
     evidence.pending_dark.push_back(stamp);
 }
 
-void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp) const {
+void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp,
+                            const PhaseMemory& known) const {
   if (!evidence.last_lit || stamp - *evidence.last_lit > longest_dark_) {
-    evidence.resumed = stamp;  // it was away: what happened meanwhile says nothing about its code
+    // It was away: what comes back in its place may be another.
     evidence.pending_dark.clear();
+    if (evidence.assigned) evidence.forget();
   }
   evidence.last_lit = stamp;
-  for (const Timestamp dark : evidence.pending_dark) {
-    forget_old(evidence, dark);
-    add(evidence, {dark, false});
-  }
+  for (const Timestamp dark : evidence.pending_dark) add(evidence, {dark, false});
   evidence.pending_dark.clear();
-  forget_old(evidence, stamp);
   add(evidence, {stamp, true});
-  if (!evidence.score.empty()) judge(evidence, stamp);
-}
-
-/// Krichevsky-Trofimov: the likelihood of the window's steps under a two-state Markov chain, its
-/// rates integrated out,  ln prod_s Gamma(a+1/2) Gamma(b+1/2) / (pi (a+b)!).
-double IdDecoder::log_markov(const BlinkEvidence& evidence) const {
-  double sum = 0.0;
-  for (const auto& [dark, lit] : evidence.steps) {
-    const auto a = static_cast<std::size_t>(dark);
-    const auto b = static_cast<std::size_t>(lit);
-    sum += log_gamma_half_[a] + log_gamma_half_[b] - log_factorial_[a + b] -
-           std::log(std::numbers::pi);
-  }
-  return sum;
-}
-
-IdDecoder::Best IdDecoder::best_of(const BlinkEvidence& evidence) const {
-  Best best;
-  double best_log = -1e9;
-  double total = std::exp(-1e3);  // relative to best_log
-  const auto include = [&](double log_likelihood) {
-    if (log_likelihood > best_log) {
-      total = total * std::exp(best_log - log_likelihood) + 1.0;
-      best_log = log_likelihood;
-      return true;
-    }
-    total += std::exp(log_likelihood - best_log);
-    return false;
-  };
-  for (std::size_t c = 0; c < codes_.size(); ++c) {
-    const std::span<const std::int16_t> scores =
-        std::span(evidence.score).subspan(codes_[c].first_score, codes_[c].phases);
-    const std::int16_t top = highest(scores);
-    // About eight steps of phase look alike to a camera; the others are as likely beforehand.
-    const double prior = 8.0 / static_cast<double>(codes_[c].phases * codes_.size());
-    if (include(top / kUnitsPerNat + std::log(prior))) {
-      // The middle of the phases that fit equally well.
-      const auto first = std::find(scores.begin(), scores.end(), top);
-      const auto last = std::find_if(first, scores.end(), [top](auto s) { return s != top; });
-      best.match = {c, static_cast<std::size_t>((first - scores.begin()) + (last - first) / 2)};
-    }
-  }
-  const double board_log = best_log;
-  include(kTemper * log_markov(evidence) + std::log(kClutterOdds));
-  best.posterior = std::exp(board_log - best_log) / total;
-  return best;
-}
-
-void IdDecoder::judge(BlinkEvidence& evidence, Timestamp now) const {
-  const Best best = best_of(evidence);
-  const bool is_sure = best.posterior >= min_confidence_;
+  if (evidence.score.empty()) return;
   if (!evidence.assigned) {
-    if (!is_sure || now - evidence.window.front().stamp < codes_[best.match.code].check_span)
-      return;
-    evidence.assigned = best.match;
+    decide(evidence, stamp, known);
+  } else if (evidence.doubt > kLost) {
+    evidence.forget();
+    evidence.last_lit = stamp;
+  } else {
+    const Code& code = codes_[evidence.assigned->code];
+    evidence.assigned->phase = best_phase(scores_of(evidence, code));  // its clock drifts
   }
-  const bool is_same = best.match.code == evidence.assigned->code;
-  if (is_same) evidence.assigned = best.match;  // its clock drifts
-  evidence.confidence = is_same ? best.posterior : 1.0 - best.posterior;
+}
 
-  const Code& code = codes_[evidence.assigned->code];
-  double frames = 0.0;
-  double mismatches = 0.0;
-  for (auto it = evidence.window.rbegin();
-       it != evidence.window.rend() && it->stamp > now - code.check_span; ++it) {
-    const double lit = p_lit(code, evidence.assigned->phase, it->stamp);
-    frames += 1.0;
-    if ((it->lit ? lit : 1.0 - lit) < 0.25) mismatches += 1.0;
+void IdDecoder::learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const {
+  if (!is_identified(evidence)) return;
+  const Duration enough = kPeriodsToLearn * codes_[evidence.assigned->code].period;
+  if (now - evidence.assigned_since >= enough) known.learn(*evidence.assigned, now);
+}
+
+/// Log likelihood and prior of a code that goes on where it was when it was seen before.
+double IdDecoder::log_known(const BlinkEvidence& evidence, std::size_t code, Timestamp now,
+                            const PhaseMemory& known) const {
+  const auto phase = known.of(code);
+  if (!phase || now - phase->learned > kOldPhase) return kImpossible;
+  const auto scores = scores_of(evidence, codes_[code]);
+  const auto n = static_cast<std::int64_t>(scores.size());
+  const Duration error = kPhaseError + from_seconds(kMaxSkew * to_seconds(now - phase->learned));
+  const std::int64_t reach = error * n / codes_[code].period + 1;
+  if (2 * reach >= n) return kImpossible;
+  double likelihood = 0.0;
+  for (std::int64_t i = -reach; i <= reach; ++i) {
+    const std::int64_t at = (static_cast<std::int64_t>(phase->phase) + i + n) % n;
+    likelihood +=
+        std::exp((scores[static_cast<std::size_t>(at)] - scores[phase->phase]) / kUnitsPerNat);
   }
-  evidence.is_doubted = mismatches > tolerated(frames) || evidence.confidence < 0.5 ||
-                        now - evidence.resumed < code.check_span;
-  if (mismatches > 2.0 * tolerated(frames) || evidence.confidence < kLostPosterior) {
-    evidence = BlinkEvidence{};
-    evidence.last_lit = now;
-    evidence.resumed = now;
+  const double odds = now - phase->learned > kInSight ? kReturnOdds : kImageOdds;
+  const auto others = static_cast<double>(known.size() * static_cast<std::size_t>(2 * reach + 1));
+  return scores[phase->phase] / kUnitsPerNat + std::log(likelihood * odds / others) +
+         (own_ == code ? std::log(kMirrorShare) : 0.0);
+}
+
+void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory& known) const {
+  double best_log = kImpossible;
+  const auto anywhere = [&](const Code& code) {
+    const auto scores = scores_of(evidence, code);
+    const std::int16_t top = highest(scores);
+    const double at_most = top / kUnitsPerNat + code.log_share;
+    return at_most < best_log - kNegligible ? kImpossible : log_mean(scores, top) + code.log_share;
+  };
+  double others = 0.0;  // relative to the best
+  std::size_t best = 0;
+  for (std::size_t c = 0; c < boards_; ++c) {
+    const double log_c = std::max(anywhere(codes_[c]), log_known(evidence, c, now, known));
+    if (log_c > best_log) {
+      others = (others + 1.0) * std::exp(best_log - log_c);
+      best_log = log_c;
+      best = c;
+    } else {
+      others += std::exp(log_c - best_log);
+    }
   }
+  double clutter = kMarkovOdds * std::exp(markov_.log_of(evidence.window.steps()) - best_log);
+  for (std::size_t c = boards_; c < codes_.size(); ++c)
+    clutter += std::exp(anywhere(codes_[c]) - best_log);
+  if (best == own_ || others > max_wrong_id_ || clutter > max_false_robot_) return;
+  evidence.assigned = {best, best_phase(scores_of(evidence, codes_[best]))};
+  evidence.assigned_since = now;
+  evidence.confidence = 1.0 / (1.0 + others + clutter);
+  evidence.doubt = 0.0;
+}
+
+/// Page's test: the log odds that another board blinks here since some frame in the past,
+///   g <- max(0, g + ln(((1 - d) p + d (1 - p)) / p)),
+/// p the likelihood of the frame under the ID and d how often another differs.
+void IdDecoder::confirm(BlinkEvidence& evidence, BlinkObservation observation) const {
+  const double lit =
+      p_lit(codes_[evidence.assigned->code], evidence.assigned->phase, observation.stamp);
+  const double p = observation.lit ? lit : 1.0 - lit;
+  evidence.doubt = std::max(
+      0.0, evidence.doubt + std::log(((1.0 - kOtherDiffers) * p + kOtherDiffers * (1.0 - p)) / p));
+}
+
+bool IdDecoder::is_identified(const BlinkEvidence& evidence) {
+  return evidence.assigned && evidence.doubt <= kDoubted;
 }
 
 std::optional<RobotId> IdDecoder::id_of(const BlinkEvidence& evidence) const {

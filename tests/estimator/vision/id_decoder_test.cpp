@@ -83,7 +83,7 @@ Light board(const BlinkCode& code, Duration phase, double ppm) {
 
 TEST(IdDecoder, NamesEveryBoardAtEveryPhaseAndRateAndNeverAnother) {
   const IdLibrary library = *IdLibrary::from(four());
-  const IdDecoder decoder(library, 0.02, 0.99);
+  const IdDecoder decoder(library, VisionConfig{}, 120.0);
   std::mt19937 random(3);
   std::vector<double> delays_ms;
 
@@ -107,7 +107,7 @@ TEST(IdDecoder, NamesEveryBoardAtEveryPhaseAndRateAndNeverAnother) {
 
 TEST(IdDecoder, IsNeverWrongWithFlippedAndDroppedFrames) {
   const IdLibrary library = *IdLibrary::from(four());
-  const IdDecoder decoder(library, 0.02, 0.99);
+  const IdDecoder decoder(library, VisionConfig{}, 120.0);
   int wrong = 0;
   int identified = 0;
   int lit = 0;
@@ -127,7 +127,7 @@ TEST(IdDecoder, IsNeverWrongWithFlippedAndDroppedFrames) {
 
 TEST(IdDecoder, TakesNoLampForARobot) {
   const IdLibrary library = *IdLibrary::from(four());
-  const IdDecoder decoder(library, 0.02, 0.99);
+  const IdDecoder decoder(library, VisionConfig{}, 120.0);
   const auto mains = [](double hz, double part) {
     return [hz, part](Duration t) {
       const double cycles = to_seconds(t) * hz;
@@ -161,7 +161,7 @@ TEST(IdDecoder, TellsDutiesApart) {
     duty += 0.2;
   }
   const IdLibrary library = *IdLibrary::from(swarm);
-  const IdDecoder decoder(library, 0.02, 0.99);
+  const IdDecoder decoder(library, VisionConfig{}, 120.0);
 
   for (int trial = 0; trial < 60; ++trial) {
     const auto& [id, code] = library.entries()[static_cast<std::size_t>(trial) % 3];
@@ -174,7 +174,7 @@ TEST(IdDecoder, TellsDutiesApart) {
 
 TEST(IdDecoder, TakesTheIdBackWhenTheTrackChangesHands) {
   const IdLibrary library = *IdLibrary::from(four());
-  const IdDecoder decoder(library, 0.02, 0.99);
+  const IdDecoder decoder(library, VisionConfig{}, 120.0);
   for (std::size_t from = 0; from < 4; ++from)
     for (std::size_t to = 0; to < 4; ++to) {
       if (from == to) continue;
@@ -196,7 +196,7 @@ TEST(IdDecoder, TakesTheIdBackWhenTheTrackChangesHands) {
 
 TEST(IdDecoder, KeepsTheIdThroughAShortAbsence) {
   const IdLibrary library = *IdLibrary::from(four());
-  const IdDecoder decoder(library, 0.02, 0.99);
+  const IdDecoder decoder(library, VisionConfig{}, 120.0);
   const Light light = board(library.entries()[1].code, 3ms, 20.0);
 
   const Outcome seen =
