@@ -1,0 +1,34 @@
+/// The board's side of the protocol: a request in, an answer out.
+#ifndef CREPES_FIRMWARE_LED_BOARD_COMMAND_H
+#define CREPES_FIRMWARE_LED_BOARD_COMMAND_H
+
+#include "firmware/led_board/flash.h"
+#include "firmware/protocol/led_messages.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// What the rest of the board has to do.
+enum led_effect {
+  LED_EFFECT_NONE,
+  LED_EFFECT_BLINK,  ///< start on the board's new settings
+  LED_EFFECT_TEST,   ///< steady light for test_ticks
+};
+
+struct led_board {
+  struct led_flash flash;
+  struct led_settings settings;  ///< as in flash
+  struct led_status status;
+  uint32_t test_ticks;
+};
+
+/// Answers `request`; sets flash and settings before it says so.
+enum led_effect led_command(struct led_board* board, const struct led_frame* request,
+                            struct led_frame* answer);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
