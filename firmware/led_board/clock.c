@@ -1,0 +1,38 @@
+#include "firmware/led_board/clock.h"
+
+#include "firmware/led_board/stm32f1.h"
+
+/// Turns of a loop at 8 MHz: some 40 ms. A crystal takes 2 ms.
+enum { PATIENCE = 40000 };
+
+static bool comes(const reg32* reg, uint32_t mask, uint32_t value) {
+  for (int i = 0; i < PATIENCE; ++i)
+    if ((*reg & mask) == value) return true;
+  return false;
+}
+
+static bool run_on_pll(uint32_t source_and_factor) {
+  RCC->CFGR = source_and_factor;
+  RCC->CR |= RCC_CR_PLLON;
+  if (!comes(&RCC->CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY)) {
+    RCC->CR &= ~(uint32_t)RCC_CR_PLLON;
+    return false;
+  }
+  RCC->CFGR |= RCC_CFGR_SW_PLL;
+  return comes(&RCC->CFGR, RCC_CFGR_SWS, RCC_CFGR_SWS_PLL);
+}
+
+enum led_clock clock_start(void) {
+  RCC->CR |= RCC_CR_HSEON;
+  if (comes(&RCC->CR, RCC_CR_HSERDY, RCC_CR_HSERDY) &&
+      run_on_pll(RCC_CFGR_PLL_HSE | RCC_CFGR_PLL_X3)) {
+    RCC->CR |= RCC_CR_CSSON;
+    return LED_CLOCK_CRYSTAL;
+  }
+  RCC->CR &= ~(uint32_t)RCC_CR_HSEON;
+  return run_on_pll(RCC_CFGR_PLL_X6) ? LED_CLOCK_RC : LED_CLOCK_RC_NO_PLL;
+}
+
+uint32_t clock_hz(enum led_clock clock) {
+  return clock == LED_CLOCK_RC_NO_PLL ? 8000000 : 24000000;
+}
