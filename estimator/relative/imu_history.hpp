@@ -16,9 +16,16 @@ struct ImuMean {
   Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
   double guessed = 0.0;  ///< share of the interval, 0..1, that no sample covers
+  /// Mean square of the time since the last sample where none covers, at most kMaxHold^2 [s^2].
+  double held_s2 = 0.0;
   /// White noise that the samples themselves show, vibration included.
   double gyro_density = 0.0;   ///< [rad/s/sqrt(Hz)]
   double accel_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
+  /// How fast the signals change beside their noise, as a random walk of this density.
+  double gyro_change = 0.0;   ///< [rad/s/sqrt(s)]
+  double accel_change = 0.0;  ///< [m/s^2/sqrt(s)]
+  /// How far the force is from its mean of the last seconds [m/s^2].
+  double accel_swing_mps2 = 0.0;
 };
 
 /// Finite, and within what sensors of these robots measure: 100 rad/s and 1000 m/s^2 an axis.
@@ -28,11 +35,13 @@ struct ImuMean {
 /// since the one before, stamped at the end, as an IMU that integrates inside gives it: so sums
 /// over samples are exact. Outside and across gaps longer than `kMaxGap` the nearest is held and
 /// called guessed. The noise is read off the second differences of successive samples, in which
-/// motion cancels: no data sheet knows how an airframe vibrates.
+/// motion cancels: no data sheet knows how an airframe vibrates; how fast the motion changes, off
+/// the differences over a few samples.
 class ImuHistory {
  public:
   static constexpr std::size_t kCapacity = 256;
   static constexpr Duration kMaxGap = std::chrono::milliseconds{50};
+  static constexpr Duration kMaxHold = std::chrono::milliseconds{100};
 
   /// False, and nothing changes: not plausible, a stamp already there, or older than everything
   /// kept.
@@ -55,14 +64,19 @@ class ImuHistory {
  private:
   ImuSample& slot(std::size_t i) { return samples_[(first_ + i) % kCapacity]; }
   [[nodiscard]] std::size_t first_after(Timestamp t) const;
-  void observe_noise();
+  void observe_motion();
 
   std::array<ImuSample, kCapacity> samples_{};
   std::size_t first_ = 0;
   std::size_t size_ = 0;
-  // Smoothed variance of a sample's noise times the sample period.
+  // Smoothed: variance of a sample's noise times the sample period, that of a change over its
+  // duration, and the force.
   double gyro_density2_ = 0.0;
   double accel_density2_ = 0.0;
+  double gyro_change2_ = 0.0;
+  double accel_change2_ = 0.0;
+  double noise_share_ = 0.0;  ///< of density2 in change2
+  Eigen::Vector3d accel_mean_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace crepes

@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <optional>
+#include <type_traits>
 
 #include "estimator/core/contract.hpp"
 #include "estimator/core/so3.hpp"
@@ -38,6 +39,31 @@ ErrorState::Covariance first_covariance(const Matrix6d& pose, double speed_sigma
   return P;
 }
 
+// How a raw pose's error goes with the errors of calibration, which are states.
+void correlate(const CalibrationJacobian& J, E::Covariance& P) {
+  const auto add = [&P](const auto& by_state, int index) {
+    constexpr int kStates = std::decay_t<decltype(by_state)>::ColsAtCompileTime;
+    const Eigen::Matrix<double, 6, kStates> cross =
+        by_state * P.template block<kStates, kStates>(index, index);
+    P.template block<3, kStates>(E::kP, index) = cross.template topRows<3>();
+    P.template block<3, kStates>(E::kTheta, index) = cross.template bottomRows<3>();
+    P.template block<kStates, 3>(index, E::kP) = cross.template topRows<3>().transpose();
+    P.template block<kStates, 3>(index, E::kTheta) = cross.template bottomRows<3>().transpose();
+  };
+  add(J.by_misalignment_B, E::kMisalignB);
+  add(J.by_misalignment_N, E::kMisalignN);
+  add(J.by_accel_bias_B, E::kAccelB);
+  add(J.by_accel_bias_N, E::kAccelN);
+  add(J.by_range_bias, E::kRangeBias);
+}
+
+Matrix6d with_tilt_of_biases(const RawPose& raw, double accel_bias_mps2) {
+  const auto& B = raw.by_calibration.by_accel_bias_B;
+  const auto& N = raw.by_calibration.by_accel_bias_N;
+  return raw.gaussian().covariance +
+         accel_bias_mps2 * accel_bias_mps2 * (B * B.transpose() + N * N.transpose());
+}
+
 // P of the error at the corrected state: theta_new = J_r(theta) (theta - theta_hat).
 void reset(const Eigen::Matrix3d& J_r, E::Covariance& P) {
   P.middleRows<3>(E::kTheta) = (J_r * P.middleRows<3>(E::kTheta)).eval();
@@ -46,12 +72,14 @@ void reset(const Eigen::Matrix3d& J_r, E::Covariance& P) {
 
 }  // namespace
 
-NeighborFilter::NeighborFilter(Timestamp stamp, const GaussianPose& first,
-                               const ProcessNoise& noise, const Priors& priors)
+NeighborFilter::NeighborFilter(Timestamp stamp, const RawPose& first, const ProcessNoise& noise,
+                               const Priors& priors)
     : stamp_(stamp),
-      P_(first_covariance(first.covariance, priors.speed_mps, priors)),
+      P_(first_covariance(with_tilt_of_biases(first, priors.accel_bias_mps2), priors.speed_mps,
+                          priors)),
       noise_(noise) {
-  state_.motion.T_B_N = first.pose;
+  correlate(first.by_calibration, P_);
+  state_.motion.T_B_N = first.T_B_N;
 }
 
 NeighborFilter::NeighborFilter(Timestamp stamp, const GraphPose& first, const ProcessNoise& noise,

@@ -35,8 +35,8 @@ struct RangeReading {
 /// both cameras' misalignment. Moves forward only; corrections apply at `stamp()`.
 class NeighborFilter {
  public:
-  /// `first` as a raw pose gives it, neighbor's speed unknown.
-  NeighborFilter(Timestamp stamp, const GaussianPose& first, const ProcessNoise& noise,
+  /// `first` shares its errors of calibration with all that follows; the speed is unknown.
+  NeighborFilter(Timestamp stamp, const RawPose& first, const ProcessNoise& noise,
                  const Priors& priors);
   /// From the pose graph: the speed is known as well as that of the robots between.
   NeighborFilter(Timestamp stamp, const GraphPose& first, const ProcessNoise& noise,

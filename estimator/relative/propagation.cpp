@@ -1,6 +1,7 @@
 #include "estimator/relative/propagation.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "estimator/core/so3.hpp"
 
@@ -9,7 +10,8 @@ namespace {
 
 constexpr Duration kMaxStep = std::chrono::milliseconds{10};
 // Scale and axis errors are constant in the sensor but change in effect as the motion does: as
-// white noise they weigh as if they held for this long.
+// white noise they weigh as if they held for this long. What they make of a force that stays the
+// same is a bias.
 constexpr double kScaleTime = 0.2;  // s
 
 BodyRates rates(const ImuMean& mean, const ImuBias& bias) {
@@ -104,19 +106,23 @@ PropagationJacobian propagation_jacobian(const RelativeMotion& before, const Rel
 Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body, const ImuMean& neighbor,
                                            const ProcessNoise& noise, double dt) {
   const auto square = [](double x) { return x * x; };
-  const auto density2 = [&](double white, double shown, double guess, double guessed, double size) {
-    return square(std::max(white, shown)) + guessed * square(guess) +
+  // A rate held for s is off by change * sqrt(s), and stays so: its integral by s^3/3 change^2.
+  const auto density2 = [&](double white, double shown, double change, double held_s2,
+                            double size) {
+    return square(std::max(white, shown)) + square(change) * held_s2 +
            square(noise.scale_sigma * size) * kScaleTime;
   };
   Eigen::Matrix<double, 12, 1> variance;
   int row = 0;
   for (const ImuMean* imu : {&body, &neighbor}) {
-    variance.segment<3>(row).setConstant(density2(noise.gyro_density, imu->gyro_density,
-                                                  noise.gyro_guess_density, imu->guessed,
-                                                  imu->gyro_radps.norm()));
-    variance.segment<3>(row + 3).setConstant(density2(noise.accel_density, imu->accel_density,
-                                                      noise.accel_guess_density, imu->guessed,
-                                                      imu->accel_mps2.norm()));
+    variance.segment<3>(row).setConstant(density2(
+        noise.gyro_density, imu->gyro_density,
+        std::hypot(noise.gyro_guess_change, imu->gyro_change), imu->held_s2,
+        imu->gyro_radps.norm()));
+    variance.segment<3>(row + 3).setConstant(density2(
+        noise.accel_density, imu->accel_density,
+        std::hypot(noise.accel_guess_change, imu->accel_change), imu->held_s2,
+        imu->accel_swing_mps2));
     row += 6;
   }
   return variance / dt;

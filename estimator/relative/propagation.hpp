@@ -15,15 +15,15 @@ struct BodyRates {
 };
 
 /// How far to trust the IMUs, the same for all robots of a team. Densities are white noise per
-/// sqrt(Hz); `guess` densities apply to intervals that no sample covers.
+/// sqrt(Hz); `guess` changes are what may begin at any time where no sample covers.
 struct ProcessNoise {
   double gyro_density = 0.0;
   double accel_density = 0.0;
   double gyro_walk = 0.0;
   double accel_walk = 0.0;
   double scale_sigma = 0.0;
-  double gyro_guess_density = 0.05;
-  double accel_guess_density = 0.5;
+  double gyro_guess_change = 0.5;   ///< [rad/s/sqrt(s)]
+  double accel_guess_change = 5.0;  ///< [m/s^2/sqrt(s)]
   double range_bias_walk = 0.0;  ///< [m/sqrt(s)]
 };
 

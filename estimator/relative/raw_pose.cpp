@@ -121,14 +121,12 @@ MutualSighting disturbed(const MutualSighting& m, int input, double step) {
   return moved;
 }
 
-// First-order covariance, with the derivative of the solution itself taken by central differences.
-std::optional<Eigen::Matrix<double, 9, 9>> covariance(const MutualSighting& m, const Solution& at) {
+using InputJacobian = Eigen::Matrix<double, 9, kInputs>;
+
+// Derivative of the solution itself, by central differences.
+std::optional<InputJacobian> input_jacobian(const MutualSighting& m, const Solution& at) {
   constexpr double kStep = 1e-5;  // rad and m; rounding and curvature both stay below 1e-9
-  const std::array<double, kInputs> sigma{
-      m.B.bearing_sigma_rad, m.B.bearing_sigma_rad, m.N.bearing_sigma_rad,
-      m.N.bearing_sigma_rad, m.B.tilt_sigma_rad,    m.B.tilt_sigma_rad,
-      m.N.tilt_sigma_rad,    m.N.tilt_sigma_rad,    m.range_sigma_m};
-  Eigen::Matrix<double, 9, kInputs> J;
+  InputJacobian J;
   for (int i = 0; i < kInputs; ++i) {
     const auto plus = solve(disturbed(m, i, kStep));
     const auto minus = solve(disturbed(m, i, -kStep));
@@ -138,9 +136,37 @@ std::optional<Eigen::Matrix<double, 9, 9>> covariance(const MutualSighting& m, c
     J.col(i) << high->T_B_N.p - low->T_B_N.p, high->p_N_B - low->p_N_B,
         so3_log(at.T_B_N.q.conjugate() * high->T_B_N.q) -
             so3_log(at.T_B_N.q.conjugate() * low->T_B_N.q);
-    J.col(i) *= sigma[static_cast<std::size_t>(i)] / (2.0 * kStep);
+    J.col(i) /= 2.0 * kStep;
   }
-  return J * J.transpose();
+  return J;
+}
+
+Eigen::Matrix<double, 9, 9> covariance(const MutualSighting& m, const InputJacobian& J) {
+  Eigen::Matrix<double, kInputs, 1> sigma;
+  sigma << m.B.bearing_sigma_rad, m.B.bearing_sigma_rad, m.N.bearing_sigma_rad,
+      m.N.bearing_sigma_rad, m.B.tilt_sigma_rad, m.B.tilt_sigma_rad, m.N.tilt_sigma_rad,
+      m.N.tilt_sigma_rad, m.range_sigma_m;
+  const InputJacobian scaled = J * sigma.asDiagonal();
+  return scaled * scaled.transpose();
+}
+
+// Truth lies where the inputs would lead without their fault: u turned back by the misalignment,
+// Exp(-m) u; the force less the bias, up - b / g; the range less its own.
+CalibrationJacobian calibration_jacobian(const MutualSighting& m, const InputJacobian& J) {
+  constexpr double kGravity = 9.80665;
+  Eigen::Matrix<double, 6, kInputs> J_pose;
+  J_pose << J.topRows<3>(), J.bottomRows<3>();
+  const auto by_turn = [&](int column, const Eigen::Vector3d& u) -> Eigen::Matrix<double, 6, 3> {
+    return J_pose.middleCols<2>(column) * tangent_basis(u).transpose() * hat(u);
+  };
+  const auto by_force = [&](int column, const Eigen::Vector3d& up) -> Eigen::Matrix<double, 6, 3> {
+    return J_pose.middleCols<2>(column) * tangent_basis(up).transpose() / -kGravity;
+  };
+  return {.by_misalignment_B = by_turn(0, m.B.u),
+          .by_misalignment_N = by_turn(2, m.N.u),
+          .by_accel_bias_B = by_force(4, m.B.up),
+          .by_accel_bias_N = by_force(6, m.N.up),
+          .by_range_bias = -J_pose.col(8)};
 }
 
 }  // namespace
@@ -159,9 +185,10 @@ std::variant<RawPose, NoPoseReason> compute_raw_pose(const MutualSighting& sight
   if (const auto* reason = std::get_if<NoPoseReason>(&solved)) return *reason;
   const auto& solution = std::get<Solution>(solved);
   if (!elevations_agree(sighting, solution)) return NoPoseReason::kUncertain;
-  const auto cov = covariance(sighting, solution);
-  if (!cov) return NoPoseReason::kNearVertical;
-  return RawPose{solution.T_B_N, solution.p_N_B, *cov};
+  const auto J = input_jacobian(sighting, solution);
+  if (!J) return NoPoseReason::kNearVertical;
+  return RawPose{solution.T_B_N, solution.p_N_B, covariance(sighting, *J),
+                 calibration_jacobian(sighting, *J)};
 }
 
 }  // namespace crepes

@@ -33,12 +33,24 @@ struct MutualSighting {
   double range_sigma_m = 0.0;
 };
 
+/// What one raw pose and the next get wrong alike: both cameras' misalignment, both accelerometers'
+/// bias (which tilts "up") and the pair's range bias.
+struct CalibrationJacobian {
+  Eigen::Matrix<double, 6, 3> by_misalignment_B = Eigen::Matrix<double, 6, 3>::Zero();
+  Eigen::Matrix<double, 6, 3> by_misalignment_N = Eigen::Matrix<double, 6, 3>::Zero();
+  Eigen::Matrix<double, 6, 3> by_accel_bias_B = Eigen::Matrix<double, 6, 3>::Zero();
+  Eigen::Matrix<double, 6, 3> by_accel_bias_N = Eigen::Matrix<double, 6, 3>::Zero();
+  Vector6d by_range_bias = Vector6d::Zero();
+};
+
 /// The measurement z of the paper's filter (eq. 16): p of N in B, p of B in N, R of N in B.
 struct RawPose {
   Pose T_B_N;
   Eigen::Vector3d p_N_B = Eigen::Vector3d::Zero();
   /// Of [p_B_N, p_N_B, theta], theta a right perturbation of T_B_N's rotation.
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
+  /// Of gaussian()'s error. The covariance holds what misalignments and range bias add.
+  CalibrationJacobian by_calibration;
 
   [[nodiscard]] GaussianPose gaussian() const;
 };

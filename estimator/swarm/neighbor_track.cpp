@@ -24,7 +24,7 @@ std::variant<NeighborFilter, PaperFilter> make_filter(Timestamp stamp, const Fir
                                                       const FilterSettings& settings) {
   if (settings.profile == Profile::kPaper) return PaperFilter(stamp, first, settings.noise);
   if constexpr (std::is_same_v<First, RawPose>) {
-    return NeighborFilter(stamp, first.gaussian(), settings.noise, settings.priors);
+    return NeighborFilter(stamp, first, settings.noise, settings.priors);
   } else {
     return NeighborFilter(stamp, first, settings.noise, settings.priors);
   }

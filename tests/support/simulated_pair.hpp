@@ -102,8 +102,10 @@ class SimulatedPair {
 
   /// Both bearings, a range and both tilts at one instant, with the sigmas that belong to them.
   [[nodiscard]] MutualSighting sighting(Timestamp stamp) {
-    const auto side = [&](const DirectionReading& u, const Pose& T_W_X, const Mounting& mounting) {
-      const Eigen::Vector3d up = T_W_X.q.conjugate() * Eigen::Vector3d::UnitZ();
+    const auto side = [&](const DirectionReading& u, const Pose& T_W_X, const Mounting& mounting,
+                          const ImuBias& bias) {
+      const Eigen::Vector3d up =
+          (T_W_X.q.conjugate() * Eigen::Vector3d::UnitZ() + bias.accel_mps2 / 9.80665).normalized();
       return Sighting{
           .u = u.u,
           .up = (up + tangent_basis(up) * random_.normal_vector<2>(noise_.tilt)).normalized(),
@@ -112,8 +114,8 @@ class SimulatedPair {
           .tilt_sigma_rad = noise_.tilt};
     };
     const double t = seconds(stamp);
-    return {.B = side(bearing(stamp), B_.T_W_B(t), mounting_B),
-            .N = side(peer_bearing(stamp), N_.T_W_B(t), mounting_N),
+    return {.B = side(bearing(stamp), B_.T_W_B(t), mounting_B, truth_.bias_B),
+            .N = side(peer_bearing(stamp), N_.T_W_B(t), mounting_N, truth_.bias_N),
             .range_m = range(stamp).range_m,
             .range_sigma_m = std::hypot(noise_.range, noise_.priors.range_bias_m)};
   }

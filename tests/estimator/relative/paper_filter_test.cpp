@@ -97,7 +97,9 @@ TEST(PaperFilter, InnovationJacobianIsTheDerivativeOfTheMeasurement) {
   RandomGeometry random(3);
   for (int i = 0; i < kStates; ++i) {
     const RelativeMotion x = random_motion(random);
-    RawPose z{.T_B_N = x.T_B_N, .p_N_B = x.T_B_N.inverse().p};
+    RawPose z;
+    z.T_B_N = x.T_B_N;
+    z.p_N_B = x.T_B_N.inverse().p;
     z.covariance = random.covariance<9>(0.1);
 
     const auto innovation = paper_innovation(x, z);
@@ -167,7 +169,8 @@ TEST(PaperFilter, TwoSidedErrorTurnsPositionAndVelocityWithTheObserver) {
 
 TEST(PaperFilter, StartsWithTheCovarianceOfTheRawPose) {
   RandomGeometry random(7);
-  RawPose first{.T_B_N = random.pose(), .p_N_B = Eigen::Vector3d::Zero()};
+  RawPose first;
+  first.T_B_N = random.pose();
   first.covariance = random.covariance<9>(0.1);
 
   const PaperFilter filter(Timestamp{}, first, ProcessNoise{});
