@@ -12,6 +12,8 @@ void inject(const ErrorState::Vector& dx, NominalState& state) {
   state.bias_B.accel_mps2 += dx.segment<3>(E::kAccelB);
   state.bias_N.gyro_radps += dx.segment<3>(E::kGyroN);
   state.bias_N.accel_mps2 += dx.segment<3>(E::kAccelN);
+  state.bias_B.gyro_scale.reshaped() += dx.segment<9>(E::kGyroScaleB);
+  state.bias_N.gyro_scale.reshaped() += dx.segment<9>(E::kGyroScaleN);
   state.range_bias_m += dx(E::kRangeBias);
   state.misalignment_B += dx.segment<3>(E::kMisalignB);
   state.misalignment_N += dx.segment<3>(E::kMisalignN);

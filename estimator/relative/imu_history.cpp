@@ -9,8 +9,8 @@
 namespace crepes {
 namespace {
 
-constexpr double kNoiseShare = 0.02;  // of one sample in the smoothed noise: 0.5 s at 100 Hz
-constexpr double kMeanTime = 3.0;     // s
+constexpr double kNoiseShare = 0.02;       // of one sample in the smoothed noise: 0.5 s at 100 Hz
+constexpr double kMeanTime = 3.0;          // s
 constexpr std::size_t kChangeSamples = 3;  // about as long as a peer's samples are late
 constexpr Duration kRotationStep = std::chrono::milliseconds{5};
 

@@ -35,6 +35,7 @@ ErrorState::Covariance first_covariance(const Matrix6d& pose, double speed_sigma
   set(E::kAccelN, priors.accel_bias_mps2);
   set(E::kMisalignB, priors.misalignment_rad);
   set(E::kMisalignN, priors.misalignment_rad);
+  P.diagonal().segment<18>(E::kGyroScaleB).setConstant(square(priors.gyro_scale));
   P(E::kRangeBias, E::kRangeBias) = square(priors.range_bias_m);
   return P;
 }

@@ -15,6 +15,7 @@ struct Priors {
   double speed_mps = 2.0;
   double gyro_bias_radps = 0.0;
   double accel_bias_mps2 = 0.0;
+  double gyro_scale = 0.0;  ///< of each entry
   double range_bias_m = 0.0;
   double misalignment_rad = 0.0;
 };
@@ -31,8 +32,8 @@ struct RangeReading {
   double sigma_m = 0.0;
 };
 
-/// ErrorState::kSize error states: relative motion, both IMUs' biases, the pair's range bias and
-/// both cameras' misalignment. Moves forward only; corrections apply at `stamp()`.
+/// ErrorState::kSize error states: relative motion, both IMUs' biases and gyro scales, the pair's
+/// range bias and both cameras' misalignment. Moves forward only; corrections apply at `stamp()`.
 class NeighborFilter {
  public:
   /// `first` shares its errors of calibration with all that follows; the speed is unknown.

@@ -9,29 +9,46 @@ namespace crepes {
 namespace {
 
 constexpr Duration kMaxStep = std::chrono::milliseconds{10};
-// Scale and axis errors are constant in the sensor but change in effect as the motion does: as
-// white noise they weigh as if they held for this long. What they make of a force that stays the
-// same is a bias.
+// An accelerometer's scale and axis errors change in effect as the force does: as white noise they
+// weigh as if they held for this long. What they make of a force that stays the same is a bias.
 constexpr double kScaleTime = 0.2;  // s
 
 BodyRates rates(const ImuMean& mean, const ImuBias& bias) {
-  return {mean.gyro_radps - bias.gyro_radps, mean.accel_mps2 - bias.accel_mps2};
+  const Eigen::Vector3d w = mean.gyro_radps - bias.gyro_radps;
+  return {w - bias.gyro_scale * w, mean.accel_mps2 - bias.accel_mps2};
 }
 
-// dx = F dx with F = [A B 0; 0 I 0; 0 0 I]: only the rows of the motion change.
-void propagate_covariance(const PropagationJacobian& J,
-                          const Eigen::Matrix<double, 12, 1>& variance, const ProcessNoise& noise,
-                          double dt, ErrorState::Covariance& P) {
+/// M of [w_B, a_B, w_N, a_N] errors = -M dx, applied to the rows of `P`: a gyroscope's is that of
+/// its bias and, by each axis it turns about, of a column of its scale.
+template <class Rows>
+Eigen::Matrix<double, 12, Rows::ColsAtCompileTime> rate_rows(const Rows& P, const BodyRates& body,
+                                                             const BodyRates& neighbor) {
+  using E = ErrorState;
+  Eigen::Matrix<double, 12, Rows::ColsAtCompileTime> rows = P.template middleRows<12>(E::kGyroB);
+  for (int axis = 0; axis < 3; ++axis) {
+    rows.template topRows<3>() +=
+        body.w(axis) * P.template middleRows<3>(E::kGyroScaleB + 3 * axis);
+    rows.template middleRows<3>(6) +=
+        neighbor.w(axis) * P.template middleRows<3>(E::kGyroScaleN + 3 * axis);
+  }
+  return rows;
+}
+
+// dx = F dx with F = [A B M; 0 I]: only the rows of the motion change.
+void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
+                          const BodyRates& neighbor, const Eigen::Matrix<double, 12, 1>& variance,
+                          const ProcessNoise& noise, double dt, ErrorState::Covariance& P) {
   using E = ErrorState;
   constexpr int kMotion = E::kGyroB;         // size of [p, v, theta]
   constexpr int kRest = E::kSize - kMotion;  // biases and calibration
   const auto& A = J.by_motion;
-  const Eigen::Matrix<double, 9, 12> B = -J.by_rates;  // a bias is subtracted from its rate
+  const Eigen::Matrix<double, 9, 12> B = -J.by_rates;
 
-  const Eigen::Matrix<double, kMotion, E::kSize> rows =
-      A * P.topRows<kMotion>() + B * P.middleRows<12>(E::kGyroB);
+  const Eigen::Matrix<double, E::kSize, kMotion> columns =
+      (A * P.topRows<kMotion>() + B * rate_rows(P, body, neighbor)).transpose();
+  const auto& rows = columns.transpose();
   const Eigen::Matrix<double, kMotion, kMotion> motion =
-      rows.leftCols<kMotion>() * A.transpose() + rows.middleCols<12>(E::kGyroB) * B.transpose() +
+      A * columns.topRows<kMotion>() + B * rate_rows(columns, body, neighbor) +
       J.by_rates * variance.asDiagonal() * J.by_rates.transpose();
   P.topLeftCorner<kMotion, kMotion>() = 0.5 * (motion + motion.transpose());
   P.topRightCorner<kMotion, kRest>() = rows.rightCols<kRest>();
@@ -107,22 +124,20 @@ Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body, const ImuMean& n
                                            const ProcessNoise& noise, double dt) {
   const auto square = [](double x) { return x * x; };
   // A rate held for s is off by change * sqrt(s), and stays so: its integral by s^3/3 change^2.
-  const auto density2 = [&](double white, double shown, double change, double held_s2,
-                            double size) {
-    return square(std::max(white, shown)) + square(change) * held_s2 +
-           square(noise.scale_sigma * size) * kScaleTime;
+  const auto density2 = [&](double white, double shown, double guess, double change,
+                            double held_s2) {
+    return square(std::max(white, shown)) + (square(guess) + square(change)) * held_s2;
   };
   Eigen::Matrix<double, 12, 1> variance;
   int row = 0;
   for (const ImuMean* imu : {&body, &neighbor}) {
-    variance.segment<3>(row).setConstant(density2(
-        noise.gyro_density, imu->gyro_density,
-        std::hypot(noise.gyro_guess_change, imu->gyro_change), imu->held_s2,
-        imu->gyro_radps.norm()));
-    variance.segment<3>(row + 3).setConstant(density2(
-        noise.accel_density, imu->accel_density,
-        std::hypot(noise.accel_guess_change, imu->accel_change), imu->held_s2,
-        imu->accel_swing_mps2));
+    variance.segment<3>(row).setConstant(density2(noise.gyro_density, imu->gyro_density,
+                                                  noise.gyro_guess_change, imu->gyro_change,
+                                                  imu->held_s2));
+    variance.segment<3>(row + 3).setConstant(
+        density2(noise.accel_density, imu->accel_density, noise.accel_guess_change,
+                 imu->accel_change, imu->held_s2) +
+        square(noise.scale_sigma * imu->accel_swing_mps2) * kScaleTime);
     row += 6;
   }
   return variance / dt;
@@ -139,8 +154,8 @@ void propagate(const ImuHistory& imu_B, const ImuHistory& imu_N, Timestamp from,
     const BodyRates neighbor = rates(mean_N, state.bias_N);
     const RelativeMotion before = state.motion;
     state.motion = propagated(before, body, neighbor, dt);
-    propagate_covariance(propagation_jacobian(before, state.motion, body, neighbor, dt),
-                         rate_variance(mean_B, mean_N, noise, dt), noise, dt, P);
+    propagate_covariance(propagation_jacobian(before, state.motion, body, neighbor, dt), body,
+                         neighbor, rate_variance(mean_B, mean_N, noise, dt), noise, dt, P);
     t = next;
   }
 }

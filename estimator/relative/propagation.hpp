@@ -8,14 +8,15 @@
 
 namespace crepes {
 
-/// One robot's rates over a step, bias taken out.
+/// One robot's rates over a step, without what its IMU adds.
 struct BodyRates {
   Eigen::Vector3d w = Eigen::Vector3d::Zero();  ///< [rad/s], body axes
   Eigen::Vector3d a = Eigen::Vector3d::Zero();  ///< specific force [m/s^2], body axes
 };
 
 /// How far to trust the IMUs, the same for all robots of a team. Densities are white noise per
-/// sqrt(Hz); `guess` changes are what may begin at any time where no sample covers.
+/// sqrt(Hz); `guess` changes are what may begin at any time where no sample covers; `scale_sigma`
+/// errors of the accelerometer weigh with the force's swing.
 struct ProcessNoise {
   double gyro_density = 0.0;
   double accel_density = 0.0;
@@ -24,7 +25,7 @@ struct ProcessNoise {
   double scale_sigma = 0.0;
   double gyro_guess_change = 0.5;   ///< [rad/s/sqrt(s)]
   double accel_guess_change = 5.0;  ///< [m/s^2/sqrt(s)]
-  double range_bias_walk = 0.0;  ///< [m/sqrt(s)]
+  double range_bias_walk = 0.0;     ///< [m/sqrt(s)]
 };
 
 /// The step of paper eq. 9 with the forces turned to the middle of the step:

@@ -38,6 +38,7 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig
 
   s.priors.gyro_bias_radps = imu.gyroscope_bias_sigma;
   s.priors.accel_bias_mps2 = imu.accelerometer_bias_sigma;
+  s.priors.gyro_scale = imu.scale_sigma;
   s.priors.range_bias_m = uwb.bias_sigma_m;
   s.priors.misalignment_rad = estimator.camera_misalignment_deg * std::numbers::pi / 180.0;
 

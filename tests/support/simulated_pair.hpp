@@ -41,6 +41,7 @@ struct PairNoise {
   Priors priors{.speed_mps = 2.0,
                 .gyro_bias_radps = 0.005,
                 .accel_bias_mps2 = 0.05,
+                .gyro_scale = 0.003,
                 .range_bias_m = 0.10,
                 .misalignment_rad = 0.0035};
 };
@@ -63,6 +64,8 @@ class SimulatedPair {
     const Priors& p = noise.priors;
     truth_.bias_B = {random_.vector(p.gyro_bias_radps), random_.vector(p.accel_bias_mps2)};
     truth_.bias_N = {random_.vector(p.gyro_bias_radps), random_.vector(p.accel_bias_mps2)};
+    for (ImuBias* bias : {&truth_.bias_B, &truth_.bias_N})
+      for (double& s : bias->gyro_scale.reshaped()) s = random_.normal(p.gyro_scale);
     truth_.range_bias_m = random_.normal(p.range_bias_m);
     truth_.misalignment_B = random_.vector(p.misalignment_rad);
     truth_.misalignment_N = random_.vector(p.misalignment_rad);
@@ -142,7 +145,8 @@ class SimulatedPair {
     const Eigen::Vector3d w = so3_log(before.q.conjugate() * after.q) / dt;
     const Eigen::Vector3d f_W =
         (flight.v_W_B(t + dt) - flight.v_W_B(t)) / dt + 9.80665 * Eigen::Vector3d::UnitZ();
-    return {sampled_ + kImuPeriod, w + bias.gyro_radps + random_.vector(noise_.gyro),
+    return {sampled_ + kImuPeriod,
+            w + bias.gyro_scale * w + bias.gyro_radps + random_.vector(noise_.gyro),
             flight.T_W_B(t + 0.5 * dt).q.conjugate() * f_W + bias.accel_mps2 +
                 random_.vector(noise_.accel)};
   }

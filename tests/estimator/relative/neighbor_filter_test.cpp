@@ -104,20 +104,18 @@ TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysAfterFiveSeconds) {
   EXPECT_LT(nees, kHigh);
 }
 
-// A raw pose shares the range's bias, the cameras' misalignments and the accelerometers' biases with
-// the filter's own states.
+// A raw pose shares the range's bias, the cameras' misalignments and the accelerometers' biases
+// with the filter's own states.
 TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysFiveSecondsAfterARawPose) {
-  const double nees = mean_pose_nees(5s, [](SimulatedPair& pair, std::uint64_t) {
-    return first_raw_pose(pair, Timestamp{50ms});
-  });
+  const double nees = mean_pose_nees(
+      5s, [](SimulatedPair& pair, std::uint64_t) { return first_raw_pose(pair, Timestamp{50ms}); });
   EXPECT_GT(nees, kLow);
   EXPECT_LT(nees, kHigh);
 }
 
 TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysRightAfterARawPose) {
-  const double nees = mean_pose_nees(0s, [](SimulatedPair& pair, std::uint64_t) {
-    return first_raw_pose(pair, Timestamp{50ms});
-  });
+  const double nees = mean_pose_nees(
+      0s, [](SimulatedPair& pair, std::uint64_t) { return first_raw_pose(pair, Timestamp{50ms}); });
   EXPECT_GT(nees, kLow);
   EXPECT_LT(nees, kHigh);
 }
