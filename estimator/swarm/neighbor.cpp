@@ -85,7 +85,7 @@ void Neighbor::take_peer_bearing(const Bearing& bearing, double clock_sigma_s,
 }
 
 bool Neighbor::needs_start(Timestamp stamp) const {
-  if (!track_ || !track_->is_certain()) return true;
+  if (!track_ || !track_->is_certain() || track_->has_lost_its_way()) return true;
   // Seen and refused ever since, while raw poses are there: the filter has lost its way.
   return stamp - track_->last_sighting() > kPatience + settings_.lag;
 }

@@ -23,11 +23,7 @@ template <class First>
 std::variant<NeighborFilter, PaperFilter> make_filter(Timestamp stamp, const First& first,
                                                       const FilterSettings& settings) {
   if (settings.profile == Profile::kPaper) return PaperFilter(stamp, first, settings.noise);
-  if constexpr (std::is_same_v<First, RawPose>) {
-    return NeighborFilter(stamp, first, settings.noise, settings.priors);
-  } else {
-    return NeighborFilter(stamp, first, settings.noise, settings.priors);
-  }
+  return NeighborFilter(stamp, first, settings.noise, settings.priors);
 }
 
 Fusion fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounting& mounting,
@@ -86,8 +82,14 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
   const Fusion fusion = tight != nullptr
                             ? fuse_tight(*tight, measurement, mounting, gates)
                             : fuse_paper(std::get<PaperFilter>(filter_), measurement, gates);
+  const auto kind = static_cast<std::size_t>(measurement.kind);
   if (fusion.verdict == Verdict::kFused) {
-    last_[static_cast<std::size_t>(measurement.kind)] = measurement.stamp;
+    last_[kind] = measurement.stamp;
+    refused_[kind] = {};
+  } else if (fusion.verdict == Verdict::kGated) {
+    Refusals& refused = refused_[kind];
+    if (refused.count++ == 0) refused.since = measurement.stamp;
+    refused.latest = measurement.stamp;
   }
   return fusion;
 }
@@ -131,6 +133,17 @@ bool NeighborTrack::is_certain() const {
 Timestamp NeighborTrack::last_sighting() const {
   return std::max({last(MeasurementKind::kBearing), last(MeasurementKind::kPeerBearing),
                    last(MeasurementKind::kRawPose)});
+}
+
+bool NeighborTrack::has_lost_its_way() const {
+  static constexpr Duration kPatience = std::chrono::milliseconds{500};
+  static constexpr int kEnough = 10;
+  const auto is_astray = [this](MeasurementKind kind) {
+    const Refusals& refused = refused_[static_cast<std::size_t>(kind)];
+    return refused.count >= kEnough && refused.latest - refused.since >= kPatience;
+  };
+  return is_astray(MeasurementKind::kBearing) || is_astray(MeasurementKind::kPeerBearing) ||
+         is_astray(MeasurementKind::kRawPose);
 }
 
 }  // namespace crepes

@@ -48,14 +48,25 @@ class NeighborTrack {
   }
   /// When anything that shows the neighbor itself (not the graph) was last used.
   [[nodiscard]] Timestamp last_sighting() const;
+  /// Of either direction, all sightings of the last half second were refused: a filter that was
+  /// led astray, by a mirror image for example. The other direction alone may still agree with it.
+  [[nodiscard]] bool has_lost_its_way() const;
 
  private:
+  /// Readings of one kind, gated one after the other.
+  struct Refusals {
+    Timestamp since = kNever;
+    Timestamp latest = kNever;
+    int count = 0;
+  };
+
   std::variant<NeighborFilter, PaperFilter> filter_;
   std::array<Timestamp, kMeasurementKindCount> last_ = [] {
     std::array<Timestamp, kMeasurementKindCount> never{};
     never.fill(kNever);
     return never;
   }();
+  std::array<Refusals, kMeasurementKindCount> refused_{};
 };
 
 }  // namespace crepes

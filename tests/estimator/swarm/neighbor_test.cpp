@@ -34,6 +34,7 @@ struct Ingredients {
   bool bearings = true;
   bool peer_bearings = true;
   bool ranges = true;
+  double heading_rad = 0.0;  ///< own bearings turned so far about the vertical: a mirror in a wall
 };
 
 /// Robot 1's view of robot 2, fed from a simulated pair every 10 ms.
@@ -50,7 +51,7 @@ class View {
       const auto step = now_.time_since_epoch() / 10ms;
       if (with.own_imu && !pair_.imu_B.empty()) self_.imu.push(pair_.imu_B.newest());
       if (with.own_tilt) self_.tilt = tilt(true, now_);
-      if (with.bearings && step % 2 == 0) neighbor_.add_bearing(own_bearing());
+      if (with.bearings && step % 2 == 0) neighbor_.add_bearing(own_bearing(with.heading_rad));
       if (with.ranges && step % 4 == 1) neighbor_.add_range(range());
       if (with.reports && step % 2 == 1) neighbor_.add_report(report(with), self_);
       neighbor_.tick(now_, self_);
@@ -103,9 +104,10 @@ class View {
     const MutualSighting z = pair_.sighting(stamp);
     return {stamp, own ? z.B.up : z.N.up, 0.01};
   }
-  [[nodiscard]] Bearing own_bearing() {
+  [[nodiscard]] Bearing own_bearing(double heading_rad) {
     const DirectionReading u = pair_.bearing(now_);
-    return {now_, kOther, u.u, u.camera, u.sigma_rad};
+    const Eigen::AngleAxisd turn(heading_rad, pair_.sighting(now_).B.up);
+    return {now_, kOther, turn * u.u, u.camera, u.sigma_rad};
   }
   [[nodiscard]] UwbRange range() { return {now_, kOther, pair_.range(now_).range_m, -80.0, -79.0}; }
 
@@ -175,6 +177,19 @@ TEST(Neighbor, IsSilentAfterTwoSecondsWithoutAReport) {
 
   EXPECT_FALSE(view.neighbor().pose());
   EXPECT_EQ(view.reason(), NoPoseReason::kSilent);
+}
+
+TEST(Neighbor, LocatedInAMirrorIsFoundWithinASecondOfBeingSeenItself) {
+  View view;
+  view.run_until(Timestamp{1500ms}, {.heading_rad = 0.8});
+  ASSERT_TRUE(view.neighbor().pose());
+  ASSERT_GT(view.error().head<3>().norm(), 2.0);  // its own sightings of us and ranges agree
+
+  view.run_until(Timestamp{2500ms});
+
+  ASSERT_TRUE(view.neighbor().pose());
+  EXPECT_LT(view.error().head<3>().norm(), 0.35);
+  EXPECT_LT(view.error().tail<3>().norm(), 0.06);
 }
 
 TEST(Neighbor, IsPredictedForAWhileAndSaysSo) {
