@@ -140,7 +140,7 @@ struct ImuConfig {
   double gyroscope_noise_density = 0.00037;
   double accelerometer_random_walk = 0.0002;
   double gyroscope_random_walk = 0.0001;
-  double accelerometer_bias_sigma = 0.05;
+  double accelerometer_bias_sigma = 0.035;
   double gyroscope_bias_sigma = 0.005;
   double scale_sigma = 0.003;
   std::string port;
@@ -172,7 +172,7 @@ struct ImuConfig {
 
 struct UwbConfig {
   double noise_m = 0.05;
-  double bias_sigma_m = 0.06;
+  double bias_sigma_m = 0.05;
   double bias_drift_m = 0.01;
   double bias_time_s = 10.0;
   double max_range_m = 200.0;
@@ -207,7 +207,7 @@ struct VisionConfig {
   double min_area_px2 = 1.5;
   double max_area_px2 = 20000.0;
   int max_spots = 256;
-  double bearing_sigma_px = 0.3;
+  double bearing_sigma_px = 0.2;
   double gate_px = 8.0;
   double track_timeout_ms = 150.0;
   double max_wrong_id = 5e-7;
