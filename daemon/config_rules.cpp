@@ -123,7 +123,10 @@ void check_members(const Config& config, Faults& faults) {
   check_unique("swarm.members", ".name", members, std::mem_fn(&MemberConfig::name), faults);
   check_unique(
       "swarm.members", ".uwb_id", members,
-      [&](const MemberConfig& m) { return id_text(m.uwb_id.value_or(m.id.value)); }, faults);
+      [&](const MemberConfig& m) {
+        return m.uwb_id ? std::to_string(*m.uwb_id) : id_text(m.id.value);
+      },
+      faults);
   check_codes(members, faults);
 
   const auto has_member = [&](RobotId id) {

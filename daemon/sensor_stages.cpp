@@ -93,11 +93,16 @@ void back_off(Duration wait, const StageContext& context, const std::stop_token&
 }
 
 Totals faults_of(const NlinkCounts& counts) {
-  return {{"unknown_modules", counts.unknown_modules}, {"implausible", counts.implausible}};
+  return {{"unknown_modules", counts.unknown_modules},
+          {"implausible", counts.implausible},
+          {"without_ranges", counts.without_ranges}};
 }
 
-Totals faults_of(const WitMotionCounts& counts) {
-  return {{"incomplete", counts.incomplete}, {"implausible", counts.implausible}};
+Totals faults_of(const ImuCounts& counts) {
+  return {{"partial", counts.partial},
+          {"unscaled", counts.unscaled},
+          {"saturated", counts.saturated},
+          {"implausible", counts.implausible}};
 }
 
 /// `Arrange` puts right what was read at once: a function of a std::vector<Measurement>&.

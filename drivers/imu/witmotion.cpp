@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <utility>
+
+#include "drivers/serial/byte_fields.hpp"
 
 namespace crepes {
 namespace {
@@ -19,19 +20,9 @@ constexpr Duration kWithinSample = std::chrono::milliseconds(5);
 
 using Raw = Eigen::Vector3i;
 
-Raw raw_of(Bytes frame) {
-  const auto word = [&](std::size_t at) {
-    const int value = frame[at] | frame[at + 1] << 8;
-    return value >= 0x8000 ? value - 0x10000 : value;
-  };
-  return {word(2), word(4), word(6)};
-}
+Raw raw_of(Bytes frame) { return vector_at<std::int16_t>(frame, 2).cast<int>(); }
 
 bool is_saturated(const Raw& raw) { return raw.minCoeff() == -0x8000 || raw.maxCoeff() == 0x7fff; }
-
-std::uint8_t checksum_of(Bytes bytes) {
-  return static_cast<std::uint8_t>(std::accumulate(bytes.begin(), bytes.end(), 0U));
-}
 
 void encode(std::span<std::uint8_t> frame, std::uint8_t type, const Eigen::Vector3d& value,
             double unit) {
@@ -45,7 +36,7 @@ void encode(std::span<std::uint8_t> frame, std::uint8_t type, const Eigen::Vecto
     frame[at] = static_cast<std::uint8_t>(word & 0xff);
     frame[at + 1] = static_cast<std::uint8_t>(word >> 8 & 0xff);
   }
-  frame[10] = checksum_of(frame.first(10));
+  frame[10] = byte_sum(frame.first(10));
 }
 
 }  // namespace
@@ -55,7 +46,7 @@ FrameCheck WitMotionParser::examine(Bytes bytes) {
   if (bytes.size() < 2) return {FrameKind::kIncomplete};
   if (bytes[1] < 0x50 || bytes[1] > 0x5f) return {};
   if (bytes.size() < kMaxFrame) return {FrameKind::kIncomplete};
-  if (checksum_of(bytes.first(10)) != bytes[10]) return {FrameKind::kBadChecksum};
+  if (byte_sum(bytes.first(10)) != bytes[10]) return {FrameKind::kBadChecksum};
   return {FrameKind::kComplete, kMaxFrame};
 }
 
@@ -65,22 +56,24 @@ void WitMotionParser::parse(Bytes frame, Timestamp arrival,
   if (frame[1] == kAcceleration) {
     acceleration_ = Acceleration{.arrival = arrival,
                                  .mps2 = raw.cast<double>() * kAccelerationUnit,
-                                 .plausible = !is_saturated(raw) && !raw.isZero()};
+                                 .saturated = is_saturated(raw)};
     return;
   }
   const std::optional<Acceleration> acceleration = std::exchange(acceleration_, std::nullopt);
   if (frame[1] != kRate) return;
+  ImuReading reading{.verdict = ImuVerdict::kPartial, .gyro_radps = raw.cast<double>() * kRateUnit};
   // Both halves are sent at once; an older first half belongs to a sample that lost its second.
-  if (!acceleration || arrival - acceleration->arrival > kWithinSample) {
-    ++counts_.incomplete;
-  } else if (!acceleration->plausible || is_saturated(raw)) {
-    ++counts_.implausible;
-  } else {
-    ++counts_.samples;
-    sink({.stamp = arrival,
-          .gyro_radps = raw.cast<double>() * kRateUnit,
-          .accel_mps2 = acceleration->mps2});
+  if (acceleration && arrival - acceleration->arrival <= kWithinSample) {
+    const bool saturated = acceleration->saturated || is_saturated(raw);
+    reading.verdict = saturated ? ImuVerdict::kSaturated : ImuVerdict::kSample;
+    reading.accel_mps2 = acceleration->mps2;
   }
+  take(reading, arrival, counts_, sink);
+}
+
+std::string WitMotionParser::why_nothing() const {
+  return "the WitMotion sensor does not send acceleration (51) and rate (52) together; switch both "
+         "on with its set-up program";
 }
 
 std::array<std::uint8_t, 22> encode_witmotion(const Eigen::Vector3d& gyro_radps,

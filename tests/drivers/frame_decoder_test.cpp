@@ -3,32 +3,13 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-#include <algorithm>
-
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/uwb/nlink.hpp"
+#include "tests/support/frame_damage.hpp"
 #include "tests/support/recorded_frames.hpp"
 
 namespace crepes {
 namespace {
-
-using Frames = std::vector<std::vector<std::uint8_t>>;
-
-template <class Protocol>
-Frames decode(FrameDecoder<Protocol>& decoder, Bytes stream, std::size_t chunk) {
-  Frames frames;
-  for (std::size_t at = 0; at < stream.size(); at += chunk) {
-    decoder.feed(stream.subspan(at, std::min(chunk, stream.size() - at)),
-                 [&](Bytes frame) { frames.emplace_back(frame.begin(), frame.end()); });
-  }
-  return frames;
-}
-
-template <class Protocol>
-Frames decode(Bytes stream, std::size_t chunk = 4096) {
-  FrameDecoder<Protocol> decoder;
-  return decode(decoder, stream, chunk);
-}
 
 TEST(FrameDecoder, FindsTheSameFramesInEveryChunkSize) {
   const auto uwb = recorded_node_frame2() + recorded_node_frame3();
@@ -37,27 +18,6 @@ TEST(FrameDecoder, FindsTheSameFramesInEveryChunkSize) {
     EXPECT_EQ(decode<NlinkParser>(uwb, chunk),
               (Frames{recorded_node_frame2(), recorded_node_frame3()}));
     EXPECT_EQ(decode<WitMotionParser>(imu, chunk).size(), 7U);
-  }
-}
-
-TEST(FrameDecoder, HandsOutNothingOfATruncatedFrameAndLosesNothingAfterIt) {
-  const auto frame = recorded_node_frame3();
-  for (std::size_t length = 0; length < frame.size(); ++length) {
-    const std::vector<std::uint8_t> cut(frame.begin(),
-                                        frame.begin() + static_cast<std::ptrdiff_t>(length));
-    EXPECT_TRUE(decode<NlinkParser>(cut).empty());
-    EXPECT_EQ(decode<NlinkParser>(cut + frame + frame), (Frames{frame, frame})) << length;
-  }
-}
-
-TEST(FrameDecoder, RefusesEverySingleBitErrorAndFindsTheNextFrame) {
-  for (const auto& good : {recorded_node_frame2(), recorded_node_frame3()}) {
-    for (std::size_t bit = 0; bit < 8 * good.size(); ++bit) {
-      auto bad = good;
-      bad[bit / 8] ^= static_cast<std::uint8_t>(1U << bit % 8);
-      // A longer length could wait for the bytes of what follows; a few frames end that.
-      EXPECT_EQ(decode<NlinkParser>(bad + good + good), (Frames{good, good})) << bit;
-    }
   }
 }
 

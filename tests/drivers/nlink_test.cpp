@@ -3,11 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-#include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
-#include <sstream>
-
+#include "tests/support/recorded_files.hpp"
 #include "tests/support/recorded_frames.hpp"
 
 namespace crepes {
@@ -116,36 +112,29 @@ TEST(Nlink, GivenModulesByConfigurationFallsBackToRobotIds) {
   EXPECT_EQ(uwb_modules_of(swarm), (UwbModules{{1, RobotId{1}}, {40, RobotId{2}}}));
 }
 
-TEST(Nlink, AgreesWithAllRecordedFrames) {
-  const auto folder =
-      std::filesystem::path(__FILE__).parent_path() / "../../../shared/vectors/nlink";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no recorded frames beside the project";
-  int compared = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.path().extension() != ".hex") continue;
-    std::ostringstream hex;
-    hex << std::ifstream(entry.path()).rdbuf();
-    const auto bytes = bytes_of(hex.str());
-    auto json_path = entry.path();
-    const auto json = nlohmann::json::parse(std::ifstream(json_path.replace_extension(".json")));
-    const auto& decoded = json.at("decoded");
-    const std::string type = decoded.value("type", "");
-    if (type != "NodeFrame2" && type != "NodeFrame3") {
-      EXPECT_NE(NlinkParser::examine(bytes).kind, FrameKind::kComplete) << entry.path();
-      continue;
-    }
-    const auto ranges = ranges_in(Bytes(bytes).first(decoded.at("ends_at").get<std::size_t>()));
-    ASSERT_EQ(ranges.size(), decoded.at("n").get<std::size_t>()) << entry.path();
-    for (std::size_t i = 0; i < ranges.size(); ++i) {
-      const auto& node = decoded.at("nodes").at(i);
-      EXPECT_EQ(ranges[i].neighbor.value, node.at("id").get<int>());
-      EXPECT_DOUBLE_EQ(ranges[i].range_m, node.at("dis").get<double>());
-      EXPECT_DOUBLE_EQ(ranges[i].first_path_dbm, node.at("fp_rssi").get<double>());
-      EXPECT_DOUBLE_EQ(ranges[i].received_dbm, node.at("rx_rssi").get<double>());
-      ++compared;
-    }
-  }
-  EXPECT_GE(compared, 10);
+TEST(Nlink, ReadsRangesOfEveryKindThatHasThem) {
+  const auto ranges_of = [](const char* name) { return ranges_in(recorded_file(name).bytes); };
+  EXPECT_EQ(ranges_of("nlink/tagframe0_01").size(), 4U);
+  EXPECT_EQ(ranges_of("nlink/aoa_nodeframe0_01").size(), 4U);
+  EXPECT_EQ(ranges_of("nlink/nodeframe5_01").size(), 4U);
+  EXPECT_EQ(ranges_of("nlink/nodeframe0_01").size(), 0U);
+  EXPECT_EQ(ranges_of("nlink/nodeframe1_01").size(), 0U);
+  // A weak first path is told by the difference of the powers; TagFrame0 has none.
+  EXPECT_EQ(ranges_of("nlink/tagframe0_01")[1].first_path_dbm, 0.0);
+  EXPECT_EQ(ranges_of("nlink/tagframe0_01")[1].received_dbm, 0.0);
+}
+
+TEST(Nlink, SaysWhyThereAreNoRanges) {
+  NlinkParser parser({{9, RobotId{9}}}, 200.0);
+  ranges_in(parser, recorded_file("nlink/nodeframe1_01").bytes);
+  EXPECT_NE(parser.why_nothing().find("NodeFrame1, which has no ranges"), std::string::npos);
+  EXPECT_EQ(parser.counts().without_ranges, 1U);
+
+  ranges_in(parser, recorded_file("nlink/nodeframe3_02").bytes);
+  EXPECT_NE(parser.why_nothing().find("such as 0; see swarm.members"), std::string::npos);
+
+  ranges_in(parser, encode_node_frame3(9, 0, {}));
+  EXPECT_NE(parser.why_nothing().find("are the others on"), std::string::npos);
 }
 
 }  // namespace

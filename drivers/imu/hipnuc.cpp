@@ -1,0 +1,51 @@
+#include "drivers/imu/hipnuc.hpp"
+
+#include <numbers>
+
+#include "drivers/serial/byte_fields.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr std::size_t kPayload = 6;
+constexpr std::size_t kHi91Length = 76;
+constexpr std::uint8_t kHi91 = 0x91;
+
+/// CRC-16 with the polynomial 0x1021, most significant bit first, started with 0.
+std::uint16_t crc_of(Bytes bytes, std::uint16_t crc) {
+  for (const std::uint8_t byte : bytes) {
+    crc = static_cast<std::uint16_t>(crc ^ byte << 8U);
+    for (int bit = 0; bit < 8; ++bit) {
+      const unsigned shifted = static_cast<unsigned>(crc) << 1U;
+      crc = static_cast<std::uint16_t>((crc & 0x8000U) != 0 ? shifted ^ 0x1021U : shifted);
+    }
+  }
+  return crc;
+}
+
+}  // namespace
+
+FrameCheck Hipnuc::examine(Bytes bytes) {
+  if (bytes[0] != 0x5a) return {};
+  if (bytes.size() < 2) return {FrameKind::kIncomplete};
+  if (bytes[1] != 0xa5) return {};
+  if (bytes.size() < kPayload) return {FrameKind::kIncomplete};
+  const std::size_t length = kPayload + unsigned_at(bytes, 2, 2);
+  if (length == kPayload || length > kMaxFrame) return {};
+  if (bytes.size() < length) return {FrameKind::kIncomplete};
+  const Bytes payload = bytes.subspan(kPayload, length - kPayload);
+  if (crc_of(payload, crc_of(bytes.first(4), 0)) != unsigned_at(bytes, 4, 2))
+    return {FrameKind::kBadChecksum};
+  return {FrameKind::kComplete, length};
+}
+
+ImuReading Hipnuc::read(Bytes frame) {
+  constexpr double kGravity = 9.80665;
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  if (frame.size() != kPayload + kHi91Length || frame[kPayload] != kHi91) return {};
+  return {.verdict = ImuVerdict::kSample,
+          .gyro_radps = vector_at<float>(frame, kPayload + 24) * kDegree,
+          .accel_mps2 = vector_at<float>(frame, kPayload + 12) * kGravity};
+}
+
+}  // namespace crepes

@@ -1,0 +1,97 @@
+/// What one frame of an inertial sensor says, and the parser that most protocols share.
+#pragma once
+
+#include <Eigen/Core>
+#include <concepts>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "drivers/serial/frame_decoder.hpp"
+#include "estimator/core/measurements.hpp"
+
+namespace crepes {
+
+enum class ImuVerdict : std::uint8_t {
+  kSample,
+  kOther,      ///< a frame that has nothing to do with rates and acceleration
+  kPartial,    ///< a rate without the acceleration of the same moment, or the other way round
+  kUnscaled,   ///< numbers without a unit
+  kSaturated,  ///< at the end of the sensor's scale
+};
+
+/// In the sensor's axes; +9.81 up at rest.
+struct ImuReading {
+  ImuVerdict verdict = ImuVerdict::kOther;
+  Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
+};
+
+/// No number, beyond every sensor's scale, or an accelerometer that says exactly nothing.
+[[nodiscard]] inline bool is_plausible(const ImuReading& reading) {
+  constexpr double kMostRate = 80.0;           // rad/s
+  constexpr double kMostAcceleration = 650.0;  // m/s^2
+  return reading.gyro_radps.allFinite() && reading.accel_mps2.allFinite() &&
+         reading.gyro_radps.cwiseAbs().maxCoeff() < kMostRate &&
+         reading.accel_mps2.cwiseAbs().maxCoeff() < kMostAcceleration &&
+         !reading.accel_mps2.isZero(0.0);
+}
+
+/// Totals by what became of readings.
+struct ImuCounts {
+  std::uint64_t samples = 0;
+  std::uint64_t partial = 0;
+  std::uint64_t unscaled = 0;
+  std::uint64_t saturated = 0;
+  std::uint64_t implausible = 0;
+};
+
+/// Hands on what `reading` holds, if it is a sample, and counts it.
+inline void take(const ImuReading& reading, Timestamp arrival, ImuCounts& counts,
+                 const std::function<void(const ImuSample&)>& sink) {
+  if (reading.verdict == ImuVerdict::kOther) return;
+  if (reading.verdict == ImuVerdict::kPartial) {
+    ++counts.partial;
+  } else if (reading.verdict == ImuVerdict::kUnscaled) {
+    ++counts.unscaled;
+  } else if (reading.verdict == ImuVerdict::kSaturated) {
+    ++counts.saturated;
+  } else if (!is_plausible(reading)) {
+    ++counts.implausible;
+  } else {
+    ++counts.samples;
+    sink({arrival, reading.gyro_radps, reading.accel_mps2});
+  }
+}
+
+/// One frame is one reading:  `static ImuReading read(Bytes frame)`,  a pure function. `kNoSamples`
+/// says what to do when frames come but no samples.
+template <class Protocol>
+concept ImuProtocolFormat = FrameProtocol<Protocol> && requires(Bytes frame) {
+  { Protocol::read(frame) } -> std::same_as<ImuReading>;
+  { Protocol::kNoSamples } -> std::convertible_to<std::string_view>;
+};
+
+/// The parser of a protocol of which every frame stands for itself.
+template <ImuProtocolFormat Protocol>
+class ImuFrameParser {
+ public:
+  using Measurement = ImuSample;
+  static constexpr std::size_t kMaxFrame = Protocol::kMaxFrame;
+  static constexpr std::string_view kForeignMeaning = {};
+
+  [[nodiscard]] static FrameCheck examine(Bytes bytes) { return Protocol::examine(bytes); }
+
+  void parse(Bytes frame, Timestamp arrival, const std::function<void(const ImuSample&)>& sink) {
+    take(Protocol::read(frame), arrival, counts_, sink);
+  }
+
+  [[nodiscard]] std::string why_nothing() const { return std::string(Protocol::kNoSamples); }
+  [[nodiscard]] const ImuCounts& counts() const { return counts_; }
+
+ private:
+  ImuCounts counts_;
+};
+
+}  // namespace crepes

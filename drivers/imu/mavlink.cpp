@@ -1,0 +1,174 @@
+#include "drivers/imu/mavlink.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "drivers/serial/byte_fields.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr std::uint8_t kVersion1 = 0xfe;
+constexpr std::uint8_t kVersion2 = 0xfd;
+constexpr std::size_t kChecksum = 2;
+constexpr std::size_t kSignature = 13;
+constexpr double kMilliGravity = 9.80665e-3;
+
+enum MessageId : std::uint32_t {
+  kHeartbeat = 0,
+  kSysStatus = 1,
+  kScaledImu = 26,
+  kRawImu = 27,
+  kAttitude = 30,
+  kHighresImu = 105,
+  kTimesync = 111,
+  kScaledImu2 = 116,
+};
+
+/// `length` in version 1; version 2 adds fields up to `extended` and cuts trailing zeros.
+struct Message {
+  MessageId id;
+  std::size_t length;
+  std::size_t extended;
+  std::uint8_t crc_extra;
+};
+
+constexpr std::array kMessages{Message{kHighresImu, 62, 63, 93}, Message{kScaledImu, 22, 24, 170},
+                               Message{kScaledImu2, 22, 24, 76}, Message{kRawImu, 26, 29, 144},
+                               Message{kHeartbeat, 9, 9, 50},    Message{kSysStatus, 31, 43, 124},
+                               Message{kAttitude, 28, 28, 39},   Message{kTimesync, 16, 18, 34}};
+
+struct Header {
+  std::uint32_t id = 0;
+  std::size_t size = 0;  ///< of the header itself
+  std::size_t payload = 0;
+  bool is_signed = false;
+  std::uint32_t sender = 0;  ///< system and component
+
+  [[nodiscard]] std::size_t frame() const {
+    return size + payload + kChecksum + (is_signed ? kSignature : 0);
+  }
+};
+
+std::size_t header_size(Bytes bytes) { return bytes[0] == kVersion1 ? 6 : 10; }
+
+Header header_of(Bytes bytes) {
+  if (bytes[0] == kVersion1) {
+    return {.id = bytes[5],
+            .size = 6,
+            .payload = bytes[1],
+            .sender = static_cast<std::uint32_t>(unsigned_at(bytes, 3, 2))};
+  }
+  return {.id = static_cast<std::uint32_t>(unsigned_at(bytes, 7, 3)),
+          .size = 10,
+          .payload = bytes[1],
+          .is_signed = (bytes[2] & 1U) != 0,
+          .sender = static_cast<std::uint32_t>(unsigned_at(bytes, 5, 2))};
+}
+
+/// CRC-16/MCRF4XX, least significant bit first.
+std::uint16_t crc_of(Bytes bytes, std::uint8_t extra) {
+  std::uint32_t crc = 0xffffU;
+  const auto add = [&](std::uint8_t byte) {
+    crc ^= byte;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 1U) != 0 ? crc >> 1U ^ 0x8408U : crc >> 1U;
+  };
+  std::ranges::for_each(bytes, add);
+  add(extra);
+  return static_cast<std::uint16_t>(crc);
+}
+
+const Message* message_of(std::uint32_t id) {
+  const auto* const found =
+      std::ranges::find_if(kMessages, [&](const Message& m) { return m.id == id; });
+  return found == kMessages.end() ? nullptr : found;
+}
+
+bool can_have(const Message& message, Bytes bytes, std::size_t length) {
+  return bytes[0] == kVersion1 ? length == message.length
+                               : length >= 1 && length <= message.extended;
+}
+
+/// Forward, right, down to forward, left, up.
+Eigen::Vector3d turned(const Eigen::Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
+
+/// Integers of which the last value means: at least so much.
+bool is_saturated(const Eigen::Vector3d& raw) {
+  return raw.minCoeff() <= -0x8000 || raw.maxCoeff() >= 0x7fff;
+}
+
+ImuReading highres(Bytes payload) {
+  constexpr std::uint32_t kAllSix = 0x3fU;  // of the field that says what is new
+  if ((unsigned_at(payload, 60, 2) & kAllSix) != kAllSix) return {.verdict = ImuVerdict::kPartial};
+  return {.verdict = ImuVerdict::kSample,
+          .gyro_radps = turned(vector_at<float>(payload, 20)),
+          .accel_mps2 = turned(vector_at<float>(payload, 8))};
+}
+
+ImuReading scaled(Bytes payload) {
+  const Eigen::Vector3d accel = vector_at<std::int16_t>(payload, 4);
+  const Eigen::Vector3d gyro = vector_at<std::int16_t>(payload, 10);
+  const bool saturated = is_saturated(accel) || is_saturated(gyro);
+  return {.verdict = saturated ? ImuVerdict::kSaturated : ImuVerdict::kSample,
+          .gyro_radps = turned(gyro) * 1e-3,
+          .accel_mps2 = turned(accel) * kMilliGravity};
+}
+
+/// The smaller, the better; empty: no samples in it.
+std::optional<int> rank_of(std::uint32_t id) {
+  constexpr std::array kBestFirst{kHighresImu, kScaledImu, kScaledImu2};
+  const auto* const found = std::ranges::find(kBestFirst, id);
+  if (found == kBestFirst.end()) return std::nullopt;
+  return static_cast<int>(found - kBestFirst.begin());
+}
+
+}  // namespace
+
+FrameCheck Mavlink::examine(Bytes bytes) {
+  if (bytes[0] != kVersion1 && bytes[0] != kVersion2) return {};
+  if (bytes.size() < header_size(bytes)) return {FrameKind::kIncomplete};
+  const Header header = header_of(bytes);
+  const Message* message = message_of(header.id);
+  if (message == nullptr || !can_have(*message, bytes, header.payload)) return {};
+  if (bytes[0] == kVersion2 && (bytes[2] & ~1U) != 0) return {};  // to be refused if not understood
+  if (bytes.size() < header.frame()) return {FrameKind::kIncomplete};
+  const std::size_t end = header.size + header.payload;
+  if (crc_of(bytes.subspan(1, end - 1), message->crc_extra) != unsigned_at(bytes, end, kChecksum))
+    return {FrameKind::kBadChecksum};
+  return {FrameKind::kComplete, header.frame()};
+}
+
+ImuReading Mavlink::read(Bytes frame) {
+  const Header header = header_of(frame);
+  std::array<std::uint8_t, 255> payload{};  // zeros that were cut are back
+  std::ranges::copy(frame.subspan(header.size, header.payload), payload.begin());
+  if (header.id == kHighresImu) return highres(payload);
+  if (header.id == kScaledImu || header.id == kScaledImu2) return scaled(payload);
+  if (header.id == kRawImu) return {.verdict = ImuVerdict::kUnscaled};
+  return {};
+}
+
+bool MavlinkParser::is_chosen(Bytes frame, Timestamp arrival) {
+  constexpr Duration kGone = std::chrono::seconds(1);
+  const Header header = header_of(frame);
+  const std::optional<int> rank = rank_of(header.id);
+  if (!rank) return true;  // no rival: to be counted
+  if (source_ && *rank == source_->rank && header.sender == source_->sender)
+    source_->heard = arrival;
+  else if (!source_ || *rank < source_->rank || arrival - source_->heard > kGone)
+    source_ = Source{*rank, header.sender, arrival};
+  else
+    return false;
+  return true;
+}
+
+void MavlinkParser::parse(Bytes frame, Timestamp arrival,
+                          const std::function<void(const ImuSample&)>& sink) {
+  if (is_chosen(frame, arrival)) take(Mavlink::read(frame), arrival, counts_, sink);
+}
+
+std::string MavlinkParser::why_nothing() const {
+  return std::string(counts_.unscaled > 0 ? Mavlink::kOnlyRaw : Mavlink::kNoSamples);
+}
+
+}  // namespace crepes

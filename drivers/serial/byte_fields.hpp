@@ -1,0 +1,66 @@
+/// Numbers inside frames. The caller has checked that the bytes are there.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <type_traits>
+
+#include "drivers/serial/frame_decoder.hpp"
+
+namespace crepes {
+
+/// An unsigned number of `count` bytes.
+[[nodiscard]] inline std::uint64_t unsigned_at(Bytes bytes, std::size_t at, std::size_t count,
+                                               std::endian order = std::endian::little) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t next = order == std::endian::big ? i : count - 1 - i;
+    value = value << 8U | bytes[at + next];
+  }
+  return value;
+}
+
+/// A number as it lies in memory, but for the order of its bytes.
+template <class T>
+[[nodiscard]] T field_at(Bytes bytes, std::size_t at, std::endian order = std::endian::little) {
+  const std::uint64_t value = unsigned_at(bytes, at, sizeof(T), order);
+  if constexpr (std::is_same_v<T, float>) {
+    return std::bit_cast<float>(static_cast<std::uint32_t>(value));
+  } else if constexpr (std::is_same_v<T, double>) {
+    return std::bit_cast<double>(value);
+  } else {
+    return static_cast<T>(value);
+  }
+}
+
+/// Three numbers in a row.
+template <class T>
+[[nodiscard]] Eigen::Vector3d vector_at(Bytes bytes, std::size_t at,
+                                        std::endian order = std::endian::little) {
+  const auto field = [&](std::size_t i) {
+    return static_cast<double>(field_at<T>(bytes, at + i * sizeof(T), order));
+  };
+  return {field(0), field(1), field(2)};
+}
+
+/// The low eight bits of the sum.
+[[nodiscard]] inline std::uint8_t byte_sum(Bytes bytes) {
+  return static_cast<std::uint8_t>(std::accumulate(bytes.begin(), bytes.end(), 0U));
+}
+
+/// Whether the frame's own beginning stands in it a second time. A frame cut short and the next one
+/// can have the right sum together (one in 256 does), which would be a wrong value.
+[[nodiscard]] inline bool begins_twice(Bytes frame) {
+  constexpr std::size_t kBeginning = 4;
+  for (std::size_t at = 1; at + 1 < frame.size(); ++at) {
+    const Bytes rest = frame.subspan(at, std::min(kBeginning, frame.size() - at));
+    if (std::ranges::equal(rest, frame.first(rest.size()))) return true;
+  }
+  return false;
+}
+
+}  // namespace crepes

@@ -1,0 +1,81 @@
+/// The NLink protocol of NoopLoop LinkTrack modules: bytes to values, nothing else.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "drivers/serial/frame_decoder.hpp"
+
+namespace crepes {
+
+/// The second byte of a frame.
+enum class NlinkKind : std::uint8_t {
+  kTagFrame0 = 0x01,
+  kNodeFrame0 = 0x02,
+  kNodeFrame1 = 0x03,
+  kNodeFrame2 = 0x04,
+  kNodeFrame3 = 0x05,
+  kAoaNodeFrame0 = 0x07,
+  kNodeFrame5 = 0x08,
+  kNodeFrame6 = 0x09,
+};
+
+/// As NAssistant calls it.
+[[nodiscard]] std::string_view name_of(NlinkKind kind);
+[[nodiscard]] bool has_ranges(NlinkKind kind);
+
+/// What a module says of one other module; a kind of frame fills only what it has.
+struct NlinkNode {
+  std::uint32_t module = 0;
+  double range_m = 0.0;         ///< of kinds with `has_ranges`
+  double first_path_dbm = 0.0;  ///< both powers are 0 in TagFrame0, which has none
+  double received_dbm = 0.0;
+  std::uint8_t role = 0;
+  std::optional<std::uint32_t> system_time_ms =
+      std::nullopt;                                ///< NodeFrame2: when the range was measured
+  std::optional<double> angle_rad = std::nullopt;  ///< AoaNodeFrame0
+  std::optional<Eigen::Vector3d> position_m = std::nullopt;  ///< NodeFrame1
+  std::vector<std::uint8_t> user_data = {};                  ///< NodeFrame0, NodeFrame6
+};
+
+/// What a tag knows of itself, in the axes of its anchors.
+struct NlinkMotion {
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position_error_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d roll_pitch_yaw_rad = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+};
+
+struct NlinkFrame {
+  NlinkKind kind = NlinkKind::kNodeFrame3;
+  std::uint8_t role = 0;
+  std::uint32_t module = 0;
+  std::uint32_t local_time_ms = 0;   ///< the module's own
+  std::uint32_t system_time_ms = 0;  ///< the network's
+  double voltage_v = 0.0;
+  std::vector<NlinkNode> nodes = {};
+  std::optional<NlinkMotion> motion = std::nullopt;  ///< NodeFrame2, TagFrame0
+};
+
+inline constexpr std::size_t kLongestNlinkFrame = 119 + 255 * 13 + 1;  ///< NodeFrame2, 255 nodes
+
+/// `bytes` begin a frame of this protocol?
+[[nodiscard]] FrameCheck examine_nlink(Bytes bytes);
+
+/// A whole frame, as `examine_nlink` found it.
+[[nodiscard]] NlinkFrame decode_nlink(Bytes frame);
+
+/// The frame that a module with role NODE sends; times are milliseconds of the module's clocks.
+[[nodiscard]] std::vector<std::uint8_t> encode_node_frame3(std::uint8_t module,
+                                                           std::uint32_t system_time_ms,
+                                                           const std::vector<NlinkNode>& nodes);
+
+}  // namespace crepes

@@ -1,0 +1,176 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "drivers/imu/hipnuc.hpp"
+#include "drivers/imu/mavlink.hpp"
+#include "drivers/imu/xsens.hpp"
+#include "tests/support/frame_damage.hpp"
+#include "tests/support/recorded_files.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using Json = nlohmann::json;
+
+constexpr double kGravity = 9.80665;
+
+Eigen::Vector3d vector_of(const Json& values) {
+  return {values[0].get<double>(), values[1].get<double>(), values[2].get<double>()};
+}
+
+/// MAVLink's forward, right, down as our forward, left, up.
+Eigen::Vector3d turned(const Eigen::Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
+
+void expect_sample(const ImuReading& reading, const Eigen::Vector3d& gyro_radps,
+                   const Eigen::Vector3d& accel_mps2) {
+  EXPECT_EQ(reading.verdict, ImuVerdict::kSample);
+  EXPECT_LT((reading.gyro_radps - gyro_radps).norm(), 1e-6);
+  EXPECT_LT((reading.accel_mps2 - accel_mps2).norm(), 1e-5);
+}
+
+template <class Parser>
+std::size_t samples_in(Parser& parser, const std::vector<std::uint8_t>& stream,
+                       Timestamp arrival = {}) {
+  std::size_t samples = 0;
+  for (const auto& frame : decode<Parser>(stream))
+    parser.parse(frame, arrival, [&](const ImuSample&) { ++samples; });
+  return samples;
+}
+
+TEST(Hipnuc, ReadsTheRecordedFrameInSiUnits) {
+  const RecordedFrame file = recorded_file("imu/hipnuc_hi91_official");
+
+  ASSERT_EQ(Hipnuc::examine(file.bytes).length, file.bytes.size());
+  expect_sample(Hipnuc::read(file.bytes), vector_of(file.decoded["gyro_dps"]) * M_PI / 180.0,
+                vector_of(file.decoded["acc_g"]) * kGravity);
+}
+
+TEST(Hipnuc, RefusesEveryTruncationSplitAndBitError) {
+  expect_refuses_damage<HipnucParser>(recorded_file("imu/hipnuc_hi91_official").bytes);
+}
+
+TEST(Xsens, ReadsTheRecordedMessage) {
+  const RecordedFrame file = recorded_file("imu/xsens_mtdata2_accgyr");
+
+  ASSERT_EQ(Xsens::examine(file.bytes).length, file.bytes.size());
+  expect_sample(Xsens::read(file.bytes), vector_of(file.decoded["items"][3]["v"]),
+                vector_of(file.decoded["items"][2]["v"]));
+}
+
+TEST(Xsens, PassesByMessagesWithoutSamples) {
+  const auto bytes = recorded_file("imu/xsens_mtdata2_short").bytes;
+  ASSERT_EQ(Xsens::examine(bytes).kind, FrameKind::kComplete);
+
+  EXPECT_EQ(Xsens::read(bytes).verdict, ImuVerdict::kOther);
+}
+
+TEST(Xsens, RefusesEveryTruncationSplitAndBitError) {
+  expect_refuses_damage<XsensParser>(recorded_file("imu/xsens_mtdata2_accgyr").bytes);
+  expect_refuses_damage<XsensParser>(recorded_file("imu/xsens_mtdata2_short").bytes);
+}
+
+/// A message with these items, checksum included.
+std::vector<std::uint8_t> xsens_message(const std::string& items) {
+  const auto payload = bytes_of(items);
+  auto message = bytes_of("fa ff 36") +
+                 std::vector<std::uint8_t>{static_cast<std::uint8_t>(payload.size())} + payload;
+  unsigned sum = 0;
+  for (std::size_t i = 1; i < message.size(); ++i) sum += message[i];
+  message.push_back(static_cast<std::uint8_t>(0x100U - (sum & 0xffU)));
+  return message;
+}
+
+TEST(Xsens, ReadsEveryNumberFormat) {
+  const auto fixed12_20 = xsens_message(
+      "40 21 0c 00 10 00 00 00 20 00 00 00 9d 00 00 80 21 0c ff f0 00 00 00 08 00 00 00 00 00 00");
+  expect_sample(Xsens::read(fixed12_20), {-1.0, 0.5, 0.0}, {1.0, 2.0, 9.8125});
+  const auto fixed16_32 = xsens_message(
+      "40 22 12 00 00 00 00 00 01 00 00 00 00 00 02 d0 00 00 00 00 09 "
+      "80 22 12 00 00 00 00 ff ff 80 00 00 00 00 00 00 00 00 00 00 00");
+  expect_sample(Xsens::read(fixed16_32), {-1.0, 0.5, 0.0}, {1.0, 2.0, 9.8125});
+  const auto doubles = xsens_message(
+      "40 23 18 3f f0 00 00 00 00 00 00 40 00 00 00 00 00 00 00 40 23 a0 00 00 00 00 00 "
+      "80 23 18 bf f0 00 00 00 00 00 00 3f e0 00 00 00 00 00 00 00 00 00 00 00 00 00 00");
+  expect_sample(Xsens::read(doubles), {-1.0, 0.5, 0.0}, {1.0, 2.0, 9.8125});
+}
+
+TEST(Xsens, TellsClippedAndHalfSamples) {
+  const std::string accel = "40 20 0c 3f 80 00 00 40 00 00 00 41 1d 00 00 ";
+  const std::string gyro = "80 20 0c bf 80 00 00 3f 00 00 00 00 00 00 00 ";
+
+  EXPECT_EQ(Xsens::read(xsens_message(accel + gyro)).verdict, ImuVerdict::kSample);
+  EXPECT_EQ(Xsens::read(xsens_message(accel + gyro + "e0 20 04 00 08 08 00")).verdict,
+            ImuVerdict::kSaturated);
+  EXPECT_EQ(Xsens::read(xsens_message(gyro)).verdict, ImuVerdict::kPartial);
+}
+
+TEST(Mavlink, ReadsRecordedMessagesInOurAxesAndUnits) {
+  for (const char* name : {"imu/mavlink_highres_imu_v1", "imu/mavlink_highres_imu_v2"}) {
+    const RecordedFrame file = recorded_file(name);
+    ASSERT_EQ(Mavlink::examine(file.bytes).length, file.bytes.size()) << name;
+    expect_sample(Mavlink::read(file.bytes), turned(vector_of(file.decoded["gyro_rads"])),
+                  turned(vector_of(file.decoded["acc_ms2"])));
+  }
+  for (const char* name : {"imu/mavlink_scaled_imu_v1", "imu/mavlink_scaled_imu2_v2"}) {
+    const RecordedFrame file = recorded_file(name);
+    ASSERT_EQ(Mavlink::examine(file.bytes).length, file.bytes.size()) << name;
+    expect_sample(Mavlink::read(file.bytes), turned(vector_of(file.decoded["gyro_mrads"])) / 1e3,
+                  turned(vector_of(file.decoded["acc_mg"])) * kGravity / 1e3);
+  }
+}
+
+TEST(Mavlink, RefusesEveryTruncationSplitAndBitErrorOfEveryRecordedMessage) {
+  int checked = 0;
+  for (const RecordedFrame& file : recorded_files("imu")) {
+    if (file.name.find("mavlink") == std::string::npos) continue;
+    SCOPED_TRACE(file.name);
+    expect_refuses_damage<MavlinkParser>(file.bytes);
+    ++checked;
+  }
+  EXPECT_EQ(checked, 6);
+}
+
+TEST(Mavlink, RefusesRawImuWithAReason) {
+  MavlinkParser parser;
+  EXPECT_EQ(samples_in(parser, recorded_file("imu/mavlink_timesync_v2").bytes), 0U);
+  EXPECT_NE(parser.why_nothing().find("without an IMU message"), std::string::npos);
+
+  EXPECT_EQ(samples_in(parser, recorded_file("imu/mavlink_raw_imu_v2").bytes), 0U);
+
+  EXPECT_EQ(parser.counts().unscaled, 1U);
+  EXPECT_NE(parser.why_nothing().find("RAW_IMU only"), std::string::npos);
+}
+
+TEST(Mavlink, TakesTheBestMessageOnlyAndAnotherWhenThatIsGone) {
+  const auto highres = recorded_file("imu/mavlink_highres_imu_v2").bytes;
+  const auto scaled = recorded_file("imu/mavlink_scaled_imu_v1").bytes;
+  const auto scaled2 = recorded_file("imu/mavlink_scaled_imu2_v2").bytes;
+  MavlinkParser parser;
+
+  EXPECT_EQ(samples_in(parser, scaled2, Timestamp{1s}), 1U);
+  EXPECT_EQ(samples_in(parser, scaled + highres, Timestamp{2s}), 2U);
+  EXPECT_EQ(samples_in(parser, scaled + scaled2, Timestamp{2500ms}), 0U);
+  EXPECT_EQ(samples_in(parser, scaled + scaled2, Timestamp{4s}), 1U);
+}
+
+template <class Parser>
+std::size_t implausible_in(const std::vector<std::uint8_t>& frame) {
+  Parser parser;
+  EXPECT_EQ(samples_in(parser, frame), 0U);
+  return parser.counts().implausible;
+}
+
+TEST(ImuReading, RefusesWhatIsNoNumberOrBeyondEverySensor) {
+  const std::string gyro = "80 20 0c bf 80 00 00 3f 00 00 00 00 00 00 00";
+  const auto with_accel_x = [&](const std::string& x) {
+    return xsens_message("40 20 0c " + x + " 40 00 00 00 41 1d 00 00 " + gyro);
+  };
+  EXPECT_EQ(implausible_in<XsensParser>(with_accel_x("7f c0 00 00")), 1U);  // not a number
+  EXPECT_EQ(implausible_in<XsensParser>(with_accel_x("7f 80 00 00")), 1U);  // infinite
+  EXPECT_EQ(implausible_in<XsensParser>(with_accel_x("44 7a 00 00")), 1U);  // 1000 m/s^2
+}
+
+}  // namespace
+}  // namespace crepes

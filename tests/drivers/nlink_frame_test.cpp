@@ -1,0 +1,152 @@
+#include "drivers/uwb/nlink_frame.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "drivers/uwb/nlink.hpp"
+#include "tests/support/frame_damage.hpp"
+#include "tests/support/recorded_files.hpp"
+
+namespace crepes {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kDegree = M_PI / 180.0;
+
+/// Recorded values are rounded to six decimals.
+void expect_vector(const Eigen::Vector3d& found, const Json& node, const char* key,
+                   double unit = 1.0) {
+  if (!node.contains(key)) return;
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(found[static_cast<Eigen::Index>(i)], node[key][i].get<double>() * unit, 1e-6)
+        << key << i;
+}
+
+void expect_node(const NlinkNode& found, const Json& node) {
+  EXPECT_EQ(found.module, node.at("id").get<unsigned>());
+  EXPECT_EQ(found.role, node.at("role").get<unsigned>());
+  EXPECT_DOUBLE_EQ(found.range_m, node.value("dis", 0.0));
+  EXPECT_DOUBLE_EQ(found.first_path_dbm, node.value("fp_rssi", 0.0));
+  EXPECT_DOUBLE_EQ(found.received_dbm, node.value("rx_rssi", 0.0));
+  EXPECT_EQ(found.system_time_ms.has_value(), node.contains("system_time"));
+  EXPECT_EQ(found.system_time_ms.value_or(0), node.value("system_time", 0U));
+  EXPECT_EQ(found.angle_rad.has_value(), node.contains("angle"));
+  EXPECT_NEAR(found.angle_rad.value_or(0.0), node.value("angle", 0.0) * kDegree, 1e-12);
+  EXPECT_EQ(found.position_m.has_value(), node.contains("pos"));
+  if (found.position_m) expect_vector(*found.position_m, node, "pos");
+  std::string hex = node.value("data", "");
+  for (std::size_t at = 2; at < hex.size(); at += 3) hex.insert(at, " ");
+  EXPECT_EQ(found.user_data, bytes_of(hex));
+}
+
+void expect_motion(const NlinkMotion& found, const Json& decoded) {
+  expect_vector(found.position_m, decoded, "pos");
+  expect_vector(found.position_error_m, decoded, "eop");
+  expect_vector(found.velocity_mps, decoded, "vel");
+  expect_vector(found.gyro_radps, decoded, "gyro");
+  expect_vector(found.accel_mps2, decoded, "acc");
+  expect_vector(found.roll_pitch_yaw_rad, decoded, "angle", kDegree);
+  EXPECT_NEAR(found.q.w(), decoded.at("quat")[0].get<double>(), 1e-6);
+  EXPECT_NEAR(found.q.x(), decoded.at("quat")[1].get<double>(), 1e-6);
+  EXPECT_NEAR(found.q.y(), decoded.at("quat")[2].get<double>(), 1e-6);
+  EXPECT_NEAR(found.q.z(), decoded.at("quat")[3].get<double>(), 1e-6);
+}
+
+/// The ranges of a TagFrame0, by anchor; 0 where there is none.
+std::vector<double> tag_ranges(const NlinkFrame& frame) {
+  std::vector<double> ranges(8);
+  for (const NlinkNode& node : frame.nodes) ranges.at(node.module) = node.range_m;
+  return ranges;
+}
+
+bool is_ours(const RecordedFrame& file) {
+  const std::string type = file.decoded.at("type");
+  return type != "AnchorFrame0" && type != "NodeFrame4";
+}
+
+TEST(NlinkFrame, DecodesEveryRecordedFrameToItsStatedValues) {
+  std::set<std::string> kinds;
+  for (const RecordedFrame& file : recorded_files("nlink")) {
+    if (!is_ours(file)) continue;
+    SCOPED_TRACE(file.name);
+    ASSERT_EQ(examine_nlink(file.bytes).kind, FrameKind::kComplete);
+    ASSERT_EQ(examine_nlink(file.bytes).length, file.decoded.at("len").get<std::size_t>());
+
+    const NlinkFrame frame = decode_nlink(file.bytes);
+
+    const Json& decoded = file.decoded;
+    kinds.insert(decoded.at("type"));
+    EXPECT_EQ(frame.role, decoded.at("role").get<unsigned>());
+    EXPECT_EQ(frame.module, decoded.at("id").get<unsigned>());
+    EXPECT_EQ(frame.local_time_ms, decoded.value("local_time", 0U));
+    EXPECT_EQ(frame.system_time_ms, decoded.value("system_time", 0U));
+    EXPECT_DOUBLE_EQ(frame.voltage_v, decoded.value("voltage", 0.0));
+    EXPECT_EQ(frame.motion.has_value(), decoded.contains("quat"));
+    if (frame.motion) expect_motion(*frame.motion, decoded);
+    if (decoded.contains("dis")) {
+      EXPECT_EQ(tag_ranges(frame), decoded["dis"].get<std::vector<double>>());
+    }
+    if (!decoded.contains("nodes")) continue;
+    ASSERT_EQ(frame.nodes.size(), decoded["nodes"].size());
+    for (std::size_t i = 0; i < frame.nodes.size(); ++i)
+      expect_node(frame.nodes[i], decoded["nodes"][i]);
+  }
+  EXPECT_EQ(kinds.size(), 7U);
+}
+
+TEST(NlinkFrame, RefusesKindsThatItDoesNotKnow) {
+  int refused = 0;
+  for (const RecordedFrame& file : recorded_files("nlink")) {
+    if (is_ours(file)) continue;
+    ++refused;
+    EXPECT_EQ(decode<NlinkParser>(file.bytes), Frames{}) << file.name;
+  }
+  EXPECT_EQ(refused, 3);
+}
+
+TEST(NlinkFrame, RefusesEveryTruncationSplitAndBitErrorOfEveryRecordedFrame) {
+  for (const RecordedFrame& file : recorded_files("nlink")) {
+    if (!is_ours(file)) continue;
+    SCOPED_TRACE(file.name);
+    expect_refuses_damage<NlinkParser>(file.bytes);
+  }
+}
+
+/// Modules 7 (3 bytes for it) and 300 (none).
+std::vector<std::uint8_t> node_frame6() {
+  auto frame = bytes_of(
+      "55 09 20 00 00 2c 01 00 00 00 00 00 00 02 00 07 00 00 00 03 00 aa bb cc 00 2c 01 00 00 00 "
+      "00");
+  unsigned sum = 0;
+  for (const auto byte : frame) sum += byte;
+  frame.push_back(static_cast<std::uint8_t>(sum));
+  return frame;
+}
+
+TEST(NlinkFrame, ReadsUserDataOfNodeFrame6) {
+  const auto bytes = node_frame6();
+  ASSERT_EQ(examine_nlink(bytes).length, bytes.size());
+
+  const NlinkFrame frame = decode_nlink(bytes);
+
+  EXPECT_EQ(frame.module, 300U);
+  ASSERT_EQ(frame.nodes.size(), 2U);
+  EXPECT_EQ(frame.nodes[0].module, 7U);
+  EXPECT_EQ(frame.nodes[0].user_data, bytes_of("aa bb cc"));
+  EXPECT_EQ(frame.nodes[1].module, 300U);
+  EXPECT_TRUE(frame.nodes[1].user_data.empty());
+  expect_refuses_damage<NlinkParser>(bytes);
+}
+
+TEST(NlinkFrame, NeverWaitsForUserDataThatCannotBe) {
+  auto frame = node_frame6();
+  frame[19] = 0xff;  // longer than the frame
+
+  EXPECT_EQ(examine_nlink(Bytes(frame).first(21)).kind, FrameKind::kNone);
+}
+
+}  // namespace
+}  // namespace crepes
