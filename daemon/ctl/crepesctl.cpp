@@ -16,6 +16,7 @@
 #include "daemon/ctl/demo.hpp"
 #include "daemon/ctl/evaluate.hpp"
 #include "daemon/ctl/import_calibration.hpp"
+#include "daemon/ctl/led.hpp"
 #include "daemon/ctl/live_screen.hpp"
 #include "daemon/ctl/plot.hpp"
 #include "daemon/ctl/spots.hpp"
@@ -250,6 +251,38 @@ void add_spots(CLI::App& app, SpotsOptions& options, Command& command) {
   sub->callback([&] { command = [&options] { return run_spots(options); }; });
 }
 
+using LedCommand = Result<std::string> (*)(const LedOptions&);
+
+CLI::App* add_led_command(CLI::App* led, const std::string& name, const std::string& help,
+                          LedCommand run_led, const LedOptions& options, Command& command) {
+  CLI::App* sub = led->add_subcommand(name, help);
+  sub->callback([&options, &command, run_led] {
+    command = [&options, run_led] {
+      return run_led(options).map([](const auto& text) { print(text); });
+    };
+  });
+  return sub;
+}
+
+void add_led(CLI::App& app, LedOptions& options, Command& command) {
+  CLI::App* led = app.add_subcommand("led", "Program the board that blinks a robot's ID");
+  led->add_option("--port", options.port, "its serial line")->required();
+  led->require_subcommand(1);
+  CLI::App* set = add_led_command(led, "set", "Keep an ID's pattern on the board and read it back",
+                                  led_set, options, command);
+  set->add_option("--id", options.id, "the robot's")->required()->check(CLI::Range(1, 65534));
+  set->add_option("--library", options.library, "a configuration or library with swarm.members")
+      ->required();
+  set->add_option("--brightness", options.brightness, "of its LEDs in percent")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 100));
+  add_led_command(led, "get", "Show what the board holds", led_get, options, command);
+  add_led_command(led, "test", "Steady light for a while", led_test, options, command)
+      ->add_option("--for", options.test_s, "seconds; 0 ends it")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, int{LED_TEST_MAX_MS} / 1e3));
+}
+
 int run(int argc, char** argv) {
   CLI::App app("crepesctl: replay, score and watch relative localization of robot swarms");
   app.require_subcommand(1);
@@ -260,6 +293,7 @@ int run(int argc, char** argv) {
   WatchOptions watch_options;
   DemoOptions demo_options;
   CodebookOptions codebook_options;
+  LedOptions led_options;
   std::vector<std::filesystem::path> calibration_files;
   std::string out;
   Command command;
@@ -272,6 +306,7 @@ int run(int argc, char** argv) {
   add_codebook(app, codebook_options, out, command);
   add_import_calibration(app, calibration_files, out, command);
   add_spots(app, spots_options, command);
+  add_led(app, led_options, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

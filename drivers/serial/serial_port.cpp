@@ -65,7 +65,7 @@ Result<void> take_for_ourselves(int fd, const std::string& path) {
 }  // namespace
 
 Result<SerialPort> SerialPort::open(const std::string& path, int baud) {
-  UniqueFd fd{::open(path.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)};
+  UniqueFd fd{::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)};
   if (!fd) return io_error(path, errno);
   return take_for_ourselves(fd.get(), path)
       .and_then([&] { return configure_raw(fd.get(), path, baud); })
@@ -88,6 +88,19 @@ Result<Bytes> SerialPort::read_some(std::chrono::milliseconds timeout) {
   }
   if (count < 0 && errno != EIO && errno != EAGAIN) return io_error(path_, errno);
   return fail(ErrorCode::kIo, path_ + ": hung up");
+}
+
+Result<void> SerialPort::write_all(Bytes bytes, std::chrono::milliseconds timeout) {
+  while (!bytes.empty()) {
+    pollfd waiting{.fd = fd_.get(), .events = POLLOUT, .revents = 0};
+    const int ready = ::poll(&waiting, 1, static_cast<int>(timeout.count()));
+    if (ready < 0 && errno != EINTR) return io_error(path_, errno);
+    if (ready == 0) return fail(ErrorCode::kIo, path_ + ": takes no bytes");
+    const ssize_t count = ::write(fd_.get(), bytes.data(), bytes.size());
+    if (count < 0 && errno != EAGAIN && errno != EINTR) return io_error(path_, errno);
+    if (count > 0) bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return {};
 }
 
 }  // namespace crepes

@@ -23,6 +23,9 @@ class SerialPort {
   /// the next call. An error means that the device is gone: open it anew.
   [[nodiscard]] Result<Bytes> read_some(std::chrono::milliseconds timeout);
 
+  /// Sends all of `bytes`, or says why not; waits at most `timeout` each time the line is full.
+  [[nodiscard]] Result<void> write_all(Bytes bytes, std::chrono::milliseconds timeout);
+
   [[nodiscard]] const std::string& path() const { return path_; }
 
  private:

@@ -1,6 +1,7 @@
 #include "drivers/sim/pseudo_terminal.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <termios.h>
 
 #include <array>
@@ -29,6 +30,15 @@ Result<PseudoTerminal> PseudoTerminal::open() {
 std::size_t PseudoTerminal::write(std::span<const std::uint8_t> bytes) {
   const ssize_t count = ::write(master_.get(), bytes.data(), bytes.size());
   return count > 0 ? static_cast<std::size_t>(count) : 0;
+}
+
+std::vector<std::uint8_t> PseudoTerminal::read(std::chrono::milliseconds timeout) {
+  pollfd waiting{.fd = master_.get(), .events = POLLIN, .revents = 0};
+  if (::poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) return {};
+  std::vector<std::uint8_t> bytes(4096);
+  const ssize_t count = ::read(master_.get(), bytes.data(), bytes.size());
+  bytes.resize(count > 0 ? static_cast<std::size_t>(count) : 0);
+  return bytes;
 }
 
 }  // namespace crepes

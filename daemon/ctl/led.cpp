@@ -1,0 +1,143 @@
+#include "daemon/ctl/led.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <span>
+#include <string_view>
+
+#include "daemon/config_file.hpp"
+#include "daemon/ctl/led_line.hpp"
+#include "daemon/ctl/text_table.hpp"
+#include "drivers/monotonic_clock.hpp"
+#include "estimator/vision/id_library.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr double kTicksPerMs = 1000.0 / int{LED_TICK_US};
+
+/// The section `swarm`; a library has nothing else, and what else a configuration has is not ours.
+Result<SwarmConfig> load_swarm(const std::filesystem::path& path) {
+  const CheckedConfig checked = check_config(path);
+  for (const ConfigFault& fault : checked.faults)
+    if (fault.key.empty() || fault.key.starts_with("swarm"))
+      return fail(ErrorCode::kConfig, to_string(fault));
+  return checked.config.swarm;
+}
+
+Result<std::uint16_t> ticks_of(const std::string& key, double ms) {
+  const double ticks = std::round(ms * kTicksPerMs);
+  if (std::abs(ms * kTicksPerMs - ticks) > 1e-6)
+    return fail(ErrorCode::kConfig, key + ": must be a multiple of 0.1 ms, is " + fixed(ms, 4));
+  return static_cast<std::uint16_t>(ticks);
+}
+
+led_settings with_pattern(led_settings settings, std::string_view pattern, std::uint16_t slot) {
+  settings.slots = static_cast<std::uint8_t>(pattern.size());
+  for (std::size_t i = 0; i < pattern.size(); ++i)
+    if (pattern[i] == '1') settings.pattern |= std::uint32_t{1} << i;
+  settings.lit_ticks = settings.dark_ticks = slot;
+  return settings;
+}
+
+/// The nearest tick to where the light goes out.
+led_settings with_duty(led_settings settings, double duty, std::uint16_t period) {
+  settings.slots = 2;
+  settings.pattern = 1;
+  settings.lit_ticks = static_cast<std::uint16_t>(std::lround(duty * period));
+  settings.dark_ticks = static_cast<std::uint16_t>(period - settings.lit_ticks);
+  return settings;
+}
+
+std::string text_of(const led_settings& settings) {
+  if (settings.robot_id == 0) return "never set: dark\n";
+  const auto ms = [](int ticks) { return fixed(ticks / kTicksPerMs, 1) + " ms"; };
+  std::string text = "id " + std::to_string(settings.robot_id) + ": ";
+  if (settings.slots == 2) {
+    text += "lit " + ms(settings.lit_ticks) + " of " + ms(settings.lit_ticks + settings.dark_ticks);
+  } else {
+    text += "pattern ";
+    for (int i = 0; i < settings.slots; ++i) text += (settings.pattern >> i & 1U) != 0 ? '1' : '0';
+    text += ", slots of " + ms(settings.lit_ticks);
+  }
+  text += "\nbrightness";
+  for (const std::uint8_t percent : std::span(settings.brightness))
+    text += " " + std::to_string(percent);
+  return text + " %\n";
+}
+
+std::string text_of(const led_status& status) {
+  constexpr std::array<std::string_view, 3> kClocks{
+      "crystal", "internal oscillator: the crystal does not start",
+      "internal oscillator without PLL: the crystal does not start"};
+  std::string text = "firmware";
+  for (const std::uint8_t part : std::span(status.version))
+    text += (&part == std::begin(status.version) ? " " : ".") + std::to_string(part);
+  text += ", clock: ";
+  text += status.clock < kClocks.size() ? kClocks.at(status.clock) : "unknown";
+  text += ", " + std::to_string(status.skipped) + " bytes skipped";
+  return text + (status.was_watchdog != 0 ? ", restarted by its watchdog\n" : "\n");
+}
+
+Result<std::string> text_of(LedLine& line) {
+  const Result<led_settings> settings = line.settings();
+  if (!settings) return tl::unexpected(settings.error());
+  return line.status().map(
+      [&](const led_status& status) { return text_of(*settings) + text_of(status); });
+}
+
+}  // namespace
+
+Result<led_settings> led_settings_of(const SwarmConfig& swarm, RobotId id, int brightness) {
+  const auto member = std::ranges::find(swarm.members, id, &MemberConfig::id);
+  if (member == swarm.members.end())
+    return fail(ErrorCode::kNotFound, "swarm.members: none has id " + std::to_string(id.value));
+  if (const Result<BlinkCode> code = BlinkCode::from(*member, swarm); !code)
+    return tl::unexpected(Error{code.error()}.with_context("id " + std::to_string(id.value)));
+  led_settings settings{};
+  settings.robot_id = id.value;
+  std::ranges::fill(settings.brightness, static_cast<std::uint8_t>(std::clamp(brightness, 0, 255)));
+  const auto whole =
+      member->pattern ? ticks_of("swarm.slot_ms", swarm.slot_ms).map([&](std::uint16_t slot) {
+        return with_pattern(settings, *member->pattern, slot);
+      })
+                      : ticks_of("swarm.period_ms", swarm.period_ms).map([&](std::uint16_t period) {
+                          return with_duty(settings, *member->duty, period);
+                        });
+  if (!whole) return tl::unexpected(whole.error());
+  const led_fault fault = led_settings_fault(&*whole);
+  if (fault != LED_FINE) return fail(ErrorCode::kConfig, describe(fault));
+  return *whole;
+}
+
+Result<std::string> led_set(const LedOptions& options) {
+  const MonotonicClock clock;
+  const auto settings = load_swarm(options.library).and_then([&](const SwarmConfig& swarm) {
+    return led_settings_of(swarm, RobotId{static_cast<std::uint16_t>(options.id)},
+                           options.brightness)
+        .map_error(
+            [&](Error error) { return std::move(error).with_context(options.library.string()); });
+  });
+  if (!settings) return tl::unexpected(settings.error());
+  Result<LedLine> line = LedLine::open(options.port, clock);
+  if (!line) return tl::unexpected(line.error());
+  return line->set(*settings).and_then([&] { return text_of(*line); });
+}
+
+Result<std::string> led_get(const LedOptions& options) {
+  const MonotonicClock clock;
+  Result<LedLine> line = LedLine::open(options.port, clock);
+  return line.and_then([](LedLine& open) { return text_of(open); });
+}
+
+Result<std::string> led_test(const LedOptions& options) {
+  const MonotonicClock clock;
+  Result<LedLine> line = LedLine::open(options.port, clock);
+  if (!line) return tl::unexpected(line.error());
+  const auto ms = std::chrono::milliseconds(std::llround(options.test_s * 1e3));
+  return line->test(ms).map([&] { return "lit for " + fixed(options.test_s, 1) + " s\n"; });
+}
+
+}  // namespace crepes

@@ -1,0 +1,30 @@
+/// crepesctl led: programs the board that blinks a robot's ID, and reads it back.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "estimator/core/config.hpp"
+#include "estimator/core/result.hpp"
+#include "firmware/protocol/led_messages.h"
+
+namespace crepes {
+
+struct LedOptions {
+  std::string port;
+  int id = 0;
+  std::filesystem::path library{};  ///< any file with a section swarm
+  int brightness = 100;           ///< percent, of all six LEDs
+  double test_s = 5.0;
+};
+
+/// How the board of swarm member `id` has to blink. Refuses times that are no multiples of a tick.
+[[nodiscard]] Result<led_settings> led_settings_of(const SwarmConfig& swarm, RobotId id,
+                                                   int brightness);
+
+/// Each returns what to tell the user.
+[[nodiscard]] Result<std::string> led_set(const LedOptions& options);
+[[nodiscard]] Result<std::string> led_get(const LedOptions& options);
+[[nodiscard]] Result<std::string> led_test(const LedOptions& options);
+
+}  // namespace crepes
