@@ -73,8 +73,11 @@ std::string text_of(const led_status& status) {
       "crystal", "internal oscillator: the crystal does not start",
       "internal oscillator without PLL: the crystal does not start"};
   std::string text = "firmware";
-  for (const std::uint8_t part : std::span(status.version))
-    text += (&part == std::begin(status.version) ? " " : ".") + std::to_string(part);
+  char separator = ' ';
+  for (const std::uint8_t part : std::span(status.version)) {
+    text += separator + std::to_string(part);
+    separator = '.';
+  }
   text += ", clock: ";
   text += status.clock < kClocks.size() ? kClocks.at(status.clock) : "unknown";
   text += ", " + std::to_string(status.skipped) + " bytes skipped";

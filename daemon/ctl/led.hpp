@@ -14,7 +14,7 @@ struct LedOptions {
   std::string port;
   int id = 0;
   std::filesystem::path library{};  ///< any file with a section swarm
-  int brightness = 100;           ///< percent, of all six LEDs
+  int brightness = 100;             ///< percent, of all six LEDs
   double test_s = 5.0;
 };
 

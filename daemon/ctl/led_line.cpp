@@ -11,7 +11,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int kAttempts = 4;
-constexpr Duration kAnswerWithin = 500ms;  // a board that writes flash takes 60 ms
+constexpr Duration kAnswerWithin = 250ms;  // a board that writes flash takes 60 ms
 
 led_frame request_of(led_message type) {
   led_frame request{};

@@ -34,7 +34,7 @@ class HostBoard {
     if (faults.is_flash_dead) flash_.cut_power_after(0, 1);
     board_.flash = flash_.port();
     board_.settings = led_settings_load(&board_.flash);
-    board_.status.protocol = LED_PROTOCOL_VERSION;
+    board_.status = {LED_PROTOCOL_VERSION, {1, 2, 3}, LED_CLOCK_CRYSTAL, 0, 0};
     thread_ = std::jthread([this](const std::stop_token& stop) {
       while (!stop.stop_requested()) serve();
     });
@@ -92,7 +92,8 @@ TEST(LedCommandLine, ProgramsABoardThatThenBlinksAsTheLibrarySays) {
 
   ASSERT_TRUE(told.has_value()) << told.error().message;
   EXPECT_NE(told->find("id 3: pattern 00100100111100111111, slots of 10.0 ms\n"
-                       "brightness 80 80 80 80 80 80 %\n"),
+                       "brightness 80 80 80 80 80 80 %\n"
+                       "firmware 1.2.3, clock: crystal, 0 bytes skipped\n"),
             std::string::npos)
       << *told;
   EXPECT_EQ(led_get({.port = board.port()}).value_or(""), *told);
