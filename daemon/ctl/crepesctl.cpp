@@ -273,7 +273,8 @@ void add_led(CLI::App& app, LedOptions& options, Command& command) {
   set->add_option("--id", options.id, "the robot's")->required()->check(CLI::Range(1, 65534));
   set->add_option("--library", options.library, "a configuration or library with swarm.members")
       ->required();
-  set->add_option("--brightness", options.brightness, "of its LEDs in percent")
+  set->add_option("--brightness", options.brightness, "in percent: of all LEDs, or of each of six")
+      ->expected(1, LED_COUNT)
       ->capture_default_str()
       ->check(CLI::Range(0, 100));
   add_led_command(led, "get", "Show what the board holds", led_get, options, command);

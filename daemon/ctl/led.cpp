@@ -6,6 +6,7 @@
 #include <cmath>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "daemon/config_file.hpp"
 #include "daemon/ctl/led_line.hpp"
@@ -21,9 +22,10 @@ constexpr double kTicksPerMs = 1000.0 / int{LED_TICK_US};
 /// The section `swarm`; a library has nothing else, and what else a configuration has is not ours.
 Result<SwarmConfig> load_swarm(const std::filesystem::path& path) {
   const CheckedConfig checked = check_config(path);
-  for (const ConfigFault& fault : checked.faults)
-    if (fault.key.empty() || fault.key.starts_with("swarm"))
-      return fail(ErrorCode::kConfig, to_string(fault));
+  const auto ours = std::ranges::find_if(checked.faults, [](const ConfigFault& fault) {
+    return fault.key.empty() || fault.key.starts_with("swarm");
+  });
+  if (ours != checked.faults.end()) return fail(ErrorCode::kConfig, to_string(*ours));
   return checked.config.swarm;
 }
 
@@ -93,7 +95,10 @@ Result<std::string> text_of(LedLine& line) {
 
 }  // namespace
 
-Result<led_settings> led_settings_of(const SwarmConfig& swarm, RobotId id, int brightness) {
+Result<led_settings> led_settings_of(const SwarmConfig& swarm, RobotId id,
+                                     const std::vector<int>& brightness) {
+  if (brightness.size() != 1 && brightness.size() != LED_COUNT)
+    return fail(ErrorCode::kUsage, "brightness: one for all LEDs, or one for each of six");
   const auto member = std::ranges::find(swarm.members, id, &MemberConfig::id);
   if (member == swarm.members.end())
     return fail(ErrorCode::kNotFound, "swarm.members: none has id " + std::to_string(id.value));
@@ -101,7 +106,9 @@ Result<led_settings> led_settings_of(const SwarmConfig& swarm, RobotId id, int b
     return tl::unexpected(Error{code.error()}.with_context("id " + std::to_string(id.value)));
   led_settings settings{};
   settings.robot_id = id.value;
-  std::ranges::fill(settings.brightness, static_cast<std::uint8_t>(std::clamp(brightness, 0, 255)));
+  for (std::size_t i = 0; i < LED_COUNT; ++i)
+    settings.brightness[i] =
+        static_cast<std::uint8_t>(std::clamp(brightness[i % brightness.size()], 0, 255));
   const auto whole =
       member->pattern ? ticks_of("swarm.slot_ms", swarm.slot_ms).map([&](std::uint16_t slot) {
         return with_pattern(settings, *member->pattern, slot);

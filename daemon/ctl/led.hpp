@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/result.hpp"
@@ -13,14 +14,14 @@ namespace crepes {
 struct LedOptions {
   std::string port;
   int id = 0;
-  std::filesystem::path library{};  ///< any file with a section swarm
-  int brightness = 100;             ///< percent, of all six LEDs
+  std::filesystem::path library{};   ///< any file with a section swarm
+  std::vector<int> brightness{100};  ///< percent: of all LEDs, or of each of six
   double test_s = 5.0;
 };
 
 /// How the board of swarm member `id` has to blink. Refuses times that are no multiples of a tick.
 [[nodiscard]] Result<led_settings> led_settings_of(const SwarmConfig& swarm, RobotId id,
-                                                   int brightness);
+                                                   const std::vector<int>& brightness);
 
 /// Each returns what to tell the user.
 [[nodiscard]] Result<std::string> led_set(const LedOptions& options);

@@ -70,9 +70,9 @@ Result<std::optional<led_frame>> LedLine::listen(const Question& question, led_r
       led_frame frame{};
       while (led_receiver_next(&receiver, false, &frame)) {
         if (frame.type == question.answer && frame.size == question.answer_size) return frame;
-        if (is_refusal_of(question.request, frame))
-          return fail(ErrorCode::kConfig,
-                      port_.path() + ": refused: " + describe(led_fault(frame.payload[1])));
+        if (!is_refusal_of(question.request, frame)) continue;
+        return fail(ErrorCode::kConfig,
+                    port_.path() + ": refused: " + describe(led_fault(frame.payload[1])));
       }
     }
   }

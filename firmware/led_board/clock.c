@@ -12,12 +12,10 @@ static bool comes(const reg32* reg, uint32_t mask, uint32_t value) {
 }
 
 static bool run_on_pll(uint32_t source_and_factor) {
+  RCC->CR &= ~(uint32_t)RCC_CR_PLLON;  // it cannot be set while it runs
   RCC->CFGR = source_and_factor;
   RCC->CR |= RCC_CR_PLLON;
-  if (!comes(&RCC->CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY)) {
-    RCC->CR &= ~(uint32_t)RCC_CR_PLLON;
-    return false;
-  }
+  if (!comes(&RCC->CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY)) return false;
   RCC->CFGR |= RCC_CFGR_SW_PLL;
   return comes(&RCC->CFGR, RCC_CFGR_SWS, RCC_CFGR_SWS_PLL);
 }
@@ -29,8 +27,11 @@ enum led_clock clock_start(void) {
     RCC->CR |= RCC_CR_CSSON;
     return LED_CLOCK_CRYSTAL;
   }
+  RCC->CFGR = 0;  // back to the internal oscillator, if need be
   RCC->CR &= ~(uint32_t)RCC_CR_HSEON;
-  return run_on_pll(RCC_CFGR_PLL_X6) ? LED_CLOCK_RC : LED_CLOCK_RC_NO_PLL;
+  if (run_on_pll(RCC_CFGR_PLL_X6)) return LED_CLOCK_RC;
+  RCC->CFGR = 0;
+  return LED_CLOCK_RC_NO_PLL;
 }
 
 uint32_t clock_hz(enum led_clock clock) {

@@ -87,12 +87,12 @@ MemberConfig member(const std::string& pattern) {
 TEST(LedCommandLine, ProgramsABoardThatThenBlinksAsTheLibrarySays) {
   HostBoard board;
 
-  const Result<std::string> told =
-      led_set({.port = board.port(), .id = 3, .library = kLibrary, .brightness = 80});
+  const Result<std::string> told = led_set(
+      {.port = board.port(), .id = 3, .library = kLibrary, .brightness = {80, 70, 60, 50, 40, 30}});
 
   ASSERT_TRUE(told.has_value()) << told.error().message;
   EXPECT_NE(told->find("id 3: pattern 00100100111100111111, slots of 10.0 ms\n"
-                       "brightness 80 80 80 80 80 80 %\n"
+                       "brightness 80 70 60 50 40 30 %\n"
                        "firmware 1.2.3, clock: crystal, 0 bytes skipped\n"),
             std::string::npos)
       << *told;
@@ -153,11 +153,11 @@ TEST(LedSettings, KeepPatternsExactlyAndDutiesToHalfATick) {
   SwarmConfig swarm;
   swarm.slot_ms = 3.3;
   swarm.members = {member("0010010011110011111100000000001")};
-  const led_settings pattern = *led_settings_of(swarm, RobotId{3}, 100);
+  const led_settings pattern = *led_settings_of(swarm, RobotId{3}, {100});
   swarm.members[0].pattern.reset();
   swarm.members[0].duty = 1.0 / 3.0;
 
-  const led_settings duty = *led_settings_of(swarm, RobotId{3}, 100);
+  const led_settings duty = *led_settings_of(swarm, RobotId{3}, {100});
 
   EXPECT_EQ(bytes_of(pattern),
             bytes_of(pattern_settings(3, "0010010011110011111100000000001", 33)));
@@ -168,13 +168,14 @@ TEST(LedSettings, RefuseWhatABoardCannotDo) {
   SwarmConfig swarm;
   swarm.members = {member("0010010011")};
   swarm.slot_ms = 3.33;
-  EXPECT_FALSE(led_settings_of(swarm, RobotId{3}, 100).has_value());
+  EXPECT_FALSE(led_settings_of(swarm, RobotId{3}, {100}).has_value());
   swarm.slot_ms = 10.0;
-  EXPECT_TRUE(led_settings_of(swarm, RobotId{3}, 100).has_value());
-  EXPECT_FALSE(led_settings_of(swarm, RobotId{4}, 100).has_value());
-  EXPECT_FALSE(led_settings_of(swarm, RobotId{3}, 101).has_value());
+  EXPECT_TRUE(led_settings_of(swarm, RobotId{3}, {100}).has_value());
+  EXPECT_FALSE(led_settings_of(swarm, RobotId{4}, {100}).has_value());
+  EXPECT_FALSE(led_settings_of(swarm, RobotId{3}, {101}).has_value());
+  EXPECT_FALSE(led_settings_of(swarm, RobotId{3}, {1, 2, 3}).has_value());
   swarm.members[0].pattern = "1111111111";
-  EXPECT_FALSE(led_settings_of(swarm, RobotId{3}, 100).has_value());
+  EXPECT_FALSE(led_settings_of(swarm, RobotId{3}, {100}).has_value());
 }
 
 }  // namespace

@@ -42,17 +42,20 @@ struct Waveform {
   std::vector<bool> lit;
   std::set<int> traces_per_write;  ///< how many lines on SysTick came between two writes
   std::set<std::string> values;    ///< ever written
+  std::string reload;              ///< what SysTick counts down from, in hexadecimal
 };
 
 Waveform record(QemuBoard& board, std::size_t ticks) {
   const std::string tick = "systick_timer_tick";
   const std::string write = "GPIOA: unimplemented device write (size 4, offset 0x000, value 0x";
+  const std::string reload = "systick_write systick write addr 0x4 data ";
   Waveform waveform;
   int traces = 0;
   while (waveform.lit.size() < ticks) {
     const std::optional<std::string> line = board.log_line();
     if (!line) break;
     if (line->starts_with(tick)) ++traces;
+    if (line->starts_with(reload)) waveform.reload = line->substr(reload.size());
     if (!line->starts_with(write)) continue;
     const std::string value = line->substr(write.size(), 8);
     waveform.values.insert(value);
@@ -66,8 +69,8 @@ Waveform record(QemuBoard& board, std::size_t ticks) {
 
 Result<QemuBoard> start_on_virtual_time(const led_settings& settings) {
   RamFlash flash = holding(settings);
-  return QemuBoard::start(flash,
-                          {"-d", "unimp,trace:systick_timer_tick", "-icount", "shift=0,sleep=off"});
+  return QemuBoard::start(flash, {"-d", "unimp,trace:systick_timer_tick,trace:systick_write",
+                                  "-icount", "shift=0,sleep=off"});
 }
 
 /// Who a camera of 200 Hz takes the board for; empty where it cannot say.
@@ -120,6 +123,8 @@ TEST(LedImage, BlinksTheIdLibrarysCodesTickByTick) {
     const Waveform waveform = record(*board, 4001);
 
     ASSERT_EQ(waveform.lit.size(), 4001U);
+    // On QEMU the board finds its slowest clock alone: 800 cycles of 8 MHz are a tick.
+    EXPECT_EQ(waveform.reload, "0x31f size 4");
     EXPECT_FALSE(waveform.lit.front()) << "the first tick works out what the second shows";
     for (std::size_t tick = 1; tick < waveform.lit.size(); ++tick)
       ASSERT_EQ(waveform.lit[tick], code.is_lit(static_cast<std::int64_t>(tick - 1) * kTick))
