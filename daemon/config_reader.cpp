@@ -49,6 +49,19 @@ std::size_t edits_between(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+/// Row by row.
+template <int kSize>
+std::string read_matrix(const YAML::Node& node, std::string_view what,
+                        Eigen::Matrix<double, kSize, kSize>& value) {
+  constexpr auto kCount = static_cast<std::size_t>(kSize);
+  return read_numbers(node, what, kCount, [&](std::size_t row, const YAML::Node& numbers) {
+    return read_numbers(numbers, what, kCount, [&](std::size_t column, const YAML::Node& element) {
+      return read_value(element,
+                        value(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)));
+    });
+  });
+}
+
 }  // namespace
 
 std::string describe(const YAML::Node& node) {
@@ -108,6 +121,10 @@ std::string read_value(const YAML::Node& node, Eigen::Vector3d& value) {
   });
 }
 
+std::string read_value(const YAML::Node& node, Eigen::Matrix3d& value) {
+  return read_matrix(node, "a 3x3 matrix as 3 rows of 3 numbers", value);
+}
+
 std::string read_value(const YAML::Node& node, std::array<int, 2>& value) {
   return read_numbers(node, "2 whole numbers", 2, [&](std::size_t i, const YAML::Node& element) {
     return read_value(element, value.at(i));
@@ -140,13 +157,7 @@ std::string read_value(const YAML::Node& node, std::vector<std::string>& value) 
 
 std::string read_value(const YAML::Node& node, Pose& value) {
   Eigen::Matrix4d T;
-  constexpr std::string_view kExpected = "a 4x4 matrix as 4 rows of 4 numbers";
-  std::string reason = read_numbers(node, kExpected, 4, [&](std::size_t row, const YAML::Node& r) {
-    return read_numbers(r, kExpected, 4, [&](std::size_t column, const YAML::Node& element) {
-      return read_value(element,
-                        T(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)));
-    });
-  });
+  std::string reason = read_matrix(node, "a 4x4 matrix as 4 rows of 4 numbers", T);
   if (!reason.empty()) return reason;
   if (T.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) return "the last row must be 0 0 0 1";
 

@@ -44,6 +44,7 @@ struct ReadLog {
 [[nodiscard]] std::string read_value(const YAML::Node& node, std::string& value);
 [[nodiscard]] std::string read_value(const YAML::Node& node, RobotId& value);
 [[nodiscard]] std::string read_value(const YAML::Node& node, Eigen::Vector3d& value);
+[[nodiscard]] std::string read_value(const YAML::Node& node, Eigen::Matrix3d& value);
 [[nodiscard]] std::string read_value(const YAML::Node& node, std::array<int, 2>& value);
 [[nodiscard]] std::string read_value(const YAML::Node& node, std::vector<double>& value);
 [[nodiscard]] std::string read_value(const YAML::Node& node,
@@ -71,6 +72,9 @@ requires requires(const Numbers& numbers) { numbers.begin(); }
     if (std::string reason = check_bounds(value, bounds); !reason.empty()) return reason;
   }
   return "";
+}
+[[nodiscard]] inline std::string check_bounds(const Eigen::Matrix3d& values, const Bounds& bounds) {
+  return check_bounds(Eigen::VectorXd(values.reshaped()), bounds);
 }
 
 /// What a node holds, in words: `the text "abc"`, `a list`.

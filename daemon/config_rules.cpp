@@ -154,6 +154,19 @@ void check_cameras(const std::vector<CameraConfig>& cameras, Faults& faults) {
   }
 }
 
+void check_imu(const ImuConfig& imu, Faults& faults) {
+  constexpr double kLeastVolume = 0.1;  // of the box that T makes of a unit cube
+  if (!imu.T_body_imu.p.isZero(0.0))
+    faults.push_back({"imu.T_body_imu", "the body's origin is the IMU: the last column must be 0"});
+  const auto check_triad = [&](const std::string& key, const TriadConfig& triad) {
+    if (triad.misalignment.determinant() < kLeastVolume)
+      faults.push_back(
+          {key + ".misalignment", "mirrors or flattens: its determinant is below 0.1"});
+  };
+  check_triad("imu.accelerometer", imu.accelerometer);
+  check_triad("imu.gyroscope", imu.gyroscope);
+}
+
 bool is_loopback(const std::string& address) {
   in_addr v4{};
   if (::inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
@@ -176,6 +189,7 @@ std::vector<RuleFault> validate(const Config& config) {
   Faults faults;
   check_members(config, faults);
   check_cameras(config.cameras, faults);
+  check_imu(config.imu, faults);
   check_network(config, faults);
   if (config.vision.min_area_px2 >= config.vision.max_area_px2)
     faults.push_back({"vision.max_area_px2", "must be above min_area_px2"});

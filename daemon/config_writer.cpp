@@ -49,6 +49,10 @@ std::string yaml_of(const std::string& value) {
 
 std::string yaml_of(const RobotId& value) { return std::to_string(value.value); }
 std::string yaml_of(const Eigen::Vector3d& value) { return flow_list(value); }
+std::string yaml_of(const Eigen::Matrix3d& value) {
+  return "[" + flow_list(value.row(0)) + ", " + flow_list(value.row(1)) + ", " +
+         flow_list(value.row(2)) + "]";
+}
 std::string yaml_of(const std::array<int, 2>& value) { return flow_list(value); }
 std::string yaml_of(const std::vector<double>& value) { return flow_list(value); }
 std::string yaml_of(const std::vector<std::string>& value) { return flow_list(value); }

@@ -18,6 +18,7 @@ namespace crepes {
 [[nodiscard]] std::string yaml_of(const std::string& value);
 [[nodiscard]] std::string yaml_of(const RobotId& value);
 [[nodiscard]] std::string yaml_of(const Eigen::Vector3d& value);
+[[nodiscard]] std::string yaml_of(const Eigen::Matrix3d& value);
 [[nodiscard]] std::string yaml_of(const std::array<int, 2>& value);
 [[nodiscard]] std::string yaml_of(const std::vector<double>& value);
 [[nodiscard]] std::string yaml_of(const std::vector<std::string>& value);

@@ -73,8 +73,13 @@ void Runtime::start_sensor(Sensor sensor) {
         });
 }
 
-/// Devices whose ports the readers are to open instead of the configured ones.
+/// Devices whose ports the readers are to open instead of the configured ones. The inertial sensor
+/// there is a WitMotion without faults, mounted straight.
 void Runtime::open_simulation() {
+  config_.imu.protocol = ImuProtocol::kWitMotion;
+  config_.imu.T_body_imu = {};
+  config_.imu.accelerometer = {};
+  config_.imu.gyroscope = {};
   world_.emplace(config_.sim);
   const auto connect = [this](Result<SimSerial> device, std::string& port) {
     if (!device) return log_message(LogLevel::kError, "simulation: " + device.error().message);

@@ -3,10 +3,6 @@
 #include <algorithm>
 
 #include "daemon/logging.hpp"
-#include "drivers/imu/bundle_spacing.hpp"
-#include "drivers/imu/witmotion.hpp"
-#include "drivers/serial/serial_reader.hpp"
-#include "drivers/uwb/nlink.hpp"
 #include "estimator/vision/spot_detector.hpp"
 
 namespace crepes {
@@ -18,7 +14,8 @@ using std::chrono::seconds;
 constexpr Duration kFirstRetry = milliseconds{100};
 constexpr Duration kLastRetry = seconds{5};
 constexpr Duration kStatusPeriod = seconds{1};
-constexpr Duration kSilence = seconds{2};
+constexpr Duration kLookPeriod = milliseconds{250};
+constexpr Duration kSilence = milliseconds{1500};
 constexpr milliseconds kReadTimeout{50};
 
 /// Rate and health of a stage, told once a second; what is wrong is logged when it changes.
@@ -31,6 +28,11 @@ class HealthReport {
 
   [[nodiscard]] bool is_due() const {
     return context_.clock.now() - period_start_ >= kStatusPeriod;
+  }
+
+  /// Not to be kept until it is due: something has begun to be wrong.
+  [[nodiscard]] bool is_news(const std::string& message) const {
+    return !message.empty() && logged_.empty();
   }
 
   /// `message` is empty when all is well.
@@ -64,21 +66,24 @@ class HealthReport {
   std::string logged_;
 };
 
-/// Reads until the device fails (the error) or `stop` (none).
+/// Reads until the device fails (the error) or `stop` (none). What is wrong is told within two
+/// seconds.
 Result<void> read_device(Device& device, const Sensor& sensor, const StageContext& context,
                          HealthReport& health, const std::stop_token& stop) {
   Timestamp last_heard = context.clock.now();
+  Timestamp last_look = last_heard;
   while (!stop.stop_requested()) {
     context.turns.add();
     const Result<std::size_t> count = device.read_once(kReadTimeout);
     if (!count) return tl::unexpected(count.error());
     health.count(*count);
-    if (*count > 0) last_heard = context.clock.now();
-    if (!health.is_due()) continue;
+    const Timestamp now = context.clock.now();
+    if (*count > 0) last_heard = now;
+    if (now - last_look < kLookPeriod) continue;
+    last_look = now;
     std::string message = device.diagnosis().value_or("");
-    if (message.empty() && context.clock.now() - last_heard > kSilence)
-      message = sensor.when_silent;
-    health.tell(message, device.counters());
+    if (message.empty() && now - last_heard > kSilence) message = sensor.when_silent;
+    if (health.is_due() || health.is_news(message)) health.tell(message, device.counters());
   }
   return {};
 }
@@ -90,73 +95,6 @@ void back_off(Duration wait, const StageContext& context, const std::stop_token&
     context.turns.add();
     wait_for(milliseconds{100}, stop);
   }
-}
-
-Totals faults_of(const NlinkCounts& counts) {
-  return {{"unknown_modules", counts.unknown_modules},
-          {"implausible", counts.implausible},
-          {"without_ranges", counts.without_ranges}};
-}
-
-Totals faults_of(const ImuCounts& counts) {
-  return {{"partial", counts.partial},
-          {"unscaled", counts.unscaled},
-          {"saturated", counts.saturated},
-          {"implausible", counts.implausible}};
-}
-
-/// `Arrange` puts right what was read at once: a function of a std::vector<Measurement>&.
-template <class Parser, class Arrange>
-class SerialDevice final : public Device {
- public:
-  SerialDevice(SerialPort port, Parser parser, Arrange arrange, const Clock& clock, EventSink sink)
-      : arrange_(std::move(arrange)),
-        sink_(std::move(sink)),
-        reader_(std::move(port), std::move(parser), clock,
-                [this](const auto& measurement) { heard_.push_back(measurement); }) {}
-
-  [[nodiscard]] Result<std::size_t> read_once(milliseconds timeout) override {
-    heard_.clear();
-    if (const Result<void> read = reader_.read_once(timeout); !read)
-      return tl::unexpected(read.error());
-    arrange_(heard_);
-    for (const auto& measurement : heard_) sink_(Event(measurement));
-    return heard_.size();
-  }
-
-  [[nodiscard]] Totals counters() const override {
-    Totals totals = faults_of(reader_.parser().counts());
-    totals.emplace_back("skipped_bytes", reader_.counts().skipped_bytes);
-    totals.emplace_back("checksum_failures", reader_.counts().checksum_failures);
-    return totals;
-  }
-
-  [[nodiscard]] std::optional<std::string> diagnosis() const override {
-    return reader_.diagnosis();
-  }
-
- private:
-  Arrange arrange_;
-  EventSink sink_;
-  std::vector<typename Parser::Measurement> heard_;
-  SerialReader<Parser> reader_;
-};
-
-template <class Parser, class Arrange>
-Sensor serial_sensor(const std::string& name, const std::string& port, int baud,
-                     const Parser& parser, const Arrange& arrange, const Clock& clock,
-                     const EventSink& sink) {
-  Sensor sensor;
-  sensor.name = name;
-  sensor.when_silent = port + ": silent for 2 s: is it powered, and is " + name + ".baud right?";
-  sensor.open = [=, &clock]() -> Result<std::unique_ptr<Device>> {
-    if (port.empty()) return fail(ErrorCode::kConfig, "no device: set " + name + ".port");
-    Result<SerialPort> opened = SerialPort::open(port, baud);
-    if (!opened) return tl::unexpected(opened.error());
-    return std::make_unique<SerialDevice<Parser, Arrange>>(std::move(*opened), parser, arrange,
-                                                           clock, sink);
-  };
-  return sensor;
 }
 
 class CameraDevice final : public Device {
@@ -200,24 +138,11 @@ Totals counters_of(const Detection& found, const Rejected& rejected, std::uint64
 
 }  // namespace
 
-Sensor uwb_sensor(const UwbConfig& config, const SwarmConfig& swarm, const Clock& clock,
-                  const EventSink& sink) {
-  return serial_sensor(
-      "uwb", config.port, config.baud, NlinkParser(uwb_modules_of(swarm), config.max_range_m),
-      [](const std::vector<UwbRange>&) {}, clock, sink);
-}
-
-Sensor imu_sensor(const ImuConfig& config, const Clock& clock, const EventSink& sink) {
-  const auto space_out = [spacing = BundleSpacing(from_seconds(1.0 / config.update_rate))](
-                             std::vector<ImuSample>& bundle) mutable { spacing.apply(bundle); };
-  return serial_sensor("imu", config.port, config.baud, WitMotionParser(), space_out, clock, sink);
-}
-
 Sensor camera_sensor(const std::string& name, const OpenCamera& open, FrameQueue& frames,
                      FrameQueue& used) {
   Sensor sensor;
   sensor.name = name;
-  sensor.when_silent = "no frame for 2 s: is the camera plugged in and running?";
+  sensor.when_silent = "no frame: is the camera plugged in and running?";
   sensor.open = [=, &frames, &used]() -> Result<std::unique_ptr<Device>> {
     Result<std::unique_ptr<Camera>> camera = open();
     if (!camera) return tl::unexpected(camera.error());

@@ -1,12 +1,15 @@
 /// From a serial device to measurements.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "drivers/recognize.hpp"
 #include "drivers/serial/frame_decoder.hpp"
 #include "drivers/serial/serial_port.hpp"
 #include "estimator/core/clock.hpp"
@@ -14,9 +17,25 @@
 
 namespace crepes {
 
+/// The newest bytes of a stream, to tell what it is.
+class RecentBytes {
+ public:
+  void add(Bytes chunk) {
+    constexpr std::size_t kMost = 2048;
+    bytes_.insert(bytes_.end(), chunk.begin(), chunk.end());
+    if (bytes_.size() <= kMost) return;
+    bytes_.erase(bytes_.begin(), bytes_.end() - static_cast<std::ptrdiff_t>(kMost));
+  }
+  [[nodiscard]] Bytes get() const { return bytes_; }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
+
 /// Reads one device. A `Parser` is a FrameProtocol that turns whole frames into measurements:
 ///   using Measurement = ...;
 ///   void parse(Bytes frame, Timestamp arrival, const std::function<void(const Measurement&)>&);
+///   std::string why_nothing() const;               when frames hold no measurement
 ///   static constexpr std::string_view kForeignMeaning;   what FrameKind::kForeign tells
 template <class Parser>
 class SerialReader {
@@ -29,7 +48,9 @@ class SerialReader {
       : port_(std::move(port)),
         parser_(std::move(parser)),
         clock_(clock),
-        on_measurement_(std::move(on_measurement)) {}
+        on_measurement_(std::move(on_measurement)),
+        last_frame_(clock.now()),
+        last_measurement_(last_frame_) {}
 
   /// Waits for bytes and hands on what they complete, stamped with their arrival. An error means
   /// that the device is gone.
@@ -37,32 +58,53 @@ class SerialReader {
     const Result<Bytes> chunk = port_.read_some(timeout);
     if (!chunk) return tl::unexpected(chunk.error());
     const Timestamp arrival = clock_.now();
-    decoder_.feed(*chunk, [&](Bytes frame) { parser_.parse(frame, arrival, on_measurement_); });
+    recent_.add(*chunk);
+    decoder_.feed(*chunk, [&](Bytes frame) {
+      last_frame_ = arrival;
+      parser_.parse(frame, arrival, [&](const Measurement& measurement) {
+        last_measurement_ = arrival;
+        on_measurement_(measurement);
+      });
+    });
     return {};
   }
 
   /// One sentence on what is wrong with what comes in, if anything; silence is not judged here.
   [[nodiscard]] std::optional<std::string> diagnosis() const {
     constexpr std::uint64_t kEnoughForeign = 3;
-    constexpr std::uint64_t kEnoughBytes = 4 * Parser::kMaxFrame;
+    constexpr std::uint64_t kEnoughBytes = 64;
+    constexpr Duration kPatience = std::chrono::seconds(1);
+    const Timestamp now = clock_.now();
     const DecoderCounts& counts = decoder_.counts();
     if (counts.foreign_in_a_row >= kEnoughForeign) {
       return port_.path() + ": " + std::string(Parser::kForeignMeaning);
     }
-    if (counts.skipped_in_a_row < kEnoughBytes) return std::nullopt;
-    return port_.path() + ": " + std::to_string(counts.skipped_in_a_row) +
-           " bytes without a valid frame; wrong baud rate or another kind of device?";
+    if (now - last_frame_ >= kPatience) {
+      if (counts.skipped_in_a_row < kEnoughBytes) return std::nullopt;
+      return port_.path() + ": " + what_else_comes();
+    }
+    if (counts.frames == 0 || now - last_measurement_ < kPatience) return std::nullopt;
+    return port_.path() + ": " + parser_.why_nothing();
   }
 
   [[nodiscard]] const DecoderCounts& counts() const { return decoder_.counts(); }
   [[nodiscard]] const Parser& parser() const { return parser_; }
 
  private:
+  [[nodiscard]] std::string what_else_comes() const {
+    const std::optional<SpokenProtocol> spoken = recognize(recent_.get());
+    return spoken ? "another kind of device: it speaks " + std::string(name_of(*spoken))
+                  : "bytes without a valid frame; wrong baud rate or another kind of device?";
+  }
+
   SerialPort port_;
   Parser parser_;
   FrameDecoder<Parser> decoder_;
   const Clock& clock_;
   Sink on_measurement_;
+  RecentBytes recent_;
+  Timestamp last_frame_;
+  Timestamp last_measurement_;
 };
 
 }  // namespace crepes

@@ -130,10 +130,28 @@ struct CameraConfig {
   }
 };
 
-enum class ImuProtocol : std::uint8_t { kWitMotion };
-inline constexpr std::array kImuProtocols{Choice{"witmotion", ImuProtocol::kWitMotion}};
+enum class ImuProtocol : std::uint8_t { kAuto, kWitMotion, kHipnuc, kXsens, kMavlink };
+inline constexpr std::array kImuProtocols{
+    Choice{"auto", ImuProtocol::kAuto}, Choice{"witmotion", ImuProtocol::kWitMotion},
+    Choice{"hipnuc", ImuProtocol::kHipnuc}, Choice{"xsens", ImuProtocol::kXsens},
+    Choice{"mavlink", ImuProtocol::kMavlink}};
 
-/// Noise under Kalibr's names (imu.yaml), one-sigma priors, and the serial line.
+/// What makes of a sensor's reading v the true T K (v - b), as imu_tk calibrates it.
+struct TriadConfig {
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+  Eigen::Matrix3d misalignment = Eigen::Matrix3d::Identity();
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("bias", bias, "b, taken off first, in the unit of the readings");
+    v.field("scale", scale, Bounds{0.5, 2}, "the diagonal of K");
+    v.field("misalignment", misalignment, Bounds{-2, 2}, "T, 3 rows of 3 numbers");
+  }
+};
+
+/// Noise under Kalibr's names (imu.yaml), one-sigma priors, the serial line, and how readings
+/// become the body's.
 struct ImuConfig {
   double update_rate = 100.0;
   double accelerometer_noise_density = 0.0018;
@@ -145,7 +163,10 @@ struct ImuConfig {
   double scale_sigma = 0.003;
   std::string port;
   int baud = 115200;
-  ImuProtocol protocol = ImuProtocol::kWitMotion;
+  ImuProtocol protocol = ImuProtocol::kAuto;
+  Pose T_body_imu;
+  TriadConfig accelerometer;
+  TriadConfig gyroscope;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -166,7 +187,12 @@ struct ImuConfig {
             "scale and axis errors that calibration left, one sigma; noise that grows with rate");
     v.field("port", port, "serial device, best under /dev/serial/by-id");
     v.field("baud", baud, Bounds{1200, 4000000}, "bits a second");
-    v.choice("protocol", protocol, kImuProtocols, "what the device speaks");
+    v.choice("protocol", protocol, kImuProtocols, "what the device speaks; auto: find out");
+    v.field("T_body_imu", T_body_imu,
+            "4x4, how the sensor's axes lie in the body's; no translation, the body is at the IMU");
+    v.section("accelerometer", accelerometer,
+              "correction T K (v - b) in the sensor's axes [m/s^2]");
+    v.section("gyroscope", gyroscope, "correction T K (v - b) in the sensor's axes [rad/s]");
   }
 };
 

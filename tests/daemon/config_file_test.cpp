@@ -184,6 +184,40 @@ TEST(ConfigFile, RoundsARotationThatIsNearlyOneToOne) {
   EXPECT_TRUE((R * R.transpose()).isIdentity(1e-14));
 }
 
+TEST(ConfigFile, ReadsHowReadingsOfTheImuBecomeTheBodys) {
+  const CheckedConfig checked = check_config_text(
+      replaced("uwb:",
+               "imu:\n  protocol: xsens\n"
+               "  T_body_imu: [[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+               "  accelerometer: {bias: [1, 2, 3], scale: [1, 1, 1.5],\n"
+               "    misalignment: [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]}\n"
+               "uwb:"),
+      "f");
+
+  ASSERT_TRUE(checked.faults.empty()) << to_string(checked.faults.front());
+  const ImuConfig& imu = checked.config.imu;
+  EXPECT_EQ(imu.protocol, ImuProtocol::kXsens);
+  EXPECT_TRUE((imu.T_body_imu.q * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitY()));
+  EXPECT_EQ(imu.accelerometer.bias.z(), 3.0);
+  EXPECT_EQ(imu.accelerometer.misalignment(0, 1), 0.1);
+  EXPECT_EQ(imu.gyroscope.scale, Eigen::Vector3d(1, 1, 1));
+}
+
+TEST(ConfigFile, RefusesMountingsAndCorrectionsThatCannotBe) {
+  const auto with_imu = [](const std::string& keys) {
+    return faults_of(replaced("uwb:", "imu: {" + keys + "}\nuwb:"));
+  };
+  EXPECT_EQ(with_imu("T_body_imu: [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]"),
+            "f:11: imu.T_body_imu: the body's origin is the IMU: the last column must be 0");
+  EXPECT_EQ(with_imu("gyroscope: {misalignment: [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}"),
+            "f:11: imu.gyroscope.misalignment: mirrors or flattens: its determinant is below 0.1");
+  EXPECT_EQ(with_imu("gyroscope: {misalignment: [[1, 0, 0], [0, 1, 0], [0, 0, 3]]}"),
+            "f:11: imu.gyroscope.misalignment: 3 is outside [-2, 2]");
+  EXPECT_EQ(with_imu("accelerometer: {misalignment: [1, 2, 3]}"),
+            "f:11: imu.accelerometer.misalignment: expected a 3x3 matrix as 3 rows of 3 numbers, "
+            "found \"1\"");
+}
+
 TEST(ConfigFile, RefusesPatternsThatCannotBlinkAnId) {
   const std::string good = "011111111111111111";
   EXPECT_EQ(faults_of(replaced(good, "01112111")),
@@ -223,6 +257,9 @@ TEST(ConfigFile, WantsDistinctMembersAndThisRobotAmongThem) {
             "f:5: swarm.members[1].name: r1 is taken by swarm.members[0]");
   EXPECT_EQ(faults_of(replaced("name: r2", "name: r2, uwb_id: 1")),
             "f:5: swarm.members[1].uwb_id: 1 is taken by swarm.members[0]");
+  std::string both_zero = replaced("name: r2", "name: r2, uwb_id: 0");
+  both_zero.replace(both_zero.find("name: r1"), 8, "name: r1, uwb_id: 0");
+  EXPECT_EQ(faults_of(both_zero), "f:5: swarm.members[1].uwb_id: 0 is taken by swarm.members[0]");
   EXPECT_EQ(faults_of(replaced("{id: 1}", "{id: 3}")),
             "f:1: robot.id: 3 is not among swarm.members");
 }

@@ -122,14 +122,37 @@ TEST_F(SerialReaderTest, SaysThatAModuleIsInAnotherModeUntilItIsNot) {
   EXPECT_FALSE(reader.diagnosis());
 }
 
-TEST_F(SerialReaderTest, SuspectsTheBaudRateWhenNoFrameIsFound) {
+TEST_F(SerialReaderTest, SuspectsTheBaudRateWhenNoFrameIsFoundForASecond) {
   auto reader = this->reader(WitMotionParser(), [](const ImuSample&) {});
   send(std::vector<std::uint8_t>(100, 0xe0));
 
   ASSERT_TRUE(reader.read_once(1s));
+  EXPECT_FALSE(reader.diagnosis());
+  clock_.set(Timestamp{1s});
 
   ASSERT_TRUE(reader.diagnosis());
   EXPECT_NE(reader.diagnosis()->find("wrong baud rate"), std::string::npos);
+}
+
+TEST_F(SerialReaderTest, NamesWhatSpeaksInsteadOfTheConfiguredDevice) {
+  auto reader = uwb_reader();
+  for (int i = 0; i < 3; ++i) send(recorded_witmotion());
+
+  ASSERT_TRUE(reader.read_once(1s));
+  clock_.set(Timestamp{1s});
+
+  EXPECT_EQ(reader.diagnosis(), line_->path() + ": another kind of device: it speaks witmotion");
+}
+
+TEST_F(SerialReaderTest, PassesOnWhyFramesHoldNoMeasurement) {
+  auto reader = this->reader(NlinkParser({}, 200.0), [](const UwbRange&) {});
+  clock_.set(Timestamp{1s});
+  send(recorded_node_frame3());
+
+  ASSERT_TRUE(reader.read_once(1s));
+
+  ASSERT_TRUE(reader.diagnosis());
+  EXPECT_NE(reader.diagnosis()->find("no member carries"), std::string::npos);
 }
 
 TEST_F(SerialReaderTest, ThrowsAwayWhatCameBeforeItOpened) {

@@ -182,7 +182,9 @@ TEST_F(LiveDaemon, OpensASerialDeviceThatComesGoesAndComesAgain) {
   config.imu.port = port;
   const Runtime runtime(config, machine_);
   Client client(config);
-  const auto sample = encode_witmotion({0.1, 0.2, 0.3}, {0.0, 0.0, 9.81});
+  auto sample = [turn = 0]() mutable {  // what repeats itself is taken for stuck
+    return encode_witmotion({0.01 * (++turn % 100), 0.2, 0.3}, {0.0, 0.0, 9.81});
+  };
   const auto missing = [](const Json& status) {
     return tells(sensor_of(status, "imu"), "crepes-imu-");
   };
@@ -192,7 +194,7 @@ TEST_F(LiveDaemon, OpensASerialDeviceThatComesGoesAndComesAgain) {
     PseudoTerminal device = PseudoTerminal::open().value();
     std::filesystem::create_symlink(device.path(), port);
     EXPECT_TRUE(client.await_status([&](const Json& status) {
-      device.write(sample);
+      device.write(sample());
       const Json imu = sensor_of(status, "imu");
       return imu.value("ok", false) && imu.value("rate_hz", 0.0) > 0.0;
     }));
