@@ -106,9 +106,10 @@ Result<led_settings> led_settings_of(const SwarmConfig& swarm, RobotId id,
     return tl::unexpected(Error{code.error()}.with_context("id " + std::to_string(id.value)));
   led_settings settings{};
   settings.robot_id = id.value;
-  for (std::size_t i = 0; i < LED_COUNT; ++i)
-    settings.brightness[i] =
-        static_cast<std::uint8_t>(std::clamp(brightness[i % brightness.size()], 0, 255));
+  for (std::size_t i = 0; i < LED_COUNT; ++i) {
+    const int percent = std::clamp(brightness[i % brightness.size()], 0, 255);
+    settings.brightness[i] = static_cast<std::uint8_t>(percent);
+  }
   const auto whole =
       member->pattern ? ticks_of("swarm.slot_ms", swarm.slot_ms).map([&](std::uint16_t slot) {
         return with_pattern(settings, *member->pattern, slot);

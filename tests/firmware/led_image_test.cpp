@@ -18,6 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
+const std::string kLightWrite = "GPIOA: unimplemented device write (size 4, offset 0x000, value 0x";
 constexpr Duration kTick = std::chrono::microseconds(LED_TICK_US);
 
 #define SKIP_WITHOUT_BOARD() \
@@ -47,7 +48,6 @@ struct Waveform {
 
 Waveform record(QemuBoard& board, std::size_t ticks) {
   const std::string tick = "systick_timer_tick";
-  const std::string write = "GPIOA: unimplemented device write (size 4, offset 0x000, value 0x";
   const std::string reload = "systick_write systick write addr 0x4 data ";
   Waveform waveform;
   int traces = 0;
@@ -56,8 +56,8 @@ Waveform record(QemuBoard& board, std::size_t ticks) {
     if (!line) break;
     if (line->starts_with(tick)) ++traces;
     if (line->starts_with(reload)) waveform.reload = line->substr(reload.size());
-    if (!line->starts_with(write)) continue;
-    const std::string value = line->substr(write.size(), 8);
+    if (!line->starts_with(kLightWrite)) continue;
+    const std::string value = line->substr(kLightWrite.size(), 8);
     waveform.values.insert(value);
     if (traces == 0) continue;  // before SysTick ran
     waveform.traces_per_write.insert(traces);
@@ -184,6 +184,44 @@ TEST(LedImage, AnswersOnItsSerialLineAndOutlivesDeadClockAndFlash) {
   const auto still = answer_to(*board, request_of(LED_GET));
   ASSERT_TRUE(still && still->type == LED_SETTINGS);
   EXPECT_EQ(bytes_of(led_settings_read(still->payload)), bytes_of(settings));
+}
+
+TEST(LedImage, SetsTheLightWithinTenMicrosecondsOfEveryTickWhateverTheLineCarries) {
+  SKIP_WITHOUT_BOARD();
+  RamFlash flash = holding(pattern_settings(3, "00100100111100111111"));
+  Result<QemuBoard> board =
+      QemuBoard::start(flash, {"-singlestep", "-d", "unimp,exec,nochain,trace:systick_timer_tick",
+                               "-icount", "shift=0,sleep=off"});
+  ASSERT_TRUE(board.has_value()) << board.error().message;
+  led_frame test = request_of(LED_TEST);
+  test.size = 2;
+  std::array<std::uint8_t, LED_MAX_FRAME> bytes{};
+  const std::size_t size = led_frame_write(&test, bytes.data());
+
+  bool is_due = false;   // a tick came, its write has not yet
+  int instructions = 0;  // since the tick
+  int ticks = 0;
+  int most = 0;
+  int answered = 0;
+  while (ticks < 6000) {
+    const std::optional<std::string> line = board->log_line();
+    ASSERT_TRUE(line.has_value());
+    if (line->starts_with("systick_timer_tick")) {
+      is_due = true;
+      instructions = 0;
+    }
+    if (line->starts_with("Trace")) ++instructions;
+    if (!line->starts_with(kLightWrite) || !is_due) continue;
+    most = std::max(most, instructions);
+    is_due = false;
+    if (++ticks % 30 == 0) board->send(std::span(bytes).first(size));
+    while (board->receive(0ms)) ++answered;
+  }
+
+  EXPECT_GT(answered, 100) << "bytes of answers, or nothing was in the way";
+  // An instruction takes 12 cycles of 24 MHz at most: 10 us are 20 of them.
+  EXPECT_LE(most, 20);
+  EXPECT_GT(most, 0);
 }
 
 }  // namespace
