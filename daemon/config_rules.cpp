@@ -159,9 +159,8 @@ void check_imu(const ImuConfig& imu, Faults& faults) {
   if (!imu.T_body_imu.p.isZero(0.0))
     faults.push_back({"imu.T_body_imu", "the body's origin is the IMU: the last column must be 0"});
   const auto check_triad = [&](const std::string& key, const TriadConfig& triad) {
-    if (triad.misalignment.determinant() < kLeastVolume)
-      faults.push_back(
-          {key + ".misalignment", "mirrors or flattens: its determinant is below 0.1"});
+    if (triad.misalignment.determinant() >= kLeastVolume) return;
+    faults.push_back({key + ".misalignment", "mirrors or flattens: its determinant is below 0.1"});
   };
   check_triad("imu.accelerometer", imu.accelerometer);
   check_triad("imu.gyroscope", imu.gyroscope);

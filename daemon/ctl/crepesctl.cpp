@@ -19,6 +19,7 @@
 #include "daemon/ctl/led.hpp"
 #include "daemon/ctl/live_screen.hpp"
 #include "daemon/ctl/plot.hpp"
+#include "daemon/ctl/setup_witmotion.hpp"
 #include "daemon/ctl/spots.hpp"
 #include "daemon/ctl/swarm_replay.hpp"
 #include "daemon/ctl/text_table.hpp"
@@ -251,6 +252,21 @@ void add_spots(CLI::App& app, SpotsOptions& options, Command& command) {
   sub->callback([&] { command = [&options] { return run_spots(options); }; });
 }
 
+void add_setup_witmotion(CLI::App& app, WitMotionSetup& setup, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "setup-witmotion",
+      "Have a WitMotion IMU send acceleration and rate alone, fast enough, and keep it so");
+  sub->add_option("--port", setup.port, "its serial line")->required();
+  sub->add_option("--baud", setup.baud, "its rate now")->capture_default_str();
+  sub->add_option("--rate", setup.rate_hz, "samples a second: 10, 20, 50, 100 or 200")
+      ->capture_default_str();
+  sub->callback([&] {
+    command = [&] {
+      return set_up_witmotion(setup).map([](const std::string& text) { print(text); });
+    };
+  });
+}
+
 using LedCommand = Result<std::string> (*)(const LedOptions&);
 
 CLI::App* add_led_command(CLI::App* led, const std::string& name, const std::string& help,
@@ -295,6 +311,7 @@ int run(int argc, char** argv) {
   DemoOptions demo_options;
   CodebookOptions codebook_options;
   LedOptions led_options;
+  WitMotionSetup witmotion_setup;
   std::vector<std::filesystem::path> calibration_files;
   std::string out;
   Command command;
@@ -308,6 +325,7 @@ int run(int argc, char** argv) {
   add_import_calibration(app, calibration_files, out, command);
   add_spots(app, spots_options, command);
   add_led(app, led_options, command);
+  add_setup_witmotion(app, witmotion_setup, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -87,7 +87,7 @@ class ImuFrameParser {
     take(Protocol::read(frame), arrival, counts_, sink);
   }
 
-  [[nodiscard]] std::string why_nothing() const { return std::string(Protocol::kNoSamples); }
+  [[nodiscard]] static std::string why_nothing() { return std::string(Protocol::kNoSamples); }
   [[nodiscard]] const ImuCounts& counts() const { return counts_; }
 
  private:

@@ -153,13 +153,10 @@ bool MavlinkParser::is_chosen(Bytes frame, Timestamp arrival) {
   const Header header = header_of(frame);
   const std::optional<int> rank = rank_of(header.id);
   if (!rank) return true;  // no rival: to be counted
-  if (source_ && *rank == source_->rank && header.sender == source_->sender)
-    source_->heard = arrival;
-  else if (!source_ || *rank < source_->rank || arrival - source_->heard > kGone)
-    source_ = Source{*rank, header.sender, arrival};
-  else
-    return false;
-  return true;
+  const bool is_same = source_ && *rank == source_->rank && header.sender == source_->sender;
+  const bool is_better = !source_ || *rank < source_->rank || arrival - source_->heard > kGone;
+  if (is_same || is_better) source_ = Source{*rank, header.sender, arrival};
+  return is_same || is_better;
 }
 
 void MavlinkParser::parse(Bytes frame, Timestamp arrival,

@@ -71,7 +71,7 @@ void WitMotionParser::parse(Bytes frame, Timestamp arrival,
   take(reading, arrival, counts_, sink);
 }
 
-std::string WitMotionParser::why_nothing() const {
+std::string WitMotionParser::why_nothing() {
   return "the WitMotion sensor does not send acceleration (51) and rate (52) together; switch both "
          "on with its set-up program";
 }

@@ -26,7 +26,7 @@ class WitMotionParser {
   /// A whole frame; the sample is stamped with the arrival of its second half.
   void parse(Bytes frame, Timestamp arrival, const std::function<void(const ImuSample&)>& sink);
 
-  [[nodiscard]] std::string why_nothing() const;
+  [[nodiscard]] static std::string why_nothing();
   [[nodiscard]] const ImuCounts& counts() const { return counts_; }
 
  private:

@@ -1,0 +1,56 @@
+#include "daemon/ctl/setup_witmotion.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "drivers/imu/witmotion.hpp"
+#include "drivers/imu/witmotion_setup.hpp"
+#include "drivers/monotonic_clock.hpp"
+#include "drivers/serial/serial_reader.hpp"
+
+namespace crepes {
+namespace {
+
+/// Samples a second, and an error when there are none.
+Result<double> measure_rate(SerialPort port, std::chrono::milliseconds duration) {
+  constexpr std::chrono::milliseconds kReadTimeout{50};
+  const MonotonicClock clock;
+  const std::string path = port.path();
+  std::size_t samples = 0;
+  SerialReader<WitMotionParser> reader(std::move(port), {}, clock,
+                                       [&](const ImuSample&) { ++samples; });
+  // What waits is from before.
+  if (const Result<void> read = reader.read_once(std::chrono::milliseconds{0}); !read)
+    return tl::unexpected(read.error());
+  samples = 0;
+  const Timestamp begin = clock.now();
+  while (clock.now() - begin < duration) {
+    if (const Result<void> read = reader.read_once(kReadTimeout); !read)
+      return tl::unexpected(read.error());
+  }
+  if (samples > 0) return static_cast<double>(samples) / to_seconds(clock.now() - begin);
+  return fail(ErrorCode::kIo,
+              reader.diagnosis().value_or(path + ": no sample; is --baud the sensor's rate?"));
+}
+
+}  // namespace
+
+Result<std::string> set_up_witmotion(const WitMotionSetup& setup) {
+  constexpr double kWithin = 0.25;  // the sensor's rates are at least a factor of two apart
+  const auto commands = witmotion_setup(setup.rate_hz);
+  if (!commands) return tl::unexpected(commands.error());
+  Result<SerialPort> port = SerialPort::open(setup.port, setup.baud);
+  if (!port) return tl::unexpected(port.error());
+  if (const auto sent = send_commands(*port, *commands, setup.pause); !sent)
+    return tl::unexpected(sent.error());
+  const Result<double> rate_hz = measure_rate(std::move(*port), setup.listen);
+  if (!rate_hz) return tl::unexpected(rate_hz.error());
+  const std::string measured = std::to_string(std::lround(*rate_hz)) + " samples a second";
+  if (std::abs(*rate_hz - setup.rate_hz) > kWithin * setup.rate_hz)
+    return fail(ErrorCode::kIo, setup.port + ": " + measured + ", not as asked");
+  return setup.port + ": " + measured + "; set imu.update_rate to " +
+         std::to_string(setup.rate_hz) + ".0\n";
+}
+
+}  // namespace crepes
