@@ -59,16 +59,18 @@ std::string exposure_advice(const SpotsSummary& summary) {
                                fixed(100.0 * summary.most_saturated, 1) + " % saturated";
   const std::string manual =
       summary.is_automatic ? "" : "; set vision.threshold to 0 (automatic) to see what that finds";
-  if (2 * summary.bright > summary.pictures)
+  if (2 * summary.bright > summary.pictures) {
     return "too bright (" + because +
            "): shorten the exposure or lower the gain, and check that the infrared filter is in "
            "place" +
            manual;
-  if (summary.dark == summary.pictures)
+  }
+  if (summary.dark == summary.pictures) {
     return "all dark, nothing stands out (" + because +
            "): check the lens cap, and that a board is lit and in view; then lengthen the exposure "
            "or raise the gain" +
            manual;
+  }
   return "";
 }
 
@@ -81,9 +83,10 @@ std::string picture_caption(const PictureFindings& findings) {
 std::string picture_text(const PictureFindings& findings) {
   std::vector<std::vector<std::string>> rows{
       {"spot", "u [px]", "v [px]", "area [px2]", "peak", "elongation"}};
-  for (const Spot& spot : findings.detection.spots)
+  for (const Spot& spot : findings.detection.spots) {
     rows.push_back({std::to_string(rows.size()), fixed(spot.u_px, 2), fixed(spot.v_px, 2),
                     fixed(spot.area_px2, 0), fixed(spot.peak, 0), fixed(spot.elongation, 2)});
+  }
   return rows.size() > 1 ? text_table(rows) + "\n" : "";
 }
 
@@ -100,15 +103,17 @@ std::string picture_json(const PictureFindings& findings) {
             {"spots", Json::array()},
             {"robots", Json::array()}};
   if (!found.failure.empty()) json["failure"] = std::string(found.failure);
-  for (const Spot& spot : found.spots)
+  for (const Spot& spot : found.spots) {
     json["spots"].push_back({{"u", spot.u_px},
                              {"v", spot.v_px},
                              {"area", spot.area_px2},
                              {"peak", spot.peak},
                              {"elongation", spot.elongation}});
-  for (const RobotSighting& robot : findings.robots)
+  }
+  for (const RobotSighting& robot : findings.robots) {
     json["robots"].push_back(
         {{"id", robot.id.value}, {"name", robot.name}, {"u", robot.u_px}, {"v", robot.v_px}});
+  }
   return dump(json);
 }
 
@@ -128,10 +133,11 @@ std::string summary_text(const SpotsSummary& summary) {
           share_text(summary.dark, all) + ", bright " + share_text(summary.bright, all) + "\n";
   if (summary.failures > 0)
     text += "failures   the detector failed on " + std::to_string(summary.failures) + " pictures\n";
-  for (const auto& [id, robot] : summary.robots)
+  for (const auto& [id, robot] : summary.robots) {
     text += "robot " + std::to_string(id.value) + "    " + robot.name + ", in " +
             share_text(robot.pictures, all) + " of the pictures, first after " +
             fixed(robot.first_s, 3) + " s\n";
+  }
   if (summary.robots.empty() && all > 1) text += "robots     none was recognized\n";
   const std::string advice = exposure_advice(summary);
   return advice.empty() ? text : text + "ADVICE     " + advice + "\n";
@@ -154,11 +160,12 @@ std::string summary_json(const SpotsSummary& summary) {
       {"exposure", {{"good", summary.good}, {"dark", summary.dark}, {"bright", summary.bright}}},
       {"failures", summary.failures},
       {"robots", Json::array()}};
-  for (const auto& [id, robot] : summary.robots)
+  for (const auto& [id, robot] : summary.robots) {
     json["robots"].push_back({{"id", id.value},
                               {"name", robot.name},
                               {"pictures", robot.pictures},
                               {"first_s", robot.first_s}});
+  }
   const std::string advice = exposure_advice(summary);
   if (!advice.empty()) json["advice"] = advice;
   return dump(json);

@@ -38,6 +38,7 @@ class Camera {
 
   /// Takes back a frame of this camera that has been used, pixels unchanged, to save the next its
   /// memory. Optional.
+  // NOLINTNEXTLINE(performance-unnecessary-value-param): overrides move from it.
   virtual void recycle(Frame /*frame*/) {}
 
   /// Totals by reason: frames missed, late, broken.
