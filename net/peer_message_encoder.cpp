@@ -1,48 +1,24 @@
-#include "net/peer_message.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <optional>
 
 #include "estimator/core/contract.hpp"
-#include "net/byte_reader.hpp"
 #include "net/byte_writer.hpp"
 #include "net/crc32.hpp"
-#include "net/wire_codes.hpp"
+#include "net/peer_message.hpp"
+#include "net/peer_message_layout.hpp"
 
 namespace crepes {
+namespace wire {
 namespace {
 
-constexpr std::array<std::uint8_t, 3> kMagic{'C', 'R', 'P'};
-constexpr std::uint8_t kVersion = 1;
 constexpr std::size_t kHeader = 26;
-constexpr std::size_t kChecksum = 4;
-constexpr std::int64_t kTick = 10'000;  // ns
-constexpr std::int64_t kMaxStamp = 4'000'000'000'000'000'000;
-
 constexpr std::size_t kMaxEchoes = 10;
 constexpr std::size_t kMaxImu = 16;  // 160 ms at 100 Hz: one datagram in three may be lost
 constexpr std::size_t kEstimateBudget = 450;
-
-constexpr std::size_t kEchoSize = 14;
-constexpr std::size_t kImuSize = 14;
-constexpr std::size_t kCameraSize = 12;
-constexpr std::size_t kSourceSize = 3;
-constexpr std::size_t kBearingSize = 8;
-constexpr std::size_t kRangeSize = 10;
-constexpr std::size_t kEstimateSize = 78;
 constexpr std::size_t kMaxCount = 255;
 
-constexpr LogScale kBearingSigma{1e-5, 1.0, 255};
-constexpr double kMaxRange = 1e4;          // m
-constexpr double kMaxCoordinate = 1e6;     // m, m/s
-constexpr double kUnknownTiltSigma = 3.2;  // rad: half a turn, nothing is known
-constexpr int kMinExponent = -30;
-constexpr int kMaxExponent = 20;
-constexpr double kMaxCode = 32767.0;
-
-std::int64_t floor_to_ticks(std::int64_t ns) { return ns / kTick - (ns % kTick < 0 ? 1 : 0); }
 std::int64_t round_to_ticks(std::int64_t ns) { return floor_to_ticks(ns + kTick / 2); }
 
 /// Ticks from the datagram's own, where the wire's integer has room for them.
@@ -52,8 +28,6 @@ std::optional<Integer> ticks_from(std::int64_t base_tick, Timestamp stamp) {
   if (!std::in_range<Integer>(ticks)) return std::nullopt;
   return static_cast<Integer>(ticks);
 }
-
-bool is_robot(RobotId id) { return id.value >= 1 && id.value <= 65534; }
 
 bool is_writable(const ImuSample& sample) {
   const double limit = std::ldexp(kMaxCode, kMaxExponent);
@@ -88,12 +62,6 @@ bool is_writable(const NeighborEstimate& estimate) {
 struct SourcedBearing {
   const Bearing* bearing;
   std::uint8_t source;
-};
-
-struct Source {
-  RobotId neighbor;
-  std::uint8_t camera;
-  bool operator==(const Source&) const = default;
 };
 
 /// Index of `item`, appended if new; `cost` grows by `size` then. Empty when the table is full.
@@ -355,193 +323,14 @@ class Encoder {
   ByteWriter out_{kMaxPeerMessage};
 };
 
-/// Reads field by field and remembers the first fault; what is read after it is not used.
-class Decoder {
- public:
-  explicit Decoder(std::span<const std::uint8_t> body) : in_(body) {}
-
-  [[nodiscard]] std::optional<PeerMessageFault> fault() const {
-    if (!in_.ok()) return PeerMessageFault::kTruncated;
-    if (fault_) return fault_;
-    if (!in_.at_end()) return PeerMessageFault::kTrailingBytes;
-    return std::nullopt;
-  }
-
-  PeerMessage read() {
-    PeerMessage message;
-    message.report.sender = robot();
-    message.session = in_.read<std::uint32_t>();
-    message.sequence = in_.read<std::uint32_t>();
-    message.sent = PeerTimestamp{Duration{bounded_stamp(in_.read<std::int64_t>())}};
-    base_tick_ = floor_to_ticks(to_ns(message.sent));
-    message.report.stamp = time(in_.read<std::int32_t>());
-    message.report.tilt = tilt();
-    each(kEchoSize, [&] { message.echoes.push_back(echo(message.sent)); });
-    imu(message.report.imu);
-    bearings(message.report.bearings);
-    each(kRangeSize, [&] { message.report.ranges.push_back(range()); });
-    each(kEstimateSize, [&] { message.report.estimates.push_back(estimate()); });
-    return message;
-  }
-
- private:
-  void expect(bool condition, PeerMessageFault fault) {
-    if (!condition && !fault_ && in_.ok()) fault_ = fault;
-  }
-
-  /// Calls `read_one` as often as the next byte says, if that many items can follow.
-  template <class ReadOne>
-  void each(std::size_t item_size, ReadOne read_one) {
-    repeat(in_.read<std::uint8_t>(), item_size, read_one);
-  }
-  template <class ReadOne>
-  void repeat(std::size_t n, std::size_t item_size, ReadOne read_one) {
-    expect(n * item_size <= in_.remaining(), PeerMessageFault::kTruncated);
-    for (std::size_t i = 0; i < n && !fault_; ++i) read_one();
-  }
-
-  [[nodiscard]] PeerTimestamp time(std::int64_t ticks) const {
-    return PeerTimestamp{Duration{(base_tick_ + ticks) * kTick}};
-  }
-  PeerTimestamp stamp() { return time(in_.read<std::int16_t>()); }
-
-  std::int64_t bounded_stamp(std::int64_t ns) {
-    const bool bounded = ns >= -kMaxStamp && ns <= kMaxStamp;
-    expect(bounded, PeerMessageFault::kBadStamp);
-    return bounded ? ns : 0;
-  }
-
-  RobotId robot() {
-    const RobotId id{in_.read<std::uint16_t>()};
-    expect(is_robot(id), PeerMessageFault::kBadId);
-    return id;
-  }
-
-  double number(double limit) {
-    const double value = in_.read_float();
-    expect(std::isfinite(value), PeerMessageFault::kNotFinite);
-    expect(std::abs(value) <= limit, PeerMessageFault::kOutOfRange);
-    return value;
-  }
-
-  Eigen::Vector3d vector() {
-    Eigen::Vector3d v;
-    for (double& x : v) x = number(kMaxCoordinate);
-    return v;
-  }
-
-  Eigen::Vector3d direction() {
-    const auto a = in_.read<std::int16_t>();
-    const auto b = in_.read<std::int16_t>();
-    const auto u = decode_direction({a, b});
-    expect(u.has_value(), PeerMessageFault::kNotUnit);
-    return u.value_or(Eigen::Vector3d::UnitZ());
-  }
-
-  BasicTilt<PeerTimestamp> tilt() {
-    BasicTilt<PeerTimestamp> tilt;
-    tilt.stamp = time(in_.read<std::int32_t>());
-    tilt.up_B = direction();
-    tilt.sigma_rad = number(kUnknownTiltSigma + 1e-6);
-    expect(tilt.sigma_rad > 0, PeerMessageFault::kOutOfRange);
-    return tilt;
-  }
-
-  ClockEcho echo(PeerTimestamp sent) {
-    ClockEcho echo;
-    echo.peer = robot();
-    echo.sent_ns = bounded_stamp(in_.read<std::int64_t>());
-    echo.received_ns = to_ns(sent) - std::int64_t{in_.read<std::uint32_t>()} * 1000;
-    return echo;
-  }
-
-  int exponent() {
-    const auto exponent = in_.read<std::int8_t>();
-    expect(exponent >= kMinExponent && exponent <= kMaxExponent, PeerMessageFault::kOutOfRange);
-    return exponent;
-  }
-
-  void imu(std::vector<BasicImuSample<PeerTimestamp>>& samples) {
-    const std::size_t n = in_.read<std::uint8_t>();
-    const int gyro = exponent();
-    const int accel = exponent();
-    repeat(n, kImuSize, [&] {
-      auto& sample = samples.emplace_back();
-      sample.stamp = stamp();
-      for (double& v : sample.gyro_radps) v = std::ldexp(in_.read<std::int16_t>(), gyro);
-      for (double& v : sample.accel_mps2) v = std::ldexp(in_.read<std::int16_t>(), accel);
-    });
-  }
-
-  void bearings(std::vector<BasicBearing<PeerTimestamp>>& bearings) {
-    std::vector<Eigen::Vector3d> cameras;
-    each(kCameraSize, [&] { cameras.push_back(vector()); });
-    std::vector<Source> sources;
-    each(kSourceSize, [&] {
-      const RobotId neighbor = robot();
-      sources.push_back({neighbor, in_.read<std::uint8_t>()});
-      expect(sources.back().camera < cameras.size(), PeerMessageFault::kBadIndex);
-    });
-    each(kBearingSize, [&] {
-      auto& bearing = bearings.emplace_back();
-      bearing.stamp = stamp();
-      const std::size_t source = in_.read<std::uint8_t>();
-      bearing.u_B = direction();
-      bearing.sigma_rad = kBearingSigma.decode(in_.read<std::uint8_t>());
-      expect(source < sources.size(), PeerMessageFault::kBadIndex);
-      if (fault_ || source >= sources.size()) return;
-      bearing.neighbor = sources[source].neighbor;
-      bearing.p_B_C = cameras[sources[source].camera];
-    });
-  }
-
-  BasicUwbRange<PeerTimestamp> range() {
-    BasicUwbRange<PeerTimestamp> range;
-    range.neighbor = robot();
-    range.stamp = stamp();
-    range.range_m = number(kMaxRange);
-    expect(range.range_m > 0, PeerMessageFault::kOutOfRange);
-    range.first_path_dbm = -0.5 * in_.read<std::uint8_t>();
-    range.received_dbm = -0.5 * in_.read<std::uint8_t>();
-    return range;
-  }
-
-  BasicNeighborEstimate<PeerTimestamp> estimate() {
-    BasicNeighborEstimate<PeerTimestamp> estimate;
-    estimate.neighbor = robot();
-    estimate.stamp = stamp();
-    estimate.T_B_N.pose.p = vector();
-    Eigen::Vector4d q;
-    for (double& v : q) v = in_.read<std::int16_t>() / kMaxCode;
-    expect(std::abs(q.norm() - 1) < 1e-3, PeerMessageFault::kNotUnit);
-    estimate.T_B_N.pose.q = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
-    estimate.v_B_N = vector();
-    CovarianceCode code;
-    for (std::uint16_t& sigma : code.sigmas) sigma = in_.read<std::uint16_t>();
-    for (std::int16_t& entry : code.factor) entry = in_.read<std::int16_t>();
-    const auto covariance = decode_covariance(code);
-    expect(covariance.has_value(), PeerMessageFault::kBadCovariance);
-    estimate.T_B_N.covariance = covariance.value_or(Matrix6d::Identity());
-    return estimate;
-  }
-
-  ByteReader in_;
-  std::int64_t base_tick_ = 0;
-  std::optional<PeerMessageFault> fault_;
-};
-
-std::uint32_t checksum_of(std::span<const std::uint8_t> datagram) {
-  ByteReader in(datagram.last(kChecksum));
-  return in.read<std::uint32_t>();
-}
-
 }  // namespace
+}  // namespace wire
 
 EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message) {
-  CREPES_EXPECT(is_robot(message.report.sender), "a sender has an id");
-  CREPES_EXPECT(std::abs(to_ns(message.sent)) <= kMaxStamp, "a clock counts from its epoch");
-  const Selection selection(message);
-  Encoder encoder(floor_to_ticks(to_ns(message.sent)));
+  CREPES_EXPECT(wire::is_robot(message.report.sender), "a sender has an id");
+  CREPES_EXPECT(std::abs(to_ns(message.sent)) <= wire::kMaxStamp, "a clock counts from its epoch");
+  const wire::Selection selection(message);
+  wire::Encoder encoder(wire::floor_to_ticks(to_ns(message.sent)));
   encoder.header(message);
   encoder.tilt(message.report.tilt);
   encoder.echoes(selection.echoes, message.sent);
@@ -550,24 +339,6 @@ EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message) {
   encoder.ranges(selection.ranges);
   encoder.estimates(selection.estimates);
   return {std::move(encoder).sealed(), selection.left_out, selection.refused};
-}
-
-tl::expected<PeerMessage, PeerMessageFault> decode_peer_message(
-    std::span<const std::uint8_t> datagram) {
-  using Fault = PeerMessageFault;
-  constexpr std::size_t kPreamble = kMagic.size() + 1;
-  if (datagram.size() > kMaxPeerMessage) return tl::unexpected(Fault::kTooLong);
-  if (datagram.size() < kPreamble + kChecksum) return tl::unexpected(Fault::kTooShort);
-  if (!std::equal(kMagic.begin(), kMagic.end(), datagram.begin()))
-    return tl::unexpected(Fault::kForeign);
-  if (datagram[kMagic.size()] != kVersion) return tl::unexpected(Fault::kOtherVersion);
-  if (crc32(datagram.first(datagram.size() - kChecksum)) != checksum_of(datagram))
-    return tl::unexpected(Fault::kDamaged);
-
-  Decoder decoder(datagram.subspan(kPreamble, datagram.size() - kPreamble - kChecksum));
-  PeerMessage message = decoder.read();
-  if (const auto fault = decoder.fault()) return tl::unexpected(*fault);
-  return message;
 }
 
 }  // namespace crepes
