@@ -60,11 +60,11 @@ Result<RingRenderer> RingRenderer::make(const SimWorld& world, RobotId robot,
   return renderer;
 }
 
-RingRenderer::RingRenderer(const SimWorld& world, RobotId robot, const CameraModel& model,
+RingRenderer::RingRenderer(const SimWorld& world, RobotId robot, CameraModel model,
                            const CameraConfig& camera, std::uint8_t index)
     : world_(world),
       robot_(robot),
-      model_(model),
+      model_(std::move(model)),
       index_(index),
       T_C_B_(camera.T_cam_imu),
       noise_{kCameraKey, static_cast<std::uint64_t>(world.seed()), robot.value, index} {

@@ -69,8 +69,8 @@ class RingRenderer {
     double peak;  ///< grey levels above the background
   };
 
-  RingRenderer(const SimWorld& world, RobotId robot, const CameraModel& model,
-               const CameraConfig& camera, std::uint8_t index);
+  RingRenderer(const SimWorld& world, RobotId robot, CameraModel model, const CameraConfig& camera,
+               std::uint8_t index);
 
   [[nodiscard]] std::vector<Blob> blobs_of(const Board& board, double t_s) const;
   [[nodiscard]] Rectangle draw(const std::vector<Blob>& blobs, std::vector<std::uint8_t>& pixels);
