@@ -11,8 +11,6 @@ constexpr Duration kMaxAge = std::chrono::milliseconds{20};  // of a published s
 constexpr Duration kMaxBehind = std::chrono::seconds{1};
 constexpr Duration kSilence = std::chrono::seconds{2};
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
-// A filter whose sightings were all refused for so long is wrong, not unlucky.
-constexpr Duration kPatience = std::chrono::milliseconds{500};
 
 }  // namespace
 

@@ -136,7 +136,6 @@ Timestamp NeighborTrack::last_sighting() const {
 }
 
 bool NeighborTrack::has_lost_its_way() const {
-  static constexpr Duration kPatience = std::chrono::milliseconds{500};
   static constexpr int kEnough = 10;
   const auto is_astray = [this](MeasurementKind kind) {
     const Refusals& refused = refused_[static_cast<std::size_t>(kind)];

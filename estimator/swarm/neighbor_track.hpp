@@ -25,6 +25,9 @@ struct PairMounting {
 /// Long before any stamp, yet safe to subtract from one.
 inline constexpr Timestamp kNever{Duration{std::numeric_limits<std::int64_t>::min() / 4}};
 
+/// A filter whose sightings were all refused for so long is wrong, not unlucky.
+inline constexpr Duration kPatience = std::chrono::milliseconds{500};
+
 /// A value: copies are used to look ahead over readings that still wait for late ones.
 class NeighborTrack {
  public:
