@@ -5,6 +5,7 @@
 #include "daemon/config_file.hpp"
 #include "daemon/ctl/csv_file.hpp"
 #include "daemon/ctl/import_calibration.hpp"
+#include "daemon/ctl/scratch_directory.hpp"
 
 namespace crepes {
 namespace {
@@ -37,7 +38,8 @@ std::string refusal(const std::string& name, const std::string& from, const std:
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   text.replace(at, from.size(), to);
-  const fs::path file = fs::path(testing::TempDir()) / name;
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const fs::path file = scratch.path() / name;
   std::ofstream(file) << text;
 
   const Result<std::string> result = import_calibration({file});
@@ -128,7 +130,8 @@ TEST(ImportCalibration, ReachesACameraByWayOfTheOneBefore) {
   const std::size_t begin = text.find("  T_cam_imu:", text.find("cam1:"));
   std::string chained = text;
   chained.erase(begin, text.find("  T_cn_cnm1:") - begin);
-  const fs::path file = fs::path(testing::TempDir()) / "chained.yaml";
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const fs::path file = scratch.path() / "chained.yaml";
   std::ofstream(file) << chained;
   const Result<std::string> result = import_calibration({file});
   ASSERT_TRUE(result.has_value()) << result.error().message;
