@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 
 #include "estimator/core/contract.hpp"
 
@@ -26,43 +25,9 @@ constexpr Duration kRecent = std::chrono::milliseconds{500};
 
 using Bounds = std::vector<OffsetBound>;
 
-/// The offset at `center` that all bounds push to, along lines of slope `skew`.
-double tightest(const Bounds& bounds, double skew, double center, int sign) {
-  double best = -std::numeric_limits<double>::infinity();
-  for (const OffsetBound& b : bounds)
-    best = std::max(best, sign * (b.offset - skew * (b.t - center)));
-  return sign * best;
-}
-
-/// How far the tightest bound errs, one sigma: of n bounds with mean excess mu the smallest has
-/// mu/n. While there are few, half the `margin` between both sides stands in for what they do not
-/// tell.
-double envelope_sigma(const Bounds& bounds, double skew, double center, double tight,
-                      double margin) {
-  double excess = std::max(margin, 0.0) / 2;
-  for (const OffsetBound& b : bounds)
-    excess += std::abs(tight - (b.offset - skew * (b.t - center)));
-  const auto n = static_cast<double>(bounds.size());
-  return excess / (n * n);
-}
-
 ClockOffset::Verdict contradicted(int& in_a_row) {
   using Verdict = ClockOffset::Verdict;
   return ++in_a_row < kContradictions ? Verdict::kImplausible : Verdict::kRestarted;
-}
-
-/// Maximum of a concave function in [low, high].
-template <class Function>
-double maximizer(double low, double high, Function f) {
-  for (int i = 0; i < 32; ++i) {
-    const double third = (high - low) / 3;
-    if (f(low + third) < f(high - third)) {
-      low += third;
-    } else {
-      high -= third;
-    }
-  }
-  return (low + high) / 2;
 }
 
 }  // namespace

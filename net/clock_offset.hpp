@@ -11,8 +11,8 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/core/bound_envelope.hpp"
 #include "estimator/core/time.hpp"
-#include "net/bound_envelope.hpp"
 
 namespace crepes {
 

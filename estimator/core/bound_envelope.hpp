@@ -1,8 +1,10 @@
 /// The tightest bounds on a clock's offset, one for every tenth of a second of a sliding window.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace crepes {
@@ -54,5 +56,40 @@ class BoundEnvelope {
   int sign_;
   std::vector<Slot> slots_;
 };
+
+/// The offset at `center` that all bounds push to, along lines of slope `skew`; `sign` as above.
+[[nodiscard]] inline double tightest(const std::vector<OffsetBound>& bounds, double skew,
+                                     double center, int sign) {
+  double best = -std::numeric_limits<double>::infinity();
+  for (const OffsetBound& b : bounds)
+    best = std::max(best, sign * (b.offset - skew * (b.t - center)));
+  return sign * best;
+}
+
+/// How far the tightest bound errs, one sigma: of n bounds with mean excess mu the smallest has
+/// mu/n. While there are few, half the `margin` (to bounds of the other side; 0: there are none)
+/// stands in for what they do not tell.
+[[nodiscard]] inline double envelope_sigma(const std::vector<OffsetBound>& bounds, double skew,
+                                           double center, double tight, double margin) {
+  double excess = std::max(margin, 0.0) / 2;
+  for (const OffsetBound& b : bounds)
+    excess += std::abs(tight - (b.offset - skew * (b.t - center)));
+  const auto n = static_cast<double>(bounds.size());
+  return excess / (n * n);
+}
+
+/// Where a concave function has its maximum in [low, high].
+template <class Function>
+[[nodiscard]] double maximizer(double low, double high, Function f) {
+  for (int i = 0; i < 32; ++i) {
+    const double third = (high - low) / 3;
+    if (f(low + third) < f(high - third)) {
+      low += third;
+    } else {
+      high -= third;
+    }
+  }
+  return (low + high) / 2;
+}
 
 }  // namespace crepes
