@@ -20,14 +20,16 @@ using std::chrono::milliseconds;
 Totals faults_of(const NlinkCounts& counts) {
   return {{"unknown_modules", counts.unknown_modules},
           {"implausible", counts.implausible},
-          {"without_ranges", counts.without_ranges}};
+          {"without_ranges", counts.without_ranges},
+          {"clock_restarts", counts.clock_restarts}};
 }
 
 Totals faults_of(const ImuCounts& counts) {
   return {{"partial", counts.partial},
           {"unscaled", counts.unscaled},
           {"saturated", counts.saturated},
-          {"implausible", counts.implausible}};
+          {"implausible", counts.implausible},
+          {"clock_restarts", counts.clock_restarts}};
 }
 
 /// Ranges are handed on as they are.

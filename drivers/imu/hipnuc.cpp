@@ -1,5 +1,6 @@
 #include "drivers/imu/hipnuc.hpp"
 
+#include <chrono>
 #include <numbers>
 
 #include "drivers/serial/byte_fields.hpp"
@@ -45,7 +46,9 @@ ImuReading Hipnuc::read(Bytes frame) {
   if (frame.size() != kPayload + kHi91Length || frame[kPayload] != kHi91) return {};
   return {.verdict = ImuVerdict::kSample,
           .gyro_radps = vector_at<float>(frame, kPayload + 24) * kDegree,
-          .accel_mps2 = vector_at<float>(frame, kPayload + 12) * kGravity};
+          .accel_mps2 = vector_at<float>(frame, kPayload + 12) * kGravity,
+          .time = DeviceTime::ticks(unsigned_at(frame, kPayload + 8, 4),
+                                    std::chrono::milliseconds{1}, 32)};
 }
 
 }  // namespace crepes

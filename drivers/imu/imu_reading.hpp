@@ -5,9 +5,11 @@
 #include <concepts>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 
+#include "drivers/device_clock.hpp"
 #include "drivers/serial/frame_decoder.hpp"
 #include "estimator/core/measurements.hpp"
 
@@ -26,6 +28,7 @@ struct ImuReading {
   ImuVerdict verdict = ImuVerdict::kOther;
   Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
+  std::optional<DeviceTime> time = std::nullopt;  ///< of sensors that have a clock
 };
 
 /// No number, beyond every sensor's scale, or an accelerometer that says exactly nothing.
@@ -45,11 +48,15 @@ struct ImuCounts {
   std::uint64_t unscaled = 0;
   std::uint64_t saturated = 0;
   std::uint64_t implausible = 0;
+  std::uint64_t clock_restarts = 0;  ///< of the sensor's own clock
 };
 
-/// Hands on what `reading` holds, if it is a sample, and counts it.
-inline void take(const ImuReading& reading, Timestamp arrival, ImuCounts& counts,
-                 const std::function<void(const ImuSample&)>& sink) {
+/// Hands on what `reading` holds, if it is a sample, and counts it. The stamp is the sensor's own
+/// where it has a clock.
+inline void take(const ImuReading& reading, Timestamp arrival, DeviceClock& clock,
+                 ImuCounts& counts, const std::function<void(const ImuSample&)>& sink) {
+  const Timestamp stamp = clock.to_local(reading.time, arrival);
+  counts.clock_restarts = clock.restarts();
   if (reading.verdict == ImuVerdict::kOther) return;
   if (reading.verdict == ImuVerdict::kPartial) {
     ++counts.partial;
@@ -61,7 +68,7 @@ inline void take(const ImuReading& reading, Timestamp arrival, ImuCounts& counts
     ++counts.implausible;
   } else {
     ++counts.samples;
-    sink({arrival, reading.gyro_radps, reading.accel_mps2});
+    sink({stamp, reading.gyro_radps, reading.accel_mps2});
   }
 }
 
@@ -84,13 +91,14 @@ class ImuFrameParser {
   [[nodiscard]] static FrameCheck examine(Bytes bytes) { return Protocol::examine(bytes); }
 
   void parse(Bytes frame, Timestamp arrival, const std::function<void(const ImuSample&)>& sink) {
-    take(Protocol::read(frame), arrival, counts_, sink);
+    take(Protocol::read(frame), arrival, clock_, counts_, sink);
   }
 
   [[nodiscard]] static std::string why_nothing() { return std::string(Protocol::kNoSamples); }
   [[nodiscard]] const ImuCounts& counts() const { return counts_; }
 
  private:
+  DeviceClock clock_;
   ImuCounts counts_;
 };
 

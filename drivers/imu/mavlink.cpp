@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 
 #include "drivers/serial/byte_fields.hpp"
 
@@ -100,9 +101,11 @@ bool is_saturated(const Eigen::Vector3d& raw) {
 ImuReading highres(Bytes payload) {
   constexpr std::uint32_t kAllSix = 0x3fU;  // of the field that says what is new
   if ((unsigned_at(payload, 60, 2) & kAllSix) != kAllSix) return {.verdict = ImuVerdict::kPartial};
+  constexpr std::uint64_t kMicrosecond = 1000;  // ns
   return {.verdict = ImuVerdict::kSample,
           .gyro_radps = turned(vector_at<float>(payload, 20)),
-          .accel_mps2 = turned(vector_at<float>(payload, 8))};
+          .accel_mps2 = turned(vector_at<float>(payload, 8)),
+          .time = DeviceTime{.ns = unsigned_at(payload, 0, 8) * kMicrosecond}};
 }
 
 ImuReading scaled(Bytes payload) {
@@ -111,7 +114,8 @@ ImuReading scaled(Bytes payload) {
   const bool saturated = is_saturated(accel) || is_saturated(gyro);
   return {.verdict = saturated ? ImuVerdict::kSaturated : ImuVerdict::kSample,
           .gyro_radps = turned(gyro) * 1e-3,
-          .accel_mps2 = turned(accel) * kMilliGravity};
+          .accel_mps2 = turned(accel) * kMilliGravity,
+          .time = DeviceTime::ticks(unsigned_at(payload, 0, 4), std::chrono::milliseconds{1}, 32)};
 }
 
 /// The smaller, the better; empty: no samples in it.
@@ -161,7 +165,7 @@ bool MavlinkParser::is_chosen(Bytes frame, Timestamp arrival) {
 
 void MavlinkParser::parse(Bytes frame, Timestamp arrival,
                           const std::function<void(const ImuSample&)>& sink) {
-  if (is_chosen(frame, arrival)) take(Mavlink::read(frame), arrival, counts_, sink);
+  if (is_chosen(frame, arrival)) take(Mavlink::read(frame), arrival, clock_, counts_, sink);
 }
 
 std::string MavlinkParser::why_nothing() const {

@@ -53,6 +53,7 @@ class MavlinkParser {
   [[nodiscard]] bool is_chosen(Bytes frame, Timestamp arrival);
 
   std::optional<Source> source_;
+  DeviceClock clock_;
   ImuCounts counts_;
 };
 

@@ -68,7 +68,7 @@ void WitMotionParser::parse(Bytes frame, Timestamp arrival,
     reading.verdict = saturated ? ImuVerdict::kSaturated : ImuVerdict::kSample;
     reading.accel_mps2 = acceleration->mps2;
   }
-  take(reading, arrival, counts_, sink);
+  take(reading, arrival, clock_, counts_, sink);
 }
 
 std::string WitMotionParser::why_nothing() {

@@ -37,6 +37,7 @@ class WitMotionParser {
   };
 
   std::optional<Acceleration> acceleration_;
+  DeviceClock clock_;  // without use: no frame has a time
   ImuCounts counts_;
 };
 

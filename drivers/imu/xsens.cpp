@@ -1,6 +1,7 @@
 #include "drivers/imu/xsens.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
 
 #include "drivers/serial/byte_fields.hpp"
@@ -10,6 +11,7 @@ namespace {
 
 constexpr std::uint8_t kMtData2 = 0x36;
 constexpr std::size_t kItemHeader = 3;
+constexpr std::uint32_t kSampleTimeFine = 0x1060;
 constexpr std::uint32_t kAcceleration = 0x4020;
 constexpr std::uint32_t kRateOfTurn = 0x8020;
 constexpr std::uint32_t kStatusWord = 0xe020;
@@ -73,10 +75,14 @@ ImuReading Xsens::read(Bytes frame) {
   const Extent payload = extent_of(frame).value_or(Extent{});
   std::optional<Eigen::Vector3d> accel;
   std::optional<Eigen::Vector3d> gyro;
+  std::optional<DeviceTime> time;
   bool clipped = false;
   for (std::size_t at = payload.begin; at < payload.end;) {
     const auto id = static_cast<std::uint32_t>(unsigned_at(frame, at, 2, std::endian::big));
     const Bytes data = frame.subspan(at + kItemHeader, frame[at + 2]);
+    if (id == kSampleTimeFine && data.size() == 4)
+      time = DeviceTime::ticks(unsigned_at(data, 0, 4, std::endian::big),
+                               std::chrono::microseconds{100}, 32);
     // Bits 2 and 3 name the axes of orientations; these two are always the sensor's.
     if ((id & 0xfff0U) == kAcceleration) accel = triad(data, id & 3U);
     if ((id & 0xfff0U) == kRateOfTurn) gyro = triad(data, id & 3U);
@@ -88,7 +94,8 @@ ImuReading Xsens::read(Bytes frame) {
   if (!accel || !gyro) return {.verdict = ImuVerdict::kPartial};
   return {.verdict = clipped ? ImuVerdict::kSaturated : ImuVerdict::kSample,
           .gyro_radps = *gyro,
-          .accel_mps2 = *accel};
+          .accel_mps2 = *accel,
+          .time = time};
 }
 
 }  // namespace crepes

@@ -20,6 +20,9 @@ void NlinkParser::parse(Bytes frame, Timestamp arrival,
     ++counts_.without_ranges;
     return;
   }
+  const Timestamp sent = clock_.to_local(
+      DeviceTime::ticks(decoded.local_time_ms, std::chrono::milliseconds{1}, 32), arrival);
+  counts_.clock_restarts = clock_.restarts();
   for (const NlinkNode& node : decoded.nodes) {
     const auto robot = modules_.find(node.module);
     if (robot == modules_.end()) {
@@ -34,7 +37,7 @@ void NlinkParser::parse(Bytes frame, Timestamp arrival,
       continue;
     }
     ++counts_.ranges;
-    sink({.stamp = arrival - from_seconds(age_ms * 1e-3),
+    sink({.stamp = sent - from_seconds(age_ms * 1e-3),
           .neighbor = robot->second,
           .range_m = node.range_m,
           .first_path_dbm = node.first_path_dbm,

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "drivers/device_clock.hpp"
 #include "drivers/uwb/nlink_frame.hpp"
 #include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
@@ -27,6 +28,7 @@ struct NlinkCounts {
   std::uint64_t unknown_modules = 0;  ///< ranges to modules that no member carries
   std::uint64_t implausible = 0;      ///< ranges that are not positive, too long or too old
   std::uint64_t without_ranges = 0;   ///< frames of a kind that has none
+  std::uint64_t clock_restarts = 0;   ///< of the module's own clock
 };
 
 /// Ranges from every kind of frame that has some.
@@ -43,7 +45,8 @@ class NlinkParser {
 
   [[nodiscard]] static FrameCheck examine(Bytes bytes) { return examine_nlink(bytes); }
 
-  /// A whole frame. Ranges of NodeFrame2 carry their own age and are stamped that much earlier.
+  /// A whole frame, stamped by the module's own clock. Ranges of NodeFrame2 carry their own age and
+  /// are stamped that much earlier.
   void parse(Bytes frame, Timestamp arrival, const std::function<void(const UwbRange&)>& sink);
 
   /// Why frames come but no ranges, judged by the last frame.
@@ -53,6 +56,7 @@ class NlinkParser {
  private:
   UwbModules modules_;
   double max_range_m_;
+  DeviceClock clock_;
   NlinkCounts counts_;
   NlinkKind last_kind_ = NlinkKind::kNodeFrame3;
   std::optional<std::uint32_t> stranger_;  ///< a module of the last frame that no member carries

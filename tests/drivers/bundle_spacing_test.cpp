@@ -45,6 +45,16 @@ TEST(BundleSpacing, PutsTheOlderSamplesOfABundleAPeriodApart) {
             (std::vector<Duration>{milliseconds{30}, milliseconds{40}, milliseconds{50}}));
 }
 
+TEST(BundleSpacing, LeavesStampsOfASensorsOwnClock) {
+  BundleSpacing spacing(kPeriod);
+  std::vector<ImuSample> bundle{{.stamp = Timestamp{milliseconds{7}}},
+                                {.stamp = Timestamp{milliseconds{50}}}};
+
+  spacing.apply(bundle);
+
+  EXPECT_EQ(times_of(bundle), (std::vector<Duration>{milliseconds{7}, milliseconds{50}}));
+}
+
 TEST(BundleSpacing, KeepsAnySequenceOfBundlesInOrderAndNeverStampsAfterArrival) {
   EXPECT_TRUE(rc::check([] {
     BundleSpacing spacing(kPeriod);

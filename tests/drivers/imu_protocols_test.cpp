@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <iomanip>
+#include <sstream>
 
 #include "drivers/imu/hipnuc.hpp"
 #include "drivers/imu/mavlink.hpp"
@@ -45,6 +47,25 @@ TEST(Hipnuc, ReadsTheRecordedFrameInSiUnits) {
   ASSERT_EQ(Hipnuc::examine(file.bytes).length, file.bytes.size());
   expect_sample(Hipnuc::read(file.bytes), vector_of(file.decoded["gyro_dps"]) * M_PI / 180.0,
                 vector_of(file.decoded["acc_g"]) * kGravity);
+}
+
+void expect_time(const ImuReading& reading, std::uint64_t ticks, Duration tick) {
+  ASSERT_TRUE(reading.time);
+  EXPECT_EQ(reading.time->ns, ticks * static_cast<std::uint64_t>(tick.count()));
+}
+
+TEST(ImuReading, HoldsTheSensorsOwnTime) {
+  const auto ticks = [](const RecordedFrame& file, const char* key) {
+    return file.decoded[key].get<std::uint64_t>();
+  };
+  const RecordedFrame hipnuc = recorded_file("imu/hipnuc_hi91_official");
+  expect_time(Hipnuc::read(hipnuc.bytes), ticks(hipnuc, "time_ms"), 1ms);
+  const RecordedFrame xsens = recorded_file("imu/xsens_mtdata2_accgyr");
+  expect_time(Xsens::read(xsens.bytes), xsens.decoded["items"][1]["v"].get<std::uint64_t>(), 100us);
+  const RecordedFrame highres = recorded_file("imu/mavlink_highres_imu_v2");
+  expect_time(Mavlink::read(highres.bytes), ticks(highres, "time_us"), 1us);
+  const RecordedFrame scaled = recorded_file("imu/mavlink_scaled_imu_v1");
+  expect_time(Mavlink::read(scaled.bytes), ticks(scaled, "time_ms"), 1ms);
 }
 
 TEST(Hipnuc, RefusesEveryTruncationSplitAndBitError) {
@@ -94,6 +115,28 @@ TEST(Xsens, ReadsEveryNumberFormat) {
       "40 23 18 3f f0 00 00 00 00 00 00 40 00 00 00 00 00 00 00 40 23 a0 00 00 00 00 00 "
       "80 23 18 bf f0 00 00 00 00 00 00 3f e0 00 00 00 00 00 00 00 00 00 00 00 00 00 00");
   expect_sample(Xsens::read(doubles), {-1.0, 0.5, 0.0}, {1.0, 2.0, 9.8125});
+}
+
+TEST(Xsens, StampsSamplesByTheSensorsClockOnceItIsKnown) {
+  XsensParser parser;
+  std::vector<Timestamp> stamps;
+  std::vector<Timestamp> arrivals;
+  for (unsigned i = 0; i < 300; ++i) {
+    std::ostringstream time;
+    for (const unsigned byte : {i * 100 >> 8U, i * 100 & 0xffU})
+      time << " " << std::hex << std::setw(2) << std::setfill('0') << byte;
+    const auto message = xsens_message("10 60 04 00 00" + time.str() +
+                                       " 40 20 0c 3f 80 00 00 40 00 00 00 41 1d 00 00"
+                                       " 80 20 0c bf 80 00 00 3f 00 00 00 00 00 00 00");
+    arrivals.push_back(Timestamp{i * 10ms + i % 7 * 1ms});
+    parser.parse(message, arrivals.back(),
+                 [&](const ImuSample& sample) { stamps.push_back(sample.stamp); });
+  }
+
+  ASSERT_EQ(stamps.size(), 300U);
+  EXPECT_EQ(stamps[50], arrivals[50]);
+  for (unsigned i = 150; i < 300; ++i)
+    EXPECT_LT(std::chrono::abs(stamps[i] - Timestamp{i * 10ms}), 100us) << i;
 }
 
 TEST(Xsens, TellsClippedAndHalfSamples) {

@@ -52,6 +52,21 @@ TEST(Nlink, StampsRangesOfNodeFrame2WithTheirOwnAge) {
   EXPECT_EQ(ranges[3].stamp, kArrival - 20ms);
 }
 
+TEST(Nlink, StampsFramesByTheModulesClockOnceItIsKnown) {
+  NlinkParser parser(identity_modules(), 200.0);
+  for (unsigned i = 0; i < 200; ++i) {
+    const Duration late = i % 5 * 2ms;
+    parser.parse(encode_node_frame3(1, 1000 + 20 * i, {{2, 3.0, -80.0, -78.0}}),
+                 Timestamp{20ms * i + late}, [&](const UwbRange& range) {
+                   const Duration expected = i < 50 ? late : 0ms;
+                   if (i >= 50 && i <= 60) return;
+                   EXPECT_LT(std::chrono::abs(range.stamp - Timestamp{20ms * i + expected}), 100us)
+                       << i;
+                 });
+  }
+  EXPECT_EQ(parser.counts().ranges, 200U);
+}
+
 TEST(Nlink, NamesRobotsByTheirModulesAndCountsStrangers) {
   NlinkParser parser({{3, RobotId{17}}}, 200.0);
 
