@@ -15,6 +15,7 @@ constexpr Duration kFirstRetry = milliseconds{100};
 constexpr Duration kLastRetry = seconds{5};
 constexpr Duration kStatusPeriod = seconds{1};
 constexpr Duration kLookPeriod = milliseconds{250};
+constexpr Duration kWorked = seconds{1};  // so long open, a device is no hopeless case
 constexpr Duration kSilence = milliseconds{1500};
 constexpr milliseconds kReadTimeout{50};
 
@@ -162,9 +163,10 @@ void run_sensor(const Sensor& sensor, const StageContext& context, const std::st
       const Result<void> read = read_device(**device, sensor, context, health, stop);
       if (read) return;
       health.tell(read.error().message, (*device)->counters());
-      if (context.clock.now() - opened > kLastRetry) retry = kFirstRetry;
+      if (context.clock.now() - opened > kWorked) retry = kFirstRetry;
     } else {
       health.tell(device.error().message, {});
+      if (device.error().code == ErrorCode::kNotFound) retry = kFirstRetry;
     }
     back_off(retry, context, stop);
     retry = std::min(2 * retry, kLastRetry);

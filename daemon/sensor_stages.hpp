@@ -14,6 +14,7 @@
 #include "daemon/bounded_queue.hpp"
 #include "daemon/counters.hpp"
 #include "drivers/camera/camera.hpp"
+#include "drivers/serial/device_name.hpp"
 #include "estimator/core/clock.hpp"
 #include "estimator/core/config.hpp"
 #include "estimator/core/event.hpp"
@@ -59,13 +60,17 @@ struct StageContext {
   Counter& turns;   ///< grows at least once in 200 ms
 };
 
-/// Reads a sensor until `stop`; reopens it after 0.1 s, at last 5 s, when it fails.
+/// Reads a sensor until `stop`; reopens it after 0.1 s, at last 5 s, when it fails. One that is not
+/// there (kNotFound) is looked for every 0.1 s.
 void run_sensor(const Sensor& sensor, const StageContext& context, const std::stop_token& stop);
 
-/// The ranging module and the inertial sensor of the configuration, on their serial ports.
+/// The ranging module and the inertial sensor of the configuration, on their serial ports. Links in
+/// `by_id` tell which device is the same as before.
 [[nodiscard]] Sensor uwb_sensor(const UwbConfig& config, const SwarmConfig& swarm,
-                                const Clock& clock, const EventSink& sink);
-[[nodiscard]] Sensor imu_sensor(const ImuConfig& config, const Clock& clock, const EventSink& sink);
+                                const Clock& clock, const EventSink& sink,
+                                const std::string& by_id = kSerialById);
+[[nodiscard]] Sensor imu_sensor(const ImuConfig& config, const Clock& clock, const EventSink& sink,
+                                const std::string& by_id = kSerialById);
 
 using FrameQueue = BoundedQueue<Frame>;
 using OpenCamera = std::function<Result<std::unique_ptr<Camera>>()>;

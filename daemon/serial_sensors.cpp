@@ -9,6 +9,7 @@
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/imu/xsens.hpp"
 #include "drivers/recognize.hpp"
+#include "drivers/serial/device_name.hpp"
 #include "drivers/serial/serial_reader.hpp"
 #include "drivers/uwb/nlink.hpp"
 
@@ -191,14 +192,18 @@ OpenDevice configured_imu(const ImuConfig& config, const Clock& clock, const Eve
   };
 }
 
+/// `port` is found again after it was unplugged, under another name if need be.
 Sensor serial_sensor(const std::string& name, const std::string& port, int baud,
-                     const OpenDevice& device) {
+                     const OpenDevice& device, const std::string& by_id) {
   Sensor sensor;
   sensor.name = name;
   sensor.when_silent = port + ": silent: is it powered and wired, and is " + name + ".baud right?";
-  sensor.open = [=]() -> Result<std::unique_ptr<Device>> {
+  sensor.open = [=, found = DeviceName(port, by_id)]() mutable -> Result<std::unique_ptr<Device>> {
     if (port.empty()) return fail(ErrorCode::kConfig, "no device: set " + name + ".port");
-    return SerialPort::open(port, baud).map(device);
+    return SerialPort::open(found.to_open(), baud).map([&](SerialPort&& opened) {
+      found.remember();
+      return device(std::move(opened));
+    });
   };
   return sensor;
 }
@@ -206,14 +211,15 @@ Sensor serial_sensor(const std::string& name, const std::string& port, int baud,
 }  // namespace
 
 Sensor uwb_sensor(const UwbConfig& config, const SwarmConfig& swarm, const Clock& clock,
-                  const EventSink& sink) {
+                  const EventSink& sink, const std::string& by_id) {
   const NlinkParser parser(uwb_modules_of(swarm), config.max_range_m);
   return serial_sensor("uwb", config.port, config.baud,
-                       device_with(parser, UwbIntake{}, clock, sink));
+                       device_with(parser, UwbIntake{}, clock, sink), by_id);
 }
 
-Sensor imu_sensor(const ImuConfig& config, const Clock& clock, const EventSink& sink) {
-  return serial_sensor("imu", config.port, config.baud, configured_imu(config, clock, sink));
+Sensor imu_sensor(const ImuConfig& config, const Clock& clock, const EventSink& sink,
+                  const std::string& by_id) {
+  return serial_sensor("imu", config.port, config.baud, configured_imu(config, clock, sink), by_id);
 }
 
 }  // namespace crepes

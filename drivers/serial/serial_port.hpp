@@ -13,10 +13,11 @@
 
 namespace crepes {
 
-/// A terminal device in raw mode, 8N1, no flow control, kept from other programs.
+/// A terminal device in raw mode, 8N1, no flow control, at any rate, kept from other programs.
 class SerialPort {
  public:
-  /// What was received before is thrown away. Errors name the device and the cause.
+  /// What was received before is thrown away. Errors name the device and the cause, and who has it
+  /// open; kNotFound: there is no such device now.
   [[nodiscard]] static Result<SerialPort> open(const std::string& path, int baud);
 
   /// The bytes that are there, or that come within `timeout`; empty when none came. Valid until

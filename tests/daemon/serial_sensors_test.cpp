@@ -1,11 +1,14 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <memory>
 #include <variant>
 
+#include "daemon/ctl/scratch_directory.hpp"
 #include "daemon/logging.hpp"
 #include "daemon/sensor_stages.hpp"
 #include "drivers/imu/witmotion.hpp"
+#include "drivers/monotonic_clock.hpp"
 #include "drivers/sim/pseudo_terminal.hpp"
 #include "tests/support/manual_clock.hpp"
 #include "tests/support/recorded_files.hpp"
@@ -121,6 +124,33 @@ TEST_F(SerialSensors, SayWhatIsWrongWithinTwoSeconds) {
   EXPECT_TRUE(says(fault_of(*open_imu(), imu), "speaks hipnuc"));
 }
 
+TEST_F(SerialSensors, FindTheSameDeviceAgainUnderAnotherTty) {
+  const auto scratch = ScratchDirectory::create("");
+  ASSERT_TRUE(scratch);
+  const auto link = scratch->path() / "usb-HiPNUC";
+  std::filesystem::create_symlink(line_->path(), link);
+  imu_.protocol = ImuProtocol::kHipnuc;
+  const Sensor sensor = imu_sensor(
+      imu_, clock_, [this](Event event) { samples_.push_back(std::get<ImuSample>(event)); },
+      scratch->path());
+  auto device = open(sensor);
+  line_.reset();
+  EXPECT_FALSE(device->read_once(1s));
+  device.reset();
+  std::filesystem::remove(link);
+  EXPECT_EQ(sensor.open().error().code, ErrorCode::kNotFound);
+
+  const auto other = PseudoTerminal::open();  // takes the number that is free now
+  line_ = std::make_unique<PseudoTerminal>(std::move(*PseudoTerminal::open()));
+  ASSERT_NE(line_->path(), imu_.port);
+  std::filesystem::create_symlink(other->path(), scratch->path() / "usb-other");
+  std::filesystem::create_symlink(line_->path(), link);
+  device = open(sensor);
+  send_for(*device, recorded_file("imu/hipnuc_hi91_official").bytes, 100ms);
+
+  EXPECT_EQ(samples_.size(), 1U);
+}
+
 TEST_F(SerialSensors, TellASensorThatRepeatsItself) {
   imu_.protocol = ImuProtocol::kHipnuc;
   imu_.update_rate = 10.0;
@@ -177,6 +207,27 @@ TEST(SensorStage, TellsAFaultAsSoonAsItLooks) {
 
   EXPECT_EQ(message, "wrong device");
   EXPECT_LE(when, Timestamp{1300ms});
+}
+
+TEST(SensorStage, LooksOftenForADeviceThatIsNotThere) {
+  const LogSession log(LogLevel::kError);
+  const MonotonicClock clock;
+  const Timestamp begin = clock.now();
+  std::stop_source stop;
+  Counter turns;
+  int looks = 0;
+  const Sensor sensor{.name = "imu",
+                      .open = [&]() -> Result<std::unique_ptr<Device>> {
+                        if (++looks == 8) stop.request_stop();
+                        return fail(ErrorCode::kNotFound, "unplugged");
+                      },
+                      .when_silent = ""};
+
+  run_sensor(sensor, {.clock = clock, .tell = [](SensorStatus) {}, .turns = turns},
+             stop.get_token());
+
+  EXPECT_EQ(looks, 8);
+  EXPECT_LT(clock.now() - begin, 6s);  // with waits that double it were 11 s
 }
 
 TEST(SensorStage, TellsASilentDeviceWithinTwoSeconds) {

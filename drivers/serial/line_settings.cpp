@@ -1,0 +1,57 @@
+#include "drivers/serial/line_settings.hpp"
+
+// The kernel's own header has termios2, which takes a rate as a number; <termios.h> would clash.
+#include <asm/termbits.h>
+#include <linux/serial.h>
+#include <sys/ioctl.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <system_error>
+
+namespace crepes {
+namespace {
+
+tl::unexpected<Error> io_error(const std::string& name) {
+  return fail(ErrorCode::kIo, name + ": " + std::generic_category().message(errno));
+}
+
+/// USB adapters save up bytes for up to 16 ms otherwise. Those that never do (cdc_acm) refuse.
+void prefer_low_latency(int fd) {
+  serial_struct serial{};
+  if (::ioctl(fd, TIOCGSERIAL, &serial) != 0) return;
+  serial.flags |= ASYNC_LOW_LATENCY;
+  static_cast<void>(::ioctl(fd, TIOCSSERIAL, &serial));
+}
+
+}  // namespace
+
+Result<void> set_raw_line(int fd, int baud, const std::string& name) {
+  const auto rate = static_cast<speed_t>(baud);
+  termios2 settings{};
+  if (::ioctl(fd, TCGETS2, &settings) != 0) return io_error(name);
+  settings.c_iflag = 0;
+  settings.c_oflag = 0;
+  settings.c_lflag = 0;
+  settings.c_cflag = (settings.c_cflag & HUPCL) | CS8 | CREAD | CLOCAL | BOTHER;
+  settings.c_ispeed = rate;
+  settings.c_ospeed = rate;
+  settings.c_cc[VMIN] = 1;
+  settings.c_cc[VTIME] = 0;
+  if (::ioctl(fd, TCSETS2, &settings) != 0) return io_error(name);
+
+  // The adapter's next best rate is taken without complaint, and told.
+  termios2 taken{};
+  if (::ioctl(fd, TCGETS2, &taken) != 0) return io_error(name);
+  const long off = std::labs(static_cast<long>(taken.c_ospeed) - baud);
+  if (50 * off > baud) {
+    return fail(ErrorCode::kIo, name + ": the device makes " + std::to_string(taken.c_ospeed) +
+                                    " baud of " + std::to_string(baud));
+  }
+  if (::ioctl(fd, TIOCEXCL) != 0) return io_error(name);
+  prefer_low_latency(fd);
+  static_cast<void>(::ioctl(fd, TCFLSH, TCIFLUSH));
+  return {};
+}
+
+}  // namespace crepes
