@@ -1,8 +1,23 @@
 #include "daemon/camera_drivers.hpp"
 
+#include "drivers/camera/aravis_camera.hpp"
 #include "drivers/camera/image_folder.hpp"
+#include "drivers/camera/watched_camera.hpp"
 
 namespace crepes {
+namespace {
+
+Result<std::unique_ptr<Camera>> open_device(const CameraConfig& camera, std::uint8_t index,
+                                            const Clock& clock) {
+  switch (camera.driver) {
+    case CameraDriver::kAravis:
+      return open_aravis_camera(camera, index, clock);
+    default:
+      return fail(ErrorCode::kConfig, "no device: set driver of camera " + camera.name);
+  }
+}
+
+}  // namespace
 
 OpenCamera real_camera(const Config& config, std::size_t index, const Clock& clock) {
   const CameraConfig camera = config.cameras[index];
@@ -10,7 +25,10 @@ OpenCamera real_camera(const Config& config, std::size_t index, const Clock& clo
   return [camera, number, &clock]() -> Result<std::unique_ptr<Camera>> {
     if (camera.driver == CameraDriver::kFolder)
       return FolderCamera::open(camera.folder, number, clock);
-    return fail(ErrorCode::kConfig, "no device: set driver of camera " + camera.name);
+    return open_device(camera, number, clock).map([&](std::unique_ptr<Camera> opened) {
+      return std::unique_ptr<Camera>(
+          std::make_unique<WatchedCamera>(std::move(opened), camera, clock));
+    });
   };
 }
 

@@ -139,6 +139,22 @@ void check_members(const Config& config, Faults& faults) {
   }
 }
 
+void check_driver(const std::string& key, const CameraConfig& camera, Faults& faults) {
+  constexpr double kMicroseconds = 1e6;
+  if (camera.driver == CameraDriver::kFolder && camera.folder.empty())
+    faults.push_back({key + ".folder", "driver folder needs the directory of the pictures"});
+  if (camera.driver == CameraDriver::kV4l2 && camera.device.empty())
+    faults.push_back({key + ".device", "driver v4l2 needs one, as /dev/video0"});
+  if (camera.exposure_us && *camera.exposure_us >= kMicroseconds / camera.rate_hz)
+    faults.push_back({key + ".exposure_us", "is longer than a frame at rate_hz"});
+  if (camera.driver == CameraDriver::kV4l2 && camera.trigger == CameraTrigger::kHardware)
+    faults.push_back({key + ".trigger", "driver v4l2 has no hardware trigger"});
+  if (camera.driver != CameraDriver::kMindVision) return;
+  if (camera.gain) faults.push_back({key + ".gain", "driver mindvision sets none"});
+  if (camera.offset != std::array{0, 0})
+    faults.push_back({key + ".offset", "driver mindvision reads out the whole sensor"});
+}
+
 void check_cameras(const std::vector<CameraConfig>& cameras, Faults& faults) {
   if (cameras.empty())
     faults.push_back({"cameras", "is empty: without a camera nobody is recognized"});
@@ -149,8 +165,7 @@ void check_cameras(const std::vector<CameraConfig>& cameras, Faults& faults) {
     check_name(key + ".name", cameras[i].name, faults);
     for (CalibrationFault& fault : calibration_faults(cameras[i]))
       faults.push_back({key + "." + std::string(fault.key), std::move(fault.reason)});
-    if (cameras[i].driver == CameraDriver::kFolder && cameras[i].folder.empty())
-      faults.push_back({key + ".folder", "driver folder needs the directory of the pictures"});
+    check_driver(key, cameras[i], faults);
   }
 }
 

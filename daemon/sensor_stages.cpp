@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "daemon/logging.hpp"
+#include "daemon/worker.hpp"
 #include "estimator/vision/spot_detector.hpp"
 
 namespace crepes {
@@ -98,6 +99,16 @@ void back_off(Duration wait, const StageContext& context, const std::stop_token&
   }
 }
 
+/// Does what may take seconds on a thread of its own, so that the watchdog sees a living loop.
+template <class Work>
+auto do_aside(const StageContext& context, const std::string& name, const Work& work) {
+  BoundedQueue<decltype(work())> done{1, Overflow::kDropOldest};
+  const Worker worker(name, [&](const std::stop_token& /*stop*/) { done.push(work()); });
+  auto result = done.try_pop();
+  for (; !result; result = done.pop_for(milliseconds{100}, {})) context.turns.add();
+  return std::move(*result);
+}
+
 class CameraDevice final : public Device {
  public:
   CameraDevice(std::unique_ptr<Camera> camera, FrameQueue& frames, FrameQueue& used)
@@ -113,7 +124,9 @@ class CameraDevice final : public Device {
   }
 
   [[nodiscard]] Totals counters() const override { return camera_->counters(); }
-  [[nodiscard]] std::optional<std::string> diagnosis() const override { return std::nullopt; }
+  [[nodiscard]] std::optional<std::string> diagnosis() const override {
+    return camera_->diagnosis();
+  }
 
  private:
   std::unique_ptr<Camera> camera_;
@@ -145,6 +158,7 @@ Sensor camera_sensor(const std::string& name, const OpenCamera& open, FrameQueue
   sensor.name = name;
   sensor.when_silent = "no frame: is the camera plugged in and running?";
   sensor.open = [=, &frames, &used]() -> Result<std::unique_ptr<Device>> {
+    while (used.try_pop()) continue;  // frames that keep the camera of before open
     Result<std::unique_ptr<Camera>> camera = open();
     if (!camera) return tl::unexpected(camera.error());
     return std::make_unique<CameraDevice>(std::move(*camera), frames, used);
@@ -157,12 +171,15 @@ void run_sensor(const Sensor& sensor, const StageContext& context, const std::st
   Duration retry = kFirstRetry;
   while (!stop.stop_requested()) {
     context.turns.add();
-    Result<std::unique_ptr<Device>> device = sensor.open();
+    Result<std::unique_ptr<Device>> device = do_aside(context, sensor.name + " open", sensor.open);
     if (device) {
       const Timestamp opened = context.clock.now();
       const Result<void> read = read_device(**device, sensor, context, health, stop);
-      if (read) return;
-      health.tell(read.error().message, (*device)->counters());
+      if (!read) health.tell(read.error().message, (*device)->counters());
+      do_aside(context, sensor.name + " close", [&] {
+        device->reset();
+        return true;
+      });
       if (context.clock.now() - opened > kWorked) retry = kFirstRetry;
     } else {
       health.tell(device.error().message, {});
@@ -183,8 +200,8 @@ void run_vision(const VisionStage& stage, const StageContext& context,
     context.turns.add();
     std::optional<Frame> frame = stage.frames.pop_for(milliseconds{100}, stop);
     if (!frame) continue;
-    const Detection found = detector.detect(
-        {frame->pixels.data(), frame->width, frame->height, std::ptrdiff_t{frame->width}});
+    const Detection found =
+        detector.detect({frame->data(), frame->width, frame->height, frame->stride()});
     stage.sink(SpotFrame{frame->stamp, frame->camera, {found.spots.begin(), found.spots.end()}});
     health.count(1);
     rejected += found.rejected;

@@ -93,9 +93,15 @@ enum class DistortionModel : std::uint8_t { kNone, kEquidistant };
 inline constexpr std::array kDistortionModels{Choice{"none", DistortionModel::kNone},
                                               Choice{"equidistant", DistortionModel::kEquidistant}};
 
-enum class CameraDriver : std::uint8_t { kNone, kFolder };
-inline constexpr std::array kCameraDrivers{Choice{"none", CameraDriver::kNone},
-                                           Choice{"folder", CameraDriver::kFolder}};
+enum class CameraDriver : std::uint8_t { kNone, kFolder, kAravis, kV4l2, kMindVision };
+inline constexpr std::array kCameraDrivers{
+    Choice{"none", CameraDriver::kNone}, Choice{"folder", CameraDriver::kFolder},
+    Choice{"aravis", CameraDriver::kAravis}, Choice{"v4l2", CameraDriver::kV4l2},
+    Choice{"mindvision", CameraDriver::kMindVision}};
+
+enum class CameraTrigger : std::uint8_t { kFree, kHardware };
+inline constexpr std::array kCameraTriggers{Choice{"free", CameraTrigger::kFree},
+                                            Choice{"hardware", CameraTrigger::kHardware}};
 
 /// One camera, with Kalibr's names and orders.
 struct CameraConfig {
@@ -110,6 +116,15 @@ struct CameraConfig {
   double timeshift_cam_imu = 0.0;
   CameraDriver driver = CameraDriver::kNone;
   std::string folder;
+  std::string device;
+  std::optional<double> exposure_us;
+  std::optional<double> gain;
+  std::array<int, 2> offset{};
+  CameraTrigger trigger = CameraTrigger::kFree;
+  std::string trigger_source = "Line1";
+  int packet_size = 0;
+  double latency_ms = 5.0;
+  std::string library = "libMVSDK.so";
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -125,8 +140,25 @@ struct CameraConfig {
     v.field("rate_hz", rate_hz, Bounds{10, 1000}, "frames a second");
     v.required("T_cam_imu", T_cam_imu, "4x4, maps body coordinates to camera coordinates (Kalibr)");
     v.field("timeshift_cam_imu", timeshift_cam_imu, Bounds{-1, 1}, "t_imu = t_cam + shift [s]");
-    v.choice("driver", driver, kCameraDrivers, "where frames come from");
+    v.choice("driver", driver, kCameraDrivers,
+             "where frames come from; aravis: USB3 Vision and GigE Vision");
     v.field("folder", folder, "driver folder: the directory of pictures, with data.csv beside it");
+    v.field("device", device,
+            "aravis: id as told by `crepesctl devices`, or address; v4l2: best under "
+            "/dev/v4l/by-id; mindvision: serial number; left out: the only one");
+    v.field("exposure_us", exposure_us, Bounds{1, 100000},
+            "shorter than a frame; left out: as the device has it");
+    v.field("gain", gain, Bounds{0, 1000},
+            "in the device's own unit (aravis: dB as a rule); left out: as the device has it");
+    v.field("offset", offset, Bounds{0, 16384},
+            "[x, y] on the sensor of the region that is read out; its size is resolution");
+    v.choice("trigger", trigger, kCameraTriggers, "free: at rate_hz; hardware: a pulse a frame");
+    v.field("trigger_source", trigger_source, "aravis: the input of those pulses");
+    v.field("packet_size", packet_size, Bounds{0, 65535},
+            "GigE Vision: bytes, 9000 with jumbo frames; 0: the camera's own");
+    v.field("latency_ms", latency_ms, Bounds{0, 100},
+            "from the middle of the exposure to the frame's arrival");
+    v.field("library", library, "mindvision: the vendor's library");
   }
 };
 
