@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "drivers/camera/frame_sequence.hpp"
+#include "drivers/device_clock.hpp"
 
 namespace crepes {
 namespace {
@@ -271,10 +272,12 @@ class AravisCamera final : public Camera {
   }
 
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const override {
-    std::vector<std::pair<std::string, std::uint64_t>> totals{{"frames", frames_},
-                                                              {"missed", sequence_.missed()},
-                                                              {"incomplete", incomplete_},
-                                                              {"superseded", superseded_}};
+    std::vector<std::pair<std::string, std::uint64_t>> totals{
+        {"frames", frames_},
+        {"missed", sequence_.missed()},
+        {"incomplete", incomplete_},
+        {"superseded", superseded_},
+        {"clock_restarts", device_clock_.restarts()}};
     ArvStream* stream = session_->stream();
     const auto add = [&](const char* name, const char* of_aravis) {
       totals.emplace_back(name, arv_stream_get_info_uint64_by_name(stream, of_aravis));
@@ -310,7 +313,10 @@ class AravisCamera final : public Camera {
     const Timestamp arrival = clock_.now();
     std::size_t size = 0;
     const void* data = arv_buffer_get_image_data(buffer, &size);
-    Frame frame{.stamp = arrival - latency_, .camera = index_};
+    Frame frame{.camera = index_};
+    std::optional<DeviceTime> taken;
+    if (const guint64 ns = arv_buffer_get_timestamp(buffer); ns != 0) taken = DeviceTime{ns};
+    frame.stamp = device_clock_.to_local(taken, arrival) - latency_;
     int padding = 0;
     int ignored = 0;
     arv_buffer_get_image_padding(buffer, &padding, &ignored);
@@ -336,6 +342,7 @@ class AravisCamera final : public Camera {
   const Clock& clock_;
   Duration latency_;
   bool is_exposure_long_ = false;
+  DeviceClock device_clock_;
   FrameSequence sequence_;
   std::uint64_t frames_ = 0;
   std::uint64_t incomplete_ = 0;
