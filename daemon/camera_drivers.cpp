@@ -1,7 +1,11 @@
 #include "daemon/camera_drivers.hpp"
 
+#include <utility>
+
 #include "drivers/camera/aravis_camera.hpp"
 #include "drivers/camera/image_folder.hpp"
+#include "drivers/camera/mindvision_camera.hpp"
+#include "drivers/camera/v4l2_camera.hpp"
 #include "drivers/camera/watched_camera.hpp"
 
 namespace crepes {
@@ -12,6 +16,12 @@ Result<std::unique_ptr<Camera>> open_device(const CameraConfig& camera, std::uin
   switch (camera.driver) {
     case CameraDriver::kAravis:
       return open_aravis_camera(camera, index, clock);
+    case CameraDriver::kV4l2:
+      return open_v4l2_device(camera.device).and_then([&](std::unique_ptr<V4l2Device> device) {
+        return run_v4l2_camera(std::move(device), camera, index, clock);
+      });
+    case CameraDriver::kMindVision:
+      return open_mindvision_camera(camera, index, clock);
     default:
       return fail(ErrorCode::kConfig, "no device: set driver of camera " + camera.name);
   }

@@ -1,0 +1,31 @@
+/// Grey levels of more than 8 bits to such of 8.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace crepes {
+
+/// Writes the upper 8 of `bits` significant bits of each little-endian 16-bit level to `grey`, row
+/// by row without gaps. `rows` must hold `height` rows of `stride` bytes; the last may end with
+/// its last level.
+inline void narrow_to_8_bits(std::span<const std::uint8_t> rows, int width, int height,
+                             std::size_t stride, int bits, std::vector<std::uint8_t>& grey) {
+  const auto columns = static_cast<std::size_t>(width);
+  grey.resize(columns * static_cast<std::size_t>(height));
+  const int shift = bits - 8;
+  const int white = (1 << bits) - 1;
+  for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+    const std::uint8_t* in = &rows[y * stride];
+    std::uint8_t* out = &grey[y * columns];
+    for (std::size_t x = 0; x < columns; ++x) {
+      const int level = in[2 * x] | in[2 * x + 1] << 8;
+      // What is above white is noise in bits that should be zero.
+      out[x] = static_cast<std::uint8_t>((level < white ? level : white) >> shift);
+    }
+  }
+}
+
+}  // namespace crepes

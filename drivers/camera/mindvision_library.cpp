@@ -1,0 +1,57 @@
+#include "drivers/camera/mindvision_library.hpp"
+
+#include <dlfcn.h>
+
+namespace crepes {
+namespace {
+
+/// Looks functions up until one is not there.
+class Symbols {
+ public:
+  explicit Symbols(void* library) : library_(library) {}
+
+  template <class Function>
+  void find(const char* name, Function*& function) {
+    void* const found = ::dlsym(library_, name);
+    if (found == nullptr && missing_.empty()) missing_ = name;
+    // POSIX: dlsym's answer is a function where a function was asked for.
+    function = reinterpret_cast<Function*>(found);  // NOLINT(*-reinterpret-cast)
+  }
+  [[nodiscard]] const std::string& missing() const { return missing_; }
+
+ private:
+  void* library_;
+  std::string missing_;
+};
+
+}  // namespace
+
+Result<MindVisionLibrary> MindVisionLibrary::load(const std::string& file) {
+  // Never unloaded: it runs threads of its own.
+  void* const handle = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  if (handle == nullptr) {
+    return fail(ErrorCode::kNotFound,
+                "MindVision's library cannot be loaded: install the vendor's SDK, or set library "
+                "to its file (" +
+                    std::string(::dlerror()) + ")");
+  }
+  MindVisionLibrary library;
+  Symbols symbols(handle);
+  symbols.find("CameraSdkInit", library.init);
+  symbols.find("CameraEnumerateDevice", library.enumerate);
+  symbols.find("CameraInit", library.open);
+  symbols.find("CameraPlay", library.play);
+  symbols.find("CameraGetImageBuffer", library.get_frame);
+  symbols.find("CameraReleaseImageBuffer", library.release_frame);
+  symbols.find("CameraUnInit", library.close);
+  symbols.find("CameraSetAeState", library.set_auto_exposure);
+  symbols.find("CameraSetExposureTime", library.set_exposure_us);
+  symbols.find("CameraSetFrameRate", library.set_frame_rate);
+  symbols.find("CameraSetTriggerMode", library.set_trigger_mode);
+  if (!symbols.missing().empty())
+    return fail(ErrorCode::kFormat,
+                file + ": no library of MindVision, " + symbols.missing() + " is not in it");
+  return library;
+}
+
+}  // namespace crepes

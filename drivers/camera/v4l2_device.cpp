@@ -1,0 +1,65 @@
+#include "drivers/camera/v4l2_device.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "drivers/unique_fd.hpp"
+
+namespace crepes {
+namespace {
+
+class KernelDevice final : public V4l2Device {
+ public:
+  explicit KernelDevice(UniqueFd fd) : fd_(std::move(fd)) {}
+  KernelDevice(const KernelDevice&) = delete;
+  KernelDevice& operator=(const KernelDevice&) = delete;
+  KernelDevice(KernelDevice&&) = delete;
+  KernelDevice& operator=(KernelDevice&&) = delete;
+  ~KernelDevice() override {
+    for (const auto& [start, length] : mapped_) ::munmap(start, length);
+  }
+
+  [[nodiscard]] int request(unsigned long code, void* argument) override {
+    int answer = 0;
+    do {
+      answer = ::ioctl(fd_.get(), code, argument);
+    } while (answer != 0 && errno == EINTR);
+    return answer == 0 ? 0 : errno;
+  }
+
+  [[nodiscard]] std::span<const std::uint8_t> map(std::size_t length, std::size_t offset) override {
+    void* const start = ::mmap(nullptr, length, PROT_READ | PROT_WRITE, MAP_SHARED, fd_.get(),
+                               static_cast<off_t>(offset));
+    if (start == MAP_FAILED) return {};
+    mapped_.emplace_back(start, length);
+    return {static_cast<const std::uint8_t*>(start), length};
+  }
+
+  [[nodiscard]] bool wait(std::chrono::milliseconds timeout) override {
+    pollfd waiting{.fd = fd_.get(), .events = POLLIN, .revents = 0};
+    return ::poll(&waiting, 1, static_cast<int>(timeout.count())) > 0;
+  }
+
+ private:
+  UniqueFd fd_;
+  std::vector<std::pair<void*, std::size_t>> mapped_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<V4l2Device>> open_v4l2_device(const std::string& path) {
+  UniqueFd fd{::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)};
+  if (fd) return std::make_unique<KernelDevice>(std::move(fd));
+  const int error = errno;
+  return fail(error == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo,
+              path + ": " + std::generic_category().message(error));
+}
+
+}  // namespace crepes

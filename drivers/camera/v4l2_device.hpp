@@ -1,0 +1,36 @@
+/// What we ask of the kernel about a video device, and nothing else.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+/// An open device; closed by its destructor. Requests may come from any thread.
+class V4l2Device {
+ public:
+  V4l2Device() = default;
+  V4l2Device(const V4l2Device&) = delete;
+  V4l2Device& operator=(const V4l2Device&) = delete;
+  V4l2Device(V4l2Device&&) = delete;
+  V4l2Device& operator=(V4l2Device&&) = delete;
+  virtual ~V4l2Device() = default;
+
+  /// An ioctl; 0, or errno.
+  [[nodiscard]] virtual int request(unsigned long code, void* argument) = 0;
+  /// A buffer of the device, mapped for as long as this lives; empty where it cannot be.
+  [[nodiscard]] virtual std::span<const std::uint8_t> map(std::size_t length,
+                                                          std::size_t offset) = 0;
+  /// Whether there is something to fetch, a frame or an error, within `timeout`.
+  [[nodiscard]] virtual bool wait(std::chrono::milliseconds timeout) = 0;
+};
+
+[[nodiscard]] Result<std::unique_ptr<V4l2Device>> open_v4l2_device(const std::string& path);
+
+}  // namespace crepes
