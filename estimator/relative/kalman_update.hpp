@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <tuple>
 
 #include "estimator/core/outputs.hpp"
 
@@ -22,27 +23,60 @@ struct UpdateOutcome {
   double nis = 0.0;  ///< residual^T S^-1 residual
   Eigen::Matrix<double, M, 1> sigma = Eigen::Matrix<double, M, 1>::Zero();  ///< sqrt(S_ii)
   Eigen::Matrix<double, N, 1> correction = Eigen::Matrix<double, N, 1>::Zero();
+  Eigen::Matrix<double, N, M> K = Eigen::Matrix<double, N, M>::Zero();
+  Eigen::Matrix<double, N, M> L = Eigen::Matrix<double, N, M>::Zero();  ///< P H^T - K S / 2
 };
 
-/// Corrects P by Joseph's form  (I - KH) P (I - KH)^T + K V K^T, written so that it costs N^2 M;
-/// the correction is left for the caller to inject. A NIS above `gate_nis` changes nothing.
+/// What an innovation asks for; P is as before, and the correction left for the caller to inject. A
+/// NIS above `gate_nis` asks for nothing.
+template <int M, int N>
+[[nodiscard]] UpdateOutcome<M, N> kalman_gain(const Innovation<M, N>& z, double gate_nis,
+                                              const Eigen::Matrix<double, N, N>& P) {
+  // A measurement sees few of the states: most of H is zero.
+  Eigen::Matrix<double, N, M> PHt = Eigen::Matrix<double, N, M>::Zero();
+  for (int i = 0; i < N; ++i) {
+    for (int m = 0; m < M; ++m)
+      if (z.H(m, i) != 0.0) PHt.col(m) += z.H(m, i) * P.col(i);
+  }
+  const Eigen::Matrix<double, M, M> S = z.H.lazyProduct(PHt) + z.cov_z;
+  const Eigen::LLT<Eigen::Matrix<double, M, M>> S_chol(S);
+  if (S_chol.info() != Eigen::Success) return {};
+  UpdateOutcome<M, N> outcome;
+  outcome.nis = z.residual.dot(S_chol.solve(z.residual));
+  outcome.sigma = S.diagonal().cwiseSqrt();
+  if (!(outcome.nis <= gate_nis)) {
+    outcome.verdict = Verdict::kGated;
+    return outcome;
+  }
+  outcome.verdict = Verdict::kFused;
+  const Eigen::Matrix<double, M, M> S_inverse =
+      S_chol.solve(Eigen::Matrix<double, M, M>::Identity());
+  outcome.K = PHt.lazyProduct(S_inverse);
+  outcome.L = PHt - outcome.K.lazyProduct(0.5 * S);
+  outcome.correction = outcome.K.lazyProduct(z.residual);
+  return outcome;
+}
+
+/// Joseph's form  (I - KH) P (I - KH)^T + K V K^T  multiplied out,  P - K L^T - L K^T:  holds
+/// for a gain that is not quite the best, costs N^2 M and stays symmetric to the bit.
+template <int M, int N>
+void correct_covariance(const UpdateOutcome<M, N>& outcome, Eigen::Matrix<double, N, N>& P) {
+  const auto& [K, L] = std::tie(outcome.K, outcome.L);
+  for (int j = 0; j < N; ++j) {
+    auto column = P.col(j).tail(N - j);
+    for (int m = 0; m < M; ++m)
+      column -= L(j, m) * K.col(m).tail(N - j) + K(j, m) * L.col(m).tail(N - j);
+  }
+  P.template triangularView<Eigen::StrictlyUpper>() = P.transpose();
+}
+
+/// Both at once.
 template <int M, int N>
 [[nodiscard]] UpdateOutcome<M, N> kalman_update(const Innovation<M, N>& z, double gate_nis,
                                                 Eigen::Matrix<double, N, N>& P) {
-  const Eigen::Matrix<double, N, M> PHt = P * z.H.transpose();
-  const Eigen::Matrix<double, M, M> S = z.H * PHt + z.cov_z;
-  const Eigen::LLT<Eigen::Matrix<double, M, M>> S_chol(S);
-  if (S_chol.info() != Eigen::Success) return {};
-  const double nis = z.residual.dot(S_chol.solve(z.residual));
-  const Eigen::Matrix<double, M, 1> sigma = S.diagonal().cwiseSqrt();
-  if (!(nis <= gate_nis)) return {Verdict::kGated, nis, sigma, Eigen::Matrix<double, N, 1>::Zero()};
-
-  const Eigen::Matrix<double, N, M> K = S_chol.solve(PHt.transpose()).transpose();
-  P.noalias() -= K * PHt.transpose();                            // (I - KH) P
-  const Eigen::Matrix<double, N, M> rest = P * z.H.transpose();  // (I - KH) P H^T
-  P.noalias() -= (rest - K * z.cov_z) * K.transpose();
-  P = (0.5 * (P + P.transpose())).eval();
-  return {Verdict::kFused, nis, sigma, K * z.residual};
+  const auto outcome = kalman_gain(z, gate_nis, P);
+  if (outcome.verdict == Verdict::kFused) correct_covariance(outcome, P);
+  return outcome;
 }
 
 /// What there is to tell of an update.

@@ -108,8 +108,7 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
 
   auto z = linearize(state_);
   if (!z) return {};
-  E::Covariance P = P_;
-  auto outcome = kalman_update(*z, gate_nis, P);
+  auto outcome = kalman_gain(*z, gate_nis, P_);
   const Fusion fusion = fusion_of(*z, outcome);
   if (outcome.verdict != Verdict::kFused) return fusion;
 
@@ -123,12 +122,11 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
     z->H.template middleCols<3>(E::kTheta) =
         (z->H.template middleCols<3>(E::kTheta) * so3_right_jacobian(theta)).eval();
     z->residual += z->H * outcome.correction;
-    P = P_;
-    outcome = kalman_update(*z, std::numeric_limits<double>::infinity(), P);
+    outcome = kalman_gain(*z, std::numeric_limits<double>::infinity(), P_);
     theta = outcome.correction.template segment<3>(E::kTheta);
   }
-  if (is_far) reset(so3_right_jacobian(theta), P);
-  P_ = P;
+  correct_covariance(outcome, P_);
+  if (is_far) reset(so3_right_jacobian(theta), P_);
   inject(outcome.correction, state_);
   return fusion;
 }

@@ -18,41 +18,53 @@ BodyRates rates(const ImuMean& mean, const ImuBias& bias) {
   return {w - bias.gyro_scale * w, mean.accel_mps2 - bias.accel_mps2};
 }
 
-/// M of [w_B, a_B, w_N, a_N] errors = -M dx, applied to the rows of `P`: a gyroscope's is that of
-/// its bias and, by each axis it turns about, of a column of its scale.
-template <class Rows>
-Eigen::Matrix<double, 12, Rows::ColsAtCompileTime> rate_rows(const Rows& P, const BodyRates& body,
-                                                             const BodyRates& neighbor) {
+constexpr int kMotion = ErrorState::kGyroB;  // size of [p, v, theta]
+
+/// Columns of errors after a step, of the motion alone: what J makes of the motion's and the
+/// rates', and the rates' are those of the biases and, by each axis a robot turns about, of a
+/// column of its gyroscope's scale. By columns, because a product of all would spend its time
+/// packing.
+template <int kColumns>
+Eigen::Matrix<double, kMotion, kColumns> moved_errors(
+    const Eigen::Matrix<double, ErrorState::kSize, kColumns>& errors, const PropagationJacobian& J,
+    const BodyRates& body, const BodyRates& neighbor) {
   using E = ErrorState;
-  Eigen::Matrix<double, 12, Rows::ColsAtCompileTime> rows = P.template middleRows<12>(E::kGyroB);
-  for (int axis = 0; axis < 3; ++axis) {
-    rows.template topRows<3>() +=
-        body.w(axis) * P.template middleRows<3>(E::kGyroScaleB + 3 * axis);
-    rows.template middleRows<3>(6) +=
-        neighbor.w(axis) * P.template middleRows<3>(E::kGyroScaleN + 3 * axis);
+  constexpr int kEven = kMotion + 1;  // pairs of rows are what a register holds
+  Eigen::Matrix<double, kEven, kMotion + 12> F;
+  F << J.by_motion, -J.by_rates, Eigen::Matrix<double, 1, kMotion + 12>::Zero();
+
+  Eigen::Matrix<double, kMotion, kColumns> moved;
+  for (int column = 0; column < kColumns; ++column) {
+    const auto error = errors.col(column);
+    Eigen::Matrix<double, kMotion + 12, 1> cause = error.template head<kMotion + 12>();
+    for (int axis = 0; axis < 3; ++axis) {
+      cause.template segment<3>(E::kGyroB) +=
+          body.w(axis) * error.template segment<3>(E::kGyroScaleB + 3 * axis);
+      cause.template segment<3>(E::kGyroN) +=
+          neighbor.w(axis) * error.template segment<3>(E::kGyroScaleN + 3 * axis);
+    }
+    Eigen::Matrix<double, kEven, 1> sum = F.col(0) * cause(0);
+    for (int k = 1; k < cause.size(); ++k) sum += F.col(k) * cause(k);
+    moved.col(column) = sum.template head<kMotion>();
   }
-  return rows;
+  return moved;
 }
 
-// dx = F dx with F = [A B M; 0 I]: only the rows of the motion change.
+// P <- F P F^T + Q, where F leaves all but the motion as it is.
 void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
                           const BodyRates& neighbor, const Eigen::Matrix<double, 12, 1>& variance,
                           const ProcessNoise& noise, double dt, ErrorState::Covariance& P) {
   using E = ErrorState;
-  constexpr int kMotion = E::kGyroB;         // size of [p, v, theta]
   constexpr int kRest = E::kSize - kMotion;  // biases and calibration
-  const auto& A = J.by_motion;
-  const Eigen::Matrix<double, 9, 12> B = -J.by_rates;
 
-  const Eigen::Matrix<double, E::kSize, kMotion> columns =
-      (A * P.topRows<kMotion>() + B * rate_rows(P, body, neighbor)).transpose();
-  const auto& rows = columns.transpose();
+  const Eigen::Matrix<double, kMotion, E::kSize> rows = moved_errors(P, J, body, neighbor);
+  const Eigen::Matrix<double, E::kSize, kMotion> columns = rows.transpose();
   const Eigen::Matrix<double, kMotion, kMotion> motion =
-      A * columns.topRows<kMotion>() + B * rate_rows(columns, body, neighbor) +
+      moved_errors(columns, J, body, neighbor) +
       J.by_rates * variance.asDiagonal() * J.by_rates.transpose();
   P.topLeftCorner<kMotion, kMotion>() = 0.5 * (motion + motion.transpose());
   P.topRightCorner<kMotion, kRest>() = rows.rightCols<kRest>();
-  P.bottomLeftCorner<kRest, kMotion>() = rows.rightCols<kRest>().transpose();
+  P.bottomLeftCorner<kRest, kMotion>() = columns.bottomRows<kRest>();
 
   const double gyro_walk = noise.gyro_walk * noise.gyro_walk * dt;
   const double accel_walk = noise.accel_walk * noise.accel_walk * dt;

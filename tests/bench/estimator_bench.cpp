@@ -1,0 +1,168 @@
+// What the tight filter costs, to be read against BM_MatrixProduct of the same run: the product of
+// two matrices of its covariance's size.
+#include <benchmark/benchmark.h>
+
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "estimator/swarm/filter_settings.hpp"
+#include "estimator/swarm/neighbor.hpp"
+#include "tests/support/simulated_pair.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using test::SimulatedPair;
+
+constexpr double kNoGate = std::numeric_limits<double>::infinity();
+
+void BM_MatrixProduct(benchmark::State& state) {
+  ErrorState::Covariance A = ErrorState::Covariance::Random();
+  ErrorState::Covariance B = ErrorState::Covariance::Random();
+  ErrorState::Covariance C;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(A.data());
+    benchmark::DoNotOptimize(B.data());
+    C.noalias() = A * B;
+    benchmark::DoNotOptimize(C.data());
+  }
+}
+
+/// Two seconds of flight, and a filter of its beginning.
+struct Flight {
+  SimulatedPair pair{1};
+  Timestamp start{1s};
+
+  Flight() { pair.sample_imus(Timestamp{2s}); }
+
+  [[nodiscard]] NeighborFilter filter() {
+    const auto raw = std::get<RawPose>(compute_raw_pose(pair.sighting(start)));
+    return {start, raw, pair.process_noise(), pair.priors()};
+  }
+};
+
+/// One sample of both robots: 10 ms.
+void BM_ImuStep(benchmark::State& state) {
+  Flight flight;
+  const NeighborFilter first = flight.filter();
+  NeighborFilter filter = first;
+  for (auto _ : state) {
+    if (filter.stamp() >= Timestamp{1900ms}) filter = first;
+    filter.advance_to(filter.stamp() + 10ms, flight.pair.imu_B, flight.pair.imu_N);
+    benchmark::DoNotOptimize(filter);
+  }
+}
+
+/// Corrects a filter that has settled, with the same reading again and again.
+template <class Fuse>
+void correct(benchmark::State& state, Flight& flight, const Fuse& fuse) {
+  NeighborFilter filter = flight.filter();
+  for (int i = 0; i < 100; ++i) fuse(filter);
+  for (auto _ : state) benchmark::DoNotOptimize(fuse(filter));
+}
+
+void BM_FuseBearing(benchmark::State& state) {
+  Flight flight;
+  const DirectionReading z = flight.pair.bearing(flight.start);
+  correct(state, flight, [&](NeighborFilter& filter) {
+    return filter.fuse_bearing(z, flight.pair.mounting_N.led, kNoGate);
+  });
+}
+
+void BM_FuseRange(benchmark::State& state) {
+  Flight flight;
+  const RangeReading z = flight.pair.range(flight.start);
+  correct(state, flight, [&](NeighborFilter& filter) {
+    return filter.fuse_range(z, flight.pair.mounting_B.antenna, flight.pair.mounting_N.antenna,
+                             kNoGate);
+  });
+}
+
+constexpr RobotId kSelf{1};
+constexpr RobotId kOther{2};
+
+/// What reaches a robot of one neighbor in 20 ms at full rate: four own bearings, one of the
+/// neighbor's, half a range of either, two samples of either IMU.
+struct Arrivals {
+  std::vector<ImuSample> imu;
+  Tilt tilt;
+  std::vector<Bearing> bearings;
+  std::optional<UwbRange> range;
+  ReceivedReport report;
+
+  Arrivals(SimulatedPair& pair, Timestamp now) {
+    pair.sample_imus(now);
+    const Timestamp sent = now - 20ms;
+    const MutualSighting sighting = pair.sighting(now);
+    const auto newest_two = [](const ImuHistory& history, std::size_t skip) {
+      const std::size_t end = history.size() - std::min(skip, history.size());
+      std::vector<ImuSample> samples;
+      for (std::size_t i = end < 2 ? 0 : end - 2; i < end; ++i) samples.push_back(history[i]);
+      return samples;
+    };
+    const auto bearing = [](Timestamp stamp, RobotId whom, const DirectionReading& u) {
+      return Bearing{stamp, whom, u.u, u.camera, u.sigma_rad};
+    };
+    const auto range_at = [&](Timestamp stamp, RobotId whom) {
+      return UwbRange{stamp, whom, pair.range(stamp).range_m, -80.0, -79.0};
+    };
+    imu = newest_two(pair.imu_B, 0);
+    tilt = {now, sighting.B.up, 0.01};
+    for (const Duration ago : {15ms, 10ms, 5ms, 0ms})
+      bearings.push_back(bearing(now - ago, kOther, pair.bearing(now - ago)));
+    report.report.sender = kOther;
+    report.report.stamp = sent;
+    report.report.tilt = {sent, sighting.N.up, 0.01};
+    report.report.imu = newest_two(pair.imu_N, 2);
+    report.report.bearings = {bearing(sent, kSelf, pair.peer_bearing(sent))};
+    if (now.time_since_epoch() % 40ms == 0ms) {
+      range = range_at(now, kOther);
+      report.report.ranges = {range_at(now - 15ms, kSelf)};
+    }
+  }
+};
+
+MemberConfig member(RobotId id, const Mounting& mounting) {
+  MemberConfig config;
+  config.id = id;
+  config.p_body_led = mounting.led;
+  config.p_body_uwb = mounting.antenna;
+  return config;
+}
+
+/// 20 ms of one neighbor, its pose included.
+void BM_NeighborTick(benchmark::State& state) {
+  SimulatedPair pair(1);
+  Neighbor neighbor(member(kSelf, pair.mounting_B), member(kOther, pair.mounting_N),
+                    filter_settings({}, {}, {}));
+  RobotState self;
+  double poses = 0.0;
+  double ticks = 0.0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    ticks += 1.0;
+    const Timestamp now{static_cast<std::int64_t>(ticks) * 20ms};
+    const Arrivals arrivals(pair, now);
+    state.ResumeTiming();
+
+    for (const ImuSample& sample : arrivals.imu) self.imu.push(sample);
+    self.tilt = arrivals.tilt;
+    for (const Bearing& bearing : arrivals.bearings) neighbor.add_bearing(bearing);
+    if (arrivals.range) neighbor.add_range(*arrivals.range);
+    neighbor.add_report(arrivals.report, self);
+    neighbor.tick(now, self);
+    poses += neighbor.pose() ? 1.0 : 0.0;
+  }
+  state.counters["poses"] = poses / ticks;
+}
+
+BENCHMARK(BM_MatrixProduct)->Unit(benchmark::kMicrosecond);
+BENCHMARK(BM_ImuStep)->Unit(benchmark::kMicrosecond);
+BENCHMARK(BM_FuseBearing)->Unit(benchmark::kMicrosecond);
+BENCHMARK(BM_FuseRange)->Unit(benchmark::kMicrosecond);
+BENCHMARK(BM_NeighborTick)->Unit(benchmark::kMicrosecond);
+
+}  // namespace
+}  // namespace crepes
