@@ -5,11 +5,6 @@ namespace {
 
 constexpr Duration kRepeated = std::chrono::milliseconds{160};
 
-template <class Readings>
-void forget_before(Timestamp t, Readings& readings) {
-  while (!readings.empty() && readings.front().stamp < t) readings.pop_front();
-}
-
 }  // namespace
 
 std::optional<Report> ReportComposer::compose(Timestamp now, const RobotState& self,
@@ -17,12 +12,12 @@ std::optional<Report> ReportComposer::compose(Timestamp now, const RobotState& s
   // Of each neighbor the newest frame's bearings: two of them where a mirror image shows it twice.
   for (auto& [neighbor, seen] : newest_) {
     for (const Bearing& bearing : seen) {
-      if (bearing.stamp == seen.back().stamp) bearings_.push_back(bearing);
+      if (bearing.stamp == seen.back().stamp) bearings_.add(bearing);
     }
     seen.clear();
   }
-  forget_before(now - kRepeated, bearings_);
-  forget_before(now - kRepeated, ranges_);
+  bearings_.forget_before(now - kRepeated);
+  ranges_.forget_before(now - kRepeated);
   if (!self.tilt) return std::nullopt;
 
   Report report;
@@ -32,8 +27,8 @@ std::optional<Report> ReportComposer::compose(Timestamp now, const RobotState& s
   for (std::size_t i = 0; i < self.imu.size(); ++i) {
     if (self.imu[i].stamp >= now - kRepeated) report.imu.push_back(self.imu[i]);
   }
-  report.bearings.assign(bearings_.begin(), bearings_.end());
-  report.ranges.assign(ranges_.begin(), ranges_.end());
+  report.bearings = bearings_.all();
+  report.ranges = ranges_.all();
   report.estimates = estimates;
   return report;
 }

@@ -1,12 +1,12 @@
 /// What this robot broadcasts.
 #pragma once
 
-#include <deque>
 #include <map>
 #include <optional>
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
+#include "estimator/swarm/recent.hpp"
 #include "estimator/swarm/robot_state.hpp"
 
 namespace crepes {
@@ -19,7 +19,7 @@ class ReportComposer {
   explicit ReportComposer(RobotId self) : self_(self) {}
 
   void add(const Bearing& bearing) { newest_[bearing.neighbor].push_back(bearing); }
-  void add(const UwbRange& range) { ranges_.push_back(range); }
+  void add(const UwbRange& range) { ranges_.add(range); }
 
   /// Empty before there is a tilt: peers could do nothing with the rest.
   [[nodiscard]] std::optional<Report> compose(Timestamp now, const RobotState& self,
@@ -28,8 +28,8 @@ class ReportComposer {
  private:
   RobotId self_;
   std::map<RobotId, std::vector<Bearing>> newest_;  ///< since the last report
-  std::deque<Bearing> bearings_;
-  std::deque<UwbRange> ranges_;
+  Recent<Bearing, 1024> bearings_;
+  Recent<UwbRange, 1024> ranges_;
 };
 
 }  // namespace crepes

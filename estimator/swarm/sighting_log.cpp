@@ -18,11 +18,6 @@ constexpr double kLineRate = 0.3;  // rad/s
 constexpr double kMountingSigma = 0.01;   // m
 constexpr double kAttitudeSigma = 0.002;  // rad
 
-template <class Readings>
-void forget_before(Timestamp t, Readings& readings) {
-  while (!readings.empty() && readings.front().stamp < t) readings.pop_front();
-}
-
 }  // namespace
 
 SightingLog::SightingLog(const MemberConfig& self, const MemberConfig& neighbor,
@@ -33,21 +28,21 @@ SightingLog::SightingLog(const MemberConfig& self, const MemberConfig& neighbor,
       range_sigma_m_(range_sigma_m) {}
 
 void SightingLog::add_own(const Bearing& bearing) {
-  own_.push_back(bearing);
-  forget_before(bearing.stamp - kKept, own_);
+  own_.add(bearing);
+  own_.forget_before(bearing.stamp - kKept);
 }
 
 void SightingLog::add_range(Timestamp stamp, double range_m) {
-  ranges_.push_back({stamp, range_m});
-  forget_before(stamp - kKept, ranges_);
+  ranges_.add({stamp, range_m});
+  ranges_.forget_before(stamp - kKept);
 }
 
 std::optional<Bearing> SightingLog::own_at(Timestamp t, const ImuHistory& imu) const {
   const auto nearest =
-      std::min_element(own_.begin(), own_.end(), [t](const auto& a, const auto& b) {
+      std::min_element(own_.all().begin(), own_.all().end(), [t](const auto& a, const auto& b) {
         return std::chrono::abs(a.stamp - t) < std::chrono::abs(b.stamp - t);
       });
-  if (nearest == own_.end() || std::chrono::abs(nearest->stamp - t) > kBearingReach) {
+  if (nearest == own_.all().end() || std::chrono::abs(nearest->stamp - t) > kBearingReach) {
     return std::nullopt;
   }
   Bearing turned = *nearest;
@@ -61,7 +56,7 @@ std::optional<Bearing> SightingLog::own_at(Timestamp t, const ImuHistory& imu) c
 // The median of what both modules said around t: an outlier does not pass.
 std::optional<double> SightingLog::range_at(Timestamp t) const {
   std::vector<double> near;
-  for (const StampedRange& range : ranges_) {
+  for (const StampedRange& range : ranges_.all()) {
     if (std::chrono::abs(range.stamp - t) <= kRangeReach) near.push_back(range.range_m);
   }
   if (near.empty()) return std::nullopt;

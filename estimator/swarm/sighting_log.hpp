@@ -1,13 +1,13 @@
 /// Recent readings of one pair of robots, to be joined into mutual sightings (paper III-C).
 #pragma once
 
-#include <deque>
 #include <optional>
 #include <variant>
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/relative/raw_pose.hpp"
+#include "estimator/swarm/recent.hpp"
 #include "estimator/swarm/robot_state.hpp"
 
 namespace crepes {
@@ -40,8 +40,8 @@ class SightingLog {
   MemberConfig neighbor_;
   double calibration_sigma_rad_;
   double range_sigma_m_;
-  std::deque<Bearing> own_;
-  std::deque<StampedRange> ranges_;
+  Recent<Bearing, 256> own_;
+  Recent<StampedRange, 256> ranges_;
 };
 
 }  // namespace crepes

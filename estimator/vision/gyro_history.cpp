@@ -17,7 +17,7 @@ bool GyroHistory::add(const ImuSample& sample) {
   if (!sample.gyro_radps.allFinite()) return false;
   if (!samples_.empty() && sample.stamp <= samples_.back().stamp) return false;
   samples_.push_back({sample.stamp, sample.gyro_radps});
-  if (samples_.size() > kMaxSamples) samples_.pop_front();
+  if (samples_.size() > kMaxSamples) samples_.erase(samples_.begin());
   return true;
 }
 

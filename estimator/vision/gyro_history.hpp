@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <deque>
+#include <vector>
 
 #include "estimator/core/measurements.hpp"
 
@@ -26,7 +26,7 @@ class GyroHistory {
 
   [[nodiscard]] Eigen::Vector3d rate_at(Timestamp stamp) const;
 
-  std::deque<Sample> samples_;
+  std::vector<Sample> samples_;
 };
 
 }  // namespace crepes
