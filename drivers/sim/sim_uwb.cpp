@@ -55,7 +55,7 @@ Result<SimUwb> SimUwb::make(const SimWorld& world, RobotId robot, const SwarmCon
 std::vector<std::uint8_t> SimUwb::sample(double t_s) const {
   std::vector<NlinkNode> nodes;
   for (const Module& other : others_) nodes.push_back(measure(other, t_s));
-  const auto time_ms = static_cast<std::int64_t>(t_s * 1000.0);
+  const auto time_ms = std::llround(t_s * 1000.0);
   return encode_node_frame3(self_.id, static_cast<std::uint32_t>(time_ms), nodes);
 }
 

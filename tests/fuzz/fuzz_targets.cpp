@@ -1,0 +1,284 @@
+#include "tests/fuzz/fuzz_targets.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <sstream>
+
+#include "daemon/config_file.hpp"
+#include "drivers/device_clock.hpp"
+#include "drivers/imu/hipnuc.hpp"
+#include "drivers/imu/mavlink.hpp"
+#include "drivers/imu/witmotion.hpp"
+#include "drivers/imu/xsens.hpp"
+#include "drivers/recognize.hpp"
+#include "drivers/serial/byte_fields.hpp"
+#include "drivers/uwb/nlink.hpp"
+#include "estimator/core/contract.hpp"
+#include "firmware/protocol/led_messages.h"
+#include "net/crc32.hpp"
+#include "net/peer_message.hpp"
+#include "net/subscription_json.hpp"
+#include "tests/support/frame_damage.hpp"
+#include "tests/support/recorded_files.hpp"
+
+namespace crepes {
+namespace {
+
+using std::chrono::milliseconds;
+
+void check(const ImuSample& sample) {
+  CREPES_EXPECT(sample.gyro_radps.allFinite() && sample.accel_mps2.allFinite(), "finite samples");
+}
+
+void check(const UwbRange& range) {
+  CREPES_EXPECT(range.range_m > 0.0 && range.range_m <= 200.0, "ranges within bounds");
+}
+
+/// A stream in pieces as long as its first byte says gives the same frames as in one piece, and
+/// what they hold makes sense.
+template <class Parser>
+void run_stream(Bytes data, Parser parser) {
+  if (data.empty()) return;
+  const Bytes stream = data.subspan(1);
+  FrameDecoder<Parser> whole;
+  FrameDecoder<Parser> pieces;
+  const Frames frames = decode(whole, stream, std::max<std::size_t>(stream.size(), 1));
+  CREPES_EXPECT(decode(pieces, stream, 1 + data[0] % 64U) == frames, "cuts change nothing");
+  CREPES_EXPECT(pieces.counts().skipped_bytes == whole.counts().skipped_bytes, "all is counted");
+  Timestamp arrival{milliseconds{1000}};
+  for (const auto& frame : frames) {
+    arrival += milliseconds{10};
+    parser.parse(frame, arrival, [&](const auto& measurement) {
+      CREPES_EXPECT(measurement.stamp <= arrival, "nothing arrives before it happened");
+      check(measurement);
+    });
+  }
+  static_cast<void>(parser.why_nothing());
+}
+
+/// A frame or stream as `run_stream` takes it.
+FuzzInput piece_by_piece(const std::vector<std::uint8_t>& stream) { return FuzzInput{16} + stream; }
+
+std::vector<FuzzInput> recorded(const std::string& folder, const std::string& part) {
+  std::vector<FuzzInput> seeds;
+  for (const RecordedFrame& file : recorded_files(folder)) {
+    if (file.name.find(part) == std::string::npos) continue;
+    seeds.push_back(piece_by_piece(file.bytes + file.bytes));
+  }
+  return seeds;
+}
+
+void run_nlink(Bytes data) {
+  UwbModules modules;
+  for (std::uint16_t id = 0; id < 8; ++id) modules.emplace(id, RobotId{id});
+  run_stream(data, NlinkParser(modules, 200.0));
+}
+
+void run_recognize(Bytes data) {
+  const auto spoken = recognize(data);
+  CREPES_EXPECT(!spoken || !name_of(*spoken).empty(), "what is recognized has a name");
+}
+
+std::vector<FuzzInput> recognize_seeds() {
+  std::vector<FuzzInput> seeds;
+  for (const char* folder : {"imu", "nlink"}) {
+    for (const RecordedFrame& file : recorded_files(folder))
+      seeds.push_back(file.bytes + file.bytes + file.bytes);
+  }
+  return seeds;
+}
+
+/// Eight bytes of device time and two of how much later the next arrives.
+void run_device_clock(Bytes data) {
+  DeviceClock clock;
+  Timestamp arrival{};
+  Timestamp last{Duration::min()};
+  for (std::size_t at = 0; at + 11 <= data.size(); at += 11) {
+    const std::uint64_t count = unsigned_at(data, at, 8);
+    const bool wraps = data[at + 8] % 2 != 0;
+    arrival += std::chrono::microseconds{100} * unsigned_at(data, at + 9, 2);
+    const Timestamp local = clock.to_local(
+        wraps ? DeviceTime::ticks(count & 0xffffffffU, milliseconds{1}, 32) : DeviceTime{count, 0},
+        arrival);
+    CREPES_EXPECT(local <= arrival && local >= last, "stamps are in order and not of the future");
+    last = local;
+  }
+}
+
+std::vector<FuzzInput> device_clock_seeds() {
+  FuzzInput steady;
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    for (unsigned byte = 0; byte < 8; ++byte)
+      steady.push_back(static_cast<std::uint8_t>(i * 10'000'000U >> 8U * byte));
+    steady.insert(steady.end(), {0, 100, 0});  // 10 ms
+  }
+  return {steady};
+}
+
+void check(const PeerMessage& message) {
+  for (const auto& bearing : message.report.bearings)
+    CREPES_EXPECT(bearing.u_B.allFinite(), "finite bearings");
+  for (const auto& range : message.report.ranges)
+    CREPES_EXPECT(range.range_m > 0.0, "positive ranges");
+  for (const auto& sample : message.report.imu)
+    CREPES_EXPECT(sample.gyro_radps.allFinite() && sample.accel_mps2.allFinite(), "finite samples");
+  for (const auto& estimate : message.report.estimates)
+    CREPES_EXPECT(estimate.T_B_N.covariance.allFinite(), "finite covariances");
+}
+
+/// As it is, and with its checksum set right: else none but the first test would ever be reached.
+void run_peer_message(Bytes data) {
+  if (const auto message = decode_peer_message(data)) check(*message);
+  if (data.size() < 4) return;
+  FuzzInput mended(data.begin(), data.end());
+  const std::uint32_t sum = crc32(Bytes(mended).first(mended.size() - 4));
+  for (std::size_t i = 0; i < 4; ++i)
+    mended[mended.size() - 4 + i] = static_cast<std::uint8_t>(sum >> 8U * i);
+  if (const auto message = decode_peer_message(mended)) check(*message);
+}
+
+std::vector<FuzzInput> peer_message_seeds() {
+  OutgoingPeerMessage message;
+  message.sent = Timestamp{milliseconds{5000}};
+  Report& report = message.report;
+  report.sender = RobotId{1};
+  report.stamp = message.sent;
+  report.tilt = {message.sent, Eigen::Vector3d::UnitZ(), 0.01};
+  const FuzzInput empty = encode_peer_message(message).bytes;
+  message.echoes.push_back({RobotId{2}, 1'000'000, 2'000'000});
+  report.imu.push_back({message.sent, {0.1, 0.2, 0.3}, {0.0, 0.0, 9.8}});
+  report.bearings.push_back(
+      {message.sent, RobotId{2}, Eigen::Vector3d::UnitX(), {0.06, 0.0, 0.04}, 0.001});
+  report.ranges.push_back({message.sent, RobotId{2}, 4.27, -85.0, -80.0});
+  NeighborEstimate estimate;
+  estimate.neighbor = RobotId{2};
+  estimate.stamp = message.sent;
+  estimate.T_B_N.covariance = 0.01 * Matrix6d::Identity();
+  report.estimates.push_back(estimate);
+  return {empty, encode_peer_message(message).bytes};
+}
+
+std::string_view text_of(Bytes data) {
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): text is bytes.
+  return {reinterpret_cast<const char*>(data.data()), data.size()};
+}
+
+FuzzInput input_of(std::string_view text) { return {text.begin(), text.end()}; }
+
+void run_subscription(Bytes data) {
+  const auto request = parse_request(text_of(data));
+  if (request) return;
+  const std::string answer = error_json(request.error().message);
+  CREPES_EXPECT(answer.size() <= kMaxSubscriptionDatagram, "answers fit into a datagram");
+}
+
+std::vector<FuzzInput> subscription_seeds() {
+  return {input_of(R"({"class":"WATCH","enable":true,"rate_hz":10,"peers":[2,3]})"),
+          input_of(R"({"class":"WATCH","enable":false})"), input_of(R"({"class":"POLL"})")};
+}
+
+/// What is valid is still that after it was written and read again.
+void run_config(Bytes data) {
+  const CheckedConfig checked = check_config_text(std::string(text_of(data)), "file");
+  if (!checked.faults.empty()) return;
+  const CheckedConfig again = check_config_text(write_config(checked.config), "again");
+  CREPES_EXPECT(again.faults.empty(), "what was written can be read");
+}
+
+std::vector<FuzzInput> config_seeds() {
+  std::string keys;  // without comments: short inputs are mutated better
+  std::istringstream lines(reference_config());
+  for (std::string line; std::getline(lines, line);) {
+    line.erase(std::min(line.find(" #"), line.size()));
+    if (!line.starts_with('#') && !line.empty()) keys += line + '\n';
+  }
+  return {input_of(keys), input_of(reference_config())};
+}
+
+/// The host's side of the LED board's line.
+void run_led(Bytes data) {
+  led_receiver receiver{};
+  for (const std::uint8_t byte : data) {
+    led_receiver_push(&receiver, byte);
+    led_frame frame{};
+    while (led_receiver_next(&receiver, byte == 0, &frame)) {
+      CREPES_EXPECT(frame.size <= LED_MAX_PAYLOAD, "payloads fit");
+      std::array<std::uint8_t, LED_MAX_FRAME> again{};
+      CREPES_EXPECT(
+          led_frame_write(&frame, again.data()) == std::size_t{frame.size} + LED_FRAME_OVERHEAD,
+          "frames can be written again");
+      if (frame.size != LED_SETTINGS_SIZE) continue;
+      const led_settings settings = led_settings_read(frame.payload);
+      static_cast<void>(led_settings_fault(&settings));
+    }
+  }
+}
+
+std::vector<FuzzInput> led_seeds() {
+  FuzzInput stream;
+  for (const std::uint8_t size : {std::uint8_t{0}, std::uint8_t{LED_SETTINGS_SIZE}}) {
+    const led_frame frame{.type = LED_SETTINGS, .size = size, .payload = {3, 0, 20, 1, 2, 3}};
+    std::array<std::uint8_t, LED_MAX_FRAME> bytes{};
+    const std::size_t length = led_frame_write(&frame, bytes.data());
+    stream.insert(stream.end(), bytes.begin(), bytes.begin() + static_cast<long>(length));
+  }
+  return {stream};
+}
+
+constexpr std::array kTargets{
+    FuzzTarget{"nlink", &run_nlink, [] { return recorded("nlink", ""); }},
+    FuzzTarget{"witmotion", [](Bytes data) { run_stream(data, WitMotionParser()); },
+               [] { return recorded("imu", "witmotion"); }},
+    FuzzTarget{"hipnuc", [](Bytes data) { run_stream(data, HipnucParser()); },
+               [] { return recorded("imu", "hipnuc"); }},
+    FuzzTarget{"xsens", [](Bytes data) { run_stream(data, XsensParser()); },
+               [] { return recorded("imu", "xsens"); }},
+    FuzzTarget{"mavlink", [](Bytes data) { run_stream(data, MavlinkParser()); },
+               [] { return recorded("imu", "mavlink"); }},
+    FuzzTarget{"recognize", &run_recognize, &recognize_seeds},
+    FuzzTarget{"device_clock", &run_device_clock, &device_clock_seeds},
+    FuzzTarget{"peer_message", &run_peer_message, &peer_message_seeds},
+    FuzzTarget{"subscription", &run_subscription, &subscription_seeds},
+    FuzzTarget{"config", &run_config, &config_seeds},
+    FuzzTarget{"led", &run_led, &led_seeds}};
+
+std::string corpus_file(std::string_view target) {
+  return std::string(CREPES_SOURCE_DIR) + "/tests/fuzz/corpus/" + std::string(target) + ".hex";
+}
+
+}  // namespace
+
+std::span<const FuzzTarget> fuzz_targets() { return kTargets; }
+
+const FuzzTarget& fuzz_target(std::string_view name) {
+  const auto* const found = std::ranges::find(kTargets, name, &FuzzTarget::name);
+  CREPES_EXPECT(found != kTargets.end(), "a target of this name");
+  return *found;
+}
+
+std::vector<FuzzInput> kept_inputs(std::string_view target) {
+  std::vector<FuzzInput> inputs;
+  std::ifstream file(corpus_file(target));
+  for (std::string line; std::getline(file, line);) {
+    FuzzInput input;
+    for (std::size_t at = 0; at + 2 <= line.size(); at += 2)
+      input.push_back(static_cast<std::uint8_t>(std::stoul(line.substr(at, 2), nullptr, 16)));
+    inputs.push_back(std::move(input));
+  }
+  return inputs;
+}
+
+void keep_inputs(std::string_view target, std::vector<FuzzInput> inputs) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::ranges::sort(inputs, [](const FuzzInput& a, const FuzzInput& b) {
+    return std::pair(a.size(), a) < std::pair(b.size(), b);
+  });
+  std::ofstream file(corpus_file(target));
+  for (const FuzzInput& input : inputs) {
+    for (const std::uint8_t byte : input) file << kDigits[byte >> 4U] << kDigits[byte & 15U];
+    file << '\n';
+  }
+}
+
+}  // namespace crepes

@@ -1,0 +1,28 @@
+/// What takes bytes from outside, and what must hold of it whatever the bytes are.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace crepes {
+
+using FuzzInput = std::vector<std::uint8_t>;
+
+struct FuzzTarget {
+  std::string_view name;
+  void (*run)(std::span<const std::uint8_t>);  ///< aborts when something does not hold
+  std::vector<FuzzInput> (*seeds)();           ///< valid inputs to begin with
+};
+
+[[nodiscard]] std::span<const FuzzTarget> fuzz_targets();
+/// Aborts when there is no such target.
+[[nodiscard]] const FuzzTarget& fuzz_target(std::string_view name);
+
+/// What earlier runs found worth keeping, in corpus/NAME.hex: an input a line.
+[[nodiscard]] std::vector<FuzzInput> kept_inputs(std::string_view target);
+void keep_inputs(std::string_view target, std::vector<FuzzInput> inputs);
+
+}  // namespace crepes
