@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iterator>
+#include <sstream>
 #include <system_error>
 
 #include "daemon/config_reader.hpp"
@@ -44,6 +44,34 @@ void add_rule_faults(const Config& config, ReadLog& log) {
   }
 }
 
+class NothingHeard final : public YAML::EventHandler {
+ public:
+  using Mark = YAML::Mark;
+  using Style = YAML::EmitterStyle::value;
+  void OnDocumentStart(const Mark& /*mark*/) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const Mark& /*mark*/, YAML::anchor_t /*anchor*/) override {}
+  void OnAlias(const Mark& /*mark*/, YAML::anchor_t /*anchor*/) override {}
+  void OnScalar(const Mark& /*mark*/, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                const std::string& /*value*/) override {}
+  void OnSequenceStart(const Mark& /*mark*/, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                       Style /*style*/) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const Mark& /*mark*/, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                  Style /*style*/) override {}
+  void OnMapEnd() override {}
+};
+
+/// 0, 1, or 2 for more. YAML::LoadAll never ends on some texts that are not YAML.
+int documents_in(const std::string& text) {
+  std::istringstream in(text);
+  YAML::Parser parser(in);
+  NothingHeard nothing;
+  int count = 0;
+  while (count < 2 && parser.HandleNextDocument(nothing)) ++count;
+  return count;
+}
+
 Result<std::string> read_text(const std::filesystem::path& path) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return fail(ErrorCode::kIo, "is a directory");
@@ -72,14 +100,15 @@ CheckedConfig check_config_text(const std::string& text, const std::string& file
   ReadLog log;
   log.file = file;
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() == 1) {
-      ConfigReader reader(documents.front(), "", log);
+    const int documents = documents_in(text);
+    if (documents == 1) {
+      const YAML::Node root = YAML::Load(text);
+      ConfigReader reader(root, "", log);
       checked.config.visit(reader);
       reader.finish();
-      if (documents.front().IsMap()) add_rule_faults(checked.config, log);
+      if (root.IsMap()) add_rule_faults(checked.config, log);
     } else {
-      log.fault("", documents.empty() ? "is empty" : "holds more than one YAML document");
+      log.fault("", documents == 0 ? "is empty" : "holds more than one YAML document");
     }
   } catch (const YAML::Exception& e) {
     log.faults.push_back({file, e.mark.is_null() ? 1 : e.mark.line + 1, "", "not YAML: " + e.msg});

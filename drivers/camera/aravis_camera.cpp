@@ -84,8 +84,10 @@ Result<void> set_pixel_format(ArvCamera* camera) {
 }
 
 Result<void> set_region(ArvCamera* camera, const CameraConfig& config) {
-  const auto [width, height] = config.resolution;
-  const auto [x, y] = config.offset;
+  const int width = config.resolution[0];
+  const int height = config.resolution[1];
+  const int x = config.offset[0];
+  const int y = config.offset[1];
   const auto described_as = [](int a, int b, int c, int d) {
     return "[" + std::to_string(a) + ", " + std::to_string(b) + "] at offset [" +
            std::to_string(c) + ", " + std::to_string(d) + "]";

@@ -316,6 +316,9 @@ TEST(ConfigFile, RefusesTextThatIsNoConfiguration) {
   EXPECT_EQ(faults_of("hello"), "f:1: expected a mapping of keys to values, found \"hello\"");
   EXPECT_EQ(faults_of(std::string(kGood) + "---\nuwb: {noise_m: 1}\n"),
             "f:1: holds more than one YAML document");
+  // Of this text yaml-cpp finds one document after the other without an end.
+  EXPECT_EQ(faults_of("cameras:m. x\n  # c\n  ,\n    n# E\n# W\n"),
+            "f:1: holds more than one YAML document");
   EXPECT_FALSE(faults_of(std::string("\0\1\2\xff", 4)).empty());
 }
 
