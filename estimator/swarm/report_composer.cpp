@@ -24,9 +24,10 @@ std::optional<Report> ReportComposer::compose(Timestamp now, const RobotState& s
   report.sender = self_;
   report.stamp = now;
   report.tilt = *self.tilt;
-  for (std::size_t i = 0; i < self.imu.size(); ++i) {
-    if (self.imu[i].stamp >= now - kRepeated) report.imu.push_back(self.imu[i]);
-  }
+  std::size_t first = self.imu.size();
+  while (first > 0 && self.imu[first - 1].stamp >= now - kRepeated) --first;
+  report.imu.reserve(self.imu.size() - first);
+  for (std::size_t i = first; i < self.imu.size(); ++i) report.imu.push_back(self.imu[i]);
   report.bearings = bearings_.all();
   report.ranges = ranges_.all();
   report.estimates = estimates;

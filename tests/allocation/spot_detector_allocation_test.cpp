@@ -1,36 +1,15 @@
-// Counts what the spot detector takes from the heap. A program of its own: it replaces operator new
-// for everything in it.
+// What the spot detector takes from the heap.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <new>
-
 #include "estimator/vision/spot_detector.hpp"
+#include "tests/allocation/allocation_counter.hpp"
 #include "tests/support/ring_scene.hpp"
-
-namespace {
-
-std::size_t allocations = 0;
-std::size_t allocated_bytes = 0;
-
-void* counted(std::size_t size) {
-  ++allocations;
-  allocated_bytes += size;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) { return counted(size); }
-void* operator new[](std::size_t size) { return counted(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace crepes {
 namespace {
+
+using test::allocated_bytes;
+using test::allocations;
 
 using Pixels = std::vector<std::uint8_t>;
 
@@ -63,10 +42,10 @@ std::size_t show(SpotDetector& detector, const Pixels& pixels, int width = 320, 
 }
 
 TEST(SpotDetectorAllocation, IsCountedHere) {
-  const std::size_t before = allocations;
+  const std::size_t before = allocations();
   const auto one = std::make_unique<int>(1);
 
-  EXPECT_GT(allocations, before);
+  EXPECT_GT(allocations(), before);
 }
 
 TEST(SpotDetectorAllocation, EndsAfterTheFirstPictures) {
@@ -75,11 +54,11 @@ TEST(SpotDetectorAllocation, EndsAfterTheFirstPictures) {
   SpotDetector detector{VisionConfig{}};
   for (const Pixels& pixels : first) show(detector, pixels);
 
-  const std::size_t before = allocations;
+  const std::size_t before = allocations();
   std::size_t spots = 0;
   for (const Pixels& pixels : then) spots += show(detector, pixels);
 
-  EXPECT_EQ(allocations - before, 0U);
+  EXPECT_EQ(allocations() - before, 0U);
   EXPECT_GT(spots, 300U);
 }
 
@@ -94,13 +73,13 @@ TEST(SpotDetectorAllocation, IsBoundedWhateverThePictureShows) {
   }
   SpotDetector detector{VisionConfig{}};
 
-  const std::size_t before = allocated_bytes;
+  const std::size_t before = allocated_bytes();
   for (const Pixels& pixels : pictures) show(detector, pixels, kSide, kSide);
-  const std::size_t first_time = allocated_bytes - before;
+  const std::size_t first_time = allocated_bytes() - before;
   for (const Pixels& pixels : pictures) show(detector, pixels, kSide, kSide);
 
   EXPECT_LT(first_time, 32U << 20U);  // all that was ever asked for, growing in steps
-  EXPECT_EQ(allocated_bytes - before, first_time);
+  EXPECT_EQ(allocated_bytes() - before, first_time);
 }
 
 }  // namespace

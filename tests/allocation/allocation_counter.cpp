@@ -1,0 +1,32 @@
+#include "tests/allocation/allocation_counter.hpp"
+
+#include <cstdlib>
+#include <new>
+
+namespace {
+
+std::size_t count = 0;
+std::size_t bytes = 0;
+
+void* counted(std::size_t size) {
+  ++count;
+  bytes += size;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new[](std::size_t size) { return counted(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace crepes::test {
+
+std::size_t allocations() { return count; }
+std::size_t allocated_bytes() { return bytes; }
+
+}  // namespace crepes::test

@@ -1,0 +1,248 @@
+/// One robot's Estimator among all that it hears of another: both IMUs, a blinking ring before two
+/// cameras, ranges, and datagrams between two clocks.
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "estimator/swarm/estimator.hpp"
+#include "estimator/vision/camera_model.hpp"
+#include "estimator/vision/id_library.hpp"
+#include "net/peer_link.hpp"
+#include "tests/support/simulated_pair.hpp"
+
+namespace crepes::test {
+
+/// What may be wrong.
+struct Conditions {
+  bool in_view = true;         ///< of each other
+  double decoy_rad = 0.0;      ///< our cameras see the neighbor's ring this far to the left instead
+  double peer_turn_rad = 0.0;  ///< the neighbor's bearings of us point this far to the left
+  bool peer_is_on = true;
+  std::function<ImuSample(const ImuSample&)> own_imu;  ///< what the IMU makes of the truth
+  std::function<ImuSample(const ImuSample&)> peer_imu;
+  std::function<void(UwbRange&)> range;
+};
+
+class EstimatorPair {
+ public:
+  static constexpr RobotId kSelf{1};
+  static constexpr RobotId kOther{2};
+  static constexpr Duration kFrame = std::chrono::milliseconds{5};
+  static constexpr Duration kTick = std::chrono::milliseconds{20};
+
+  /// A pose as it came, against the truth.
+  struct Found {
+    Duration at{};  ///< true time of the tick
+    NeighborPose pose;
+    Vector6d error = Vector6d::Zero();
+    double nees = 0.0;
+  };
+
+  explicit EstimatorPair(std::uint64_t seed)
+      : pair_(seed, noise()), config_(config_of(pair_)), estimator_(config_) {
+    for (const CameraConfig& camera : config_.cameras)
+      cameras_.push_back(CameraModel::from(camera).value());
+  }
+
+  void run_for(Duration duration, const Conditions& with = {}) {
+    for (const Duration end = now_ + duration; now_ < end;) advance(with);
+  }
+
+  /// Our clock goes on from elsewhere, or the neighbor starts anew with another clock.
+  void jump_own_clock(Duration by) { own_clock_ += by; }
+  void reboot_peer(Duration by) {
+    peer_clock_ += by;
+    peer_link_ = PeerLink(kOther, {kSelf, kOther});
+  }
+
+  [[nodiscard]] Duration now() const { return now_; }
+  /// Of every tick that gave one.
+  [[nodiscard]] const std::vector<Found>& found() const { return found_; }
+  /// The pose at the last tick.
+  [[nodiscard]] const Found* latest() const {
+    return found_.empty() || found_.back().at != last_tick_ ? nullptr : &found_.back();
+  }
+  [[nodiscard]] NeighborStatus status() const { return estimator_.status().neighbors.at(0); }
+  [[nodiscard]] std::uint64_t count(MeasurementKind kind, Verdict verdict) const {
+    return status()
+        .measurements.at(static_cast<std::size_t>(kind))
+        .at(static_cast<std::size_t>(verdict));
+  }
+  [[nodiscard]] const Config& config() const { return config_; }
+  /// From now on all events are also written down.
+  void log_to(std::vector<Event>& log) { log_ = &log; }
+  [[nodiscard]] Timestamp own_time(Duration t) const { return Timestamp{t + own_clock_}; }
+  /// When our cameras last identified the neighbor, true time.
+  [[nodiscard]] Duration last_bearing() const { return last_bearing_; }
+
+ private:
+  struct Datagram {
+    Duration arrival{};
+    std::vector<std::uint8_t> bytes;
+  };
+
+  static PairNoise noise() {
+    PairNoise noise;
+    noise.bearing = 0.001;
+    noise.priors.accel_bias_mps2 = 0.035;
+    noise.priors.range_bias_m = 0.05;
+    return noise;
+  }
+
+  /// A camera ahead and one behind, which see all around between them.
+  static Config config_of(const SimulatedPair& pair) {
+    Config config;
+    config.robot.id = kSelf;
+    config.swarm.members.resize(2);
+    config.swarm.members[0].id = kSelf;
+    config.swarm.members[0].pattern = "011111111111111111";
+    config.swarm.members[0].p_body_led = pair.mounting_B.led;
+    config.swarm.members[0].p_body_uwb = pair.mounting_B.antenna;
+    config.swarm.members[1].id = kOther;
+    config.swarm.members[1].pattern = "001001011111111111";
+    config.swarm.members[1].p_body_led = pair.mounting_N.led;
+    config.swarm.members[1].p_body_uwb = pair.mounting_N.antenna;
+    Eigen::Matrix3d R_B_C;  // x to the right, y down, z ahead
+    R_B_C << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+    for (const double heading : {0.0, std::numbers::pi}) {
+      CameraConfig camera;
+      camera.name = heading == 0.0 ? "ahead" : "behind";
+      camera.intrinsics = {-0.1723, 0.5931, 316.9, 316.8, 638.2, 512.5};
+      camera.resolution = {1280, 1024};
+      const Eigen::Quaterniond q_B_C = so3_exp({0.0, 0.0, heading}) * Eigen::Quaterniond(R_B_C);
+      camera.T_cam_imu = Pose{pair.mounting_B.camera, q_B_C}.inverse();
+      config.cameras.push_back(camera);
+    }
+    const double root_period = std::sqrt(to_seconds(SimulatedPair::kImuPeriod));
+    const PairNoise n = noise();
+    config.imu.gyroscope_noise_density = n.gyro * root_period;
+    config.imu.accelerometer_noise_density = n.accel * root_period;
+    config.imu.gyroscope_bias_sigma = n.priors.gyro_bias_radps;
+    config.imu.accelerometer_bias_sigma = n.priors.accel_bias_mps2;
+    config.imu.scale_sigma = n.priors.gyro_scale;
+    config.uwb.noise_m = n.range;
+    config.uwb.bias_sigma_m = n.priors.range_bias_m;
+    config.vision.bearing_sigma_px = n.bearing * 316.9;
+    config.estimator.camera_misalignment_deg = n.priors.misalignment_rad * 180.0 / std::numbers::pi;
+    config.graph.enabled = false;
+    return config;
+  }
+
+  void advance(const Conditions& with) {
+    now_ += kFrame;
+    pair_.sample_imus(Timestamp{now_});
+    deliver(with);
+    if (now_ % SimulatedPair::kImuPeriod == Duration{}) sample_imus(with);
+    if (now_ % (2 * kTick) == kFrame) measure_ranges(with);
+    look(with);
+    if (now_ % kTick == Duration{}) {
+      if (with.in_view && with.peer_is_on) {
+        const DirectionReading z = pair_.peer_bearing(Timestamp{now_});
+        peer_report_.bearings.push_back({Timestamp{now_ + peer_clock_}, kSelf,
+                                         so3_exp({0.0, 0.0, with.peer_turn_rad}) * z.u, z.camera,
+                                         z.sigma_rad});
+      }
+      if (with.peer_is_on) report_for_peer();
+      tick();
+    }
+  }
+
+  void deliver(const Conditions& with) {
+    std::vector<Datagram> due;
+    std::swap(due, in_flight_to_us_);
+    for (const Datagram& datagram : due)
+      if (auto received = own_link_.receive(datagram.bytes, own_time(now_)))
+        static_cast<void>(step(*received));
+    std::swap(due, in_flight_to_peer_);
+    for (const Datagram& datagram : due)
+      if (with.peer_is_on)
+        static_cast<void>(peer_link_.receive(datagram.bytes, Timestamp{now_ + peer_clock_}));
+    in_flight_to_peer_.clear();
+  }
+
+  void sample_imus(const Conditions& with) {
+    const auto sampled = [](const ImuHistory& imu, const auto& fault, Duration clock) {
+      ImuSample sample = fault ? fault(imu.newest()) : imu.newest();
+      sample.stamp = imu.newest().stamp + clock;
+      return sample;
+    };
+    static_cast<void>(step(sampled(pair_.imu_B, with.own_imu, own_clock_)));
+    if (with.peer_is_on)
+      peer_report_.imu.push_back(sampled(pair_.imu_N, with.peer_imu, peer_clock_));
+  }
+
+  void measure_ranges(const Conditions& with) {
+    const auto measured = [&](Duration clock, RobotId neighbor) {
+      UwbRange range{Timestamp{now_ + clock}, neighbor, pair_.range(Timestamp{now_}).range_m, -80.0,
+                     -79.0};
+      if (with.range) with.range(range);
+      return range;
+    };
+    static_cast<void>(step(measured(own_clock_, kOther)));
+    if (with.peer_is_on) peer_report_.ranges.push_back(measured(peer_clock_, kSelf));
+  }
+
+  void look(const Conditions& with) {
+    static constexpr Duration kPhase = std::chrono::microseconds{37123};  // of the neighbor's board
+    const IdLibrary library = IdLibrary::from(config_.swarm).value();
+    const bool is_lit = with.in_view && library.entries()[1].code.is_lit(now_ + kPhase);
+    for (std::size_t k = 0; k < cameras_.size(); ++k) {
+      SpotFrame frame{own_time(now_), static_cast<std::uint8_t>(k), {}};
+      const Eigen::Vector3d u_B =
+          so3_exp({0.0, 0.0, with.decoy_rad}) * pair_.bearing(Timestamp{now_}).u;
+      const auto uv = cameras_[k].project(config_.cameras[k].T_cam_imu.q * u_B);
+      if (is_lit && uv && cameras_[k].contains(*uv))
+        frame.spots.push_back({uv->x(), uv->y(), 12.0, 255.0, 1.0});
+      const Outputs outputs = step(frame);
+      if (!outputs.bearings.empty()) last_bearing_ = now_;
+    }
+  }
+
+  void report_for_peer() {
+    const Timestamp stamp{now_ + peer_clock_};
+    peer_report_.sender = kOther;
+    peer_report_.stamp = stamp;
+    peer_report_.tilt = {stamp, pair_.sighting(Timestamp{now_}).N.up, 0.01};
+    in_flight_to_us_.push_back({now_, peer_link_.compose(peer_report_, stamp)});
+    peer_report_ = {};
+  }
+
+  void tick() {
+    last_tick_ = now_;
+    const Outputs outputs = step(Tick{own_time(now_)});
+    if (outputs.report)
+      in_flight_to_peer_.push_back({now_, own_link_.compose(*outputs.report, own_time(now_))});
+    for (const NeighborPose& pose : outputs.poses) {
+      const Pose truth = pair_.truth(pose.stamp - own_clock_).motion.T_B_N;
+      const Vector6d error = pose_difference(pose.T_B_N.pose, truth);
+      found_.push_back({now_, pose, error, error.dot(pose.T_B_N.covariance.llt().solve(error))});
+    }
+  }
+
+  Outputs step(const Event& event) {
+    if (log_ != nullptr) log_->push_back(event);
+    return estimator_.step(event);
+  }
+
+  SimulatedPair pair_;
+  Config config_;
+  Estimator estimator_;
+  std::vector<CameraModel> cameras_;
+  PeerLink own_link_{kSelf, {kSelf, kOther}};
+  PeerLink peer_link_{kOther, {kSelf, kOther}};
+  Duration own_clock_ = std::chrono::seconds{100};
+  Duration peer_clock_ = std::chrono::seconds{7};
+  Duration now_{};
+  Duration last_tick_{};
+  Duration last_bearing_{};
+  Report peer_report_;
+  std::vector<Datagram> in_flight_to_us_;
+  std::vector<Datagram> in_flight_to_peer_;
+  std::vector<Found> found_;
+  std::vector<Event>* log_ = nullptr;
+};
+
+}  // namespace crepes::test
