@@ -14,6 +14,7 @@
 
 #include "daemon/ctl/codebook.hpp"
 #include "daemon/ctl/demo.hpp"
+#include "daemon/ctl/devices.hpp"
 #include "daemon/ctl/evaluate.hpp"
 #include "daemon/ctl/import_calibration.hpp"
 #include "daemon/ctl/led.hpp"
@@ -267,6 +268,15 @@ void add_setup_witmotion(CLI::App& app, WitMotionSetup& setup, Command& command)
   });
 }
 
+void add_devices(CLI::App& app, DevicesOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand(
+      "devices", "List cameras and serial devices, and what to write into the configuration");
+  sub->add_flag("--json", options.json, "JSON instead of text");
+  sub->callback([&] {
+    command = [&] { return list_devices(options).map([](const auto& text) { print(text); }); };
+  });
+}
+
 using LedCommand = Result<std::string> (*)(const LedOptions&);
 
 CLI::App* add_led_command(CLI::App* led, const std::string& name, const std::string& help,
@@ -312,6 +322,7 @@ int run(int argc, char** argv) {
   CodebookOptions codebook_options;
   LedOptions led_options;
   WitMotionSetup witmotion_setup;
+  DevicesOptions devices_options;
   std::vector<std::filesystem::path> calibration_files;
   std::string out;
   Command command;
@@ -326,6 +337,7 @@ int run(int argc, char** argv) {
   add_spots(app, spots_options, command);
   add_led(app, led_options, command);
   add_setup_witmotion(app, witmotion_setup, command);
+  add_devices(app, devices_options, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

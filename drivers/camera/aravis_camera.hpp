@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "drivers/camera/camera.hpp"
@@ -17,12 +16,6 @@ namespace crepes {
 [[nodiscard]] Result<std::unique_ptr<Camera>> open_aravis_camera(const CameraConfig& config,
                                                                  std::uint8_t index,
                                                                  const Clock& clock);
-
-/// A camera that could be opened.
-struct FoundCamera {
-  std::string device;       ///< what to write into the configuration
-  std::string description;  ///< vendor, model, serial number, address
-};
 
 /// Asks USB and network; takes a second.
 [[nodiscard]] std::vector<FoundCamera> find_aravis_cameras();

@@ -62,4 +62,10 @@ class Camera {
   [[nodiscard]] virtual std::optional<std::string> diagnosis() const { return std::nullopt; }
 };
 
+/// A camera that could be opened.
+struct FoundCamera {
+  std::string device;       ///< what to write into the configuration
+  std::string description;  ///< for people
+};
+
 }  // namespace crepes

@@ -1,15 +1,19 @@
 #include "drivers/camera/v4l2_device.hpp"
 
 #include <fcntl.h>
+#include <linux/videodev2.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <optional>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "drivers/serial/device_name.hpp"
 #include "drivers/unique_fd.hpp"
 
 namespace crepes {
@@ -52,6 +56,16 @@ class KernelDevice final : public V4l2Device {
   std::vector<std::pair<void*, std::size_t>> mapped_;
 };
 
+/// Its name, if it captures frames.
+std::optional<std::string> name_of_camera(const std::string& path) {
+  const Result<std::unique_ptr<V4l2Device>> device = open_v4l2_device(path);
+  v4l2_capability ability{};
+  if (!device || (*device)->request(VIDIOC_QUERYCAP, &ability) != 0) return std::nullopt;
+  if ((ability.device_caps & V4L2_CAP_VIDEO_CAPTURE) == 0) return std::nullopt;
+  const auto* const card = ability.card;
+  return std::string(card, std::find(card, card + sizeof(ability.card), 0));
+}
+
 }  // namespace
 
 Result<std::unique_ptr<V4l2Device>> open_v4l2_device(const std::string& path) {
@@ -60,6 +74,18 @@ Result<std::unique_ptr<V4l2Device>> open_v4l2_device(const std::string& path) {
   const int error = errno;
   return fail(error == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo,
               path + ": " + std::generic_category().message(error));
+}
+
+std::vector<FoundCamera> find_v4l2_cameras(const std::filesystem::path& dev) {
+  std::vector<FoundCamera> found;
+  std::error_code failed;
+  for (const auto& entry : std::filesystem::directory_iterator(dev, failed)) {
+    const std::string path = entry.path();
+    if (!entry.path().filename().string().starts_with("video")) continue;
+    if (const auto name = name_of_camera(path))
+      found.push_back({steady_name_of(path, dev / "v4l" / "by-id").value_or(path), *name});
+  }
+  return found;
 }
 
 }  // namespace crepes

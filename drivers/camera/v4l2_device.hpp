@@ -4,10 +4,13 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "drivers/camera/camera.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
@@ -32,5 +35,8 @@ class V4l2Device {
 };
 
 [[nodiscard]] Result<std::unique_ptr<V4l2Device>> open_v4l2_device(const std::string& path);
+
+/// The devices in `dev` that capture frames, by their steady names where they have one.
+[[nodiscard]] std::vector<FoundCamera> find_v4l2_cameras(const std::filesystem::path& dev);
 
 }  // namespace crepes

@@ -1,0 +1,116 @@
+#include "daemon/ctl/devices.hpp"
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "drivers/camera/aravis_camera.hpp"
+#include "drivers/camera/v4l2_device.hpp"
+#include "drivers/monotonic_clock.hpp"
+#include "drivers/recognize.hpp"
+#include "drivers/serial/serial_port.hpp"
+#include "drivers/serial/serial_reader.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Fastest first: a slower line looks like noise to a fast port, and is then heard right.
+constexpr std::array kRates{921600, 460800, 115200};
+
+struct SerialDevice {
+  std::string port;
+  int baud = 0;
+  std::optional<SpokenProtocol> speaks;
+  std::string fault;  ///< why it could not be listened to
+};
+
+SerialDevice listen_to(const std::string& path, std::chrono::milliseconds duration) {
+  const MonotonicClock clock;
+  for (const int baud : kRates) {
+    Result<SerialPort> port = SerialPort::open(path, baud);
+    if (!port) return {path, 0, std::nullopt, port.error().message};
+    RecentBytes recent;
+    for (const Timestamp end = clock.now() + duration; clock.now() < end;) {
+      const Result<Bytes> chunk = port->read_some(std::chrono::milliseconds(20));
+      if (!chunk) return {path, 0, std::nullopt, chunk.error().message};
+      recent.add(*chunk);
+    }
+    if (const auto spoken = recognize(recent.get())) return {path, baud, spoken, ""};
+  }
+  return {path, 0, std::nullopt, ""};
+}
+
+std::vector<SerialDevice> find_serial_devices(const DevicesOptions& options) {
+  std::vector<SerialDevice> found;
+  std::error_code failed;  // none plugged in: no directory
+  for (const auto& link : fs::directory_iterator(options.dev / "serial" / "by-id", failed))
+    found.push_back(listen_to(link.path(), options.listen));
+  std::ranges::sort(found, {}, &SerialDevice::port);
+  return found;
+}
+
+struct CameraDevice {
+  std::string driver;
+  FoundCamera found;
+};
+
+std::vector<CameraDevice> find_cameras(const DevicesOptions& options) {
+  std::vector<CameraDevice> cameras;
+  for (FoundCamera& found : find_aravis_cameras()) cameras.push_back({"aravis", std::move(found)});
+  for (FoundCamera& found : find_v4l2_cameras(options.dev))
+    cameras.push_back({"v4l2", std::move(found)});
+  return cameras;
+}
+
+std::string text_of(const CameraDevice& camera) {
+  return camera.found.description + "\n    cameras: driver: " + camera.driver + ", device: \"" +
+         camera.found.device + "\"\n";
+}
+
+std::string text_of(const SerialDevice& device) {
+  if (!device.fault.empty()) return device.port + "\n    " + device.fault + "\n";
+  if (!device.speaks) return device.port + "\n    says nothing that is known\n";
+  const std::string section = *device.speaks == SpokenProtocol::kNlink ? "uwb" : "imu";
+  return device.port + "\n    speaks " + std::string(name_of(*device.speaks)) + "\n    " + section +
+         ": port: \"" + device.port + "\", baud: " + std::to_string(device.baud) + "\n";
+}
+
+nlohmann::json json_of(const CameraDevice& camera) {
+  return {{"driver", camera.driver},
+          {"device", camera.found.device},
+          {"description", camera.found.description}};
+}
+
+nlohmann::json json_of(const SerialDevice& device) {
+  nlohmann::json json{{"port", device.port}};
+  if (!device.fault.empty()) json["fault"] = device.fault;
+  if (!device.speaks) return json;
+  json["speaks"] = name_of(*device.speaks);
+  json["baud"] = device.baud;
+  return json;
+}
+
+}  // namespace
+
+Result<std::string> list_devices(const DevicesOptions& options) {
+  const std::vector<CameraDevice> cameras = find_cameras(options);
+  const std::vector<SerialDevice> serial = find_serial_devices(options);
+  if (options.json) {
+    nlohmann::json json{{"cameras", nlohmann::json::array()},
+                        {"serial_ports", nlohmann::json::array()}};
+    for (const auto& camera : cameras) json["cameras"].push_back(json_of(camera));
+    for (const auto& device : serial) json["serial_ports"].push_back(json_of(device));
+    return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  }
+  std::string text = cameras.empty() ? "no camera\n" : "";
+  for (const auto& camera : cameras) text += text_of(camera);
+  if (serial.empty()) text += "no serial port\n";
+  for (const auto& device : serial) text += text_of(device);
+  return text;
+}
+
+}  // namespace crepes

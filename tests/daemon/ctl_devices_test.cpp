@@ -1,0 +1,76 @@
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "daemon/ctl/devices.hpp"
+#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/worker.hpp"
+#include "drivers/imu/witmotion.hpp"
+#include "drivers/sim/pseudo_terminal.hpp"
+#include "drivers/sleep.hpp"
+#include "tests/support/gige_camera.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+class Devices : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!enter_own_network()) GTEST_SKIP() << "no right to a network of our own";
+    auto scratch = ScratchDirectory::create("");
+    ASSERT_TRUE(scratch) << scratch.error().message;
+    scratch_.emplace(std::move(*scratch));
+    options_.dev = scratch_->path();
+    fs::create_directories(options_.dev / "serial/by-id");
+  }
+
+  std::optional<ScratchDirectory> scratch_;
+  DevicesOptions options_;
+};
+
+TEST_F(Devices, AreNamedWithWhatToWriteIntoTheConfiguration) {
+  const GigeCamera camera([](std::uint8_t* pixels, int width, int height) {
+    std::memset(pixels, 0, static_cast<std::size_t>(width * height));
+  });
+  PseudoTerminal line = PseudoTerminal::open().value();
+  const fs::path port = options_.dev / "serial/by-id/usb-imu";
+  fs::create_symlink(line.path(), port);
+  const Worker sensor("imu", [&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      line.write(encode_witmotion({0.1, 0.2, 0.3}, {0.0, 0.0, 9.81}));
+      sleep_for(10ms);
+    }
+  });
+
+  const auto text = list_devices(options_);
+  options_.json = true;
+  const auto json = list_devices(options_);
+
+  ASSERT_TRUE(text && json);
+  EXPECT_NE(text->find("cameras: driver: aravis, device: \"Aravis-Fake-GV01\""), std::string::npos)
+      << *text;
+  EXPECT_NE(text->find("imu: port: \"" + port.string() + "\""), std::string::npos) << *text;
+  const auto told = nlohmann::json::parse(*json);
+  EXPECT_EQ(told["cameras"][0]["driver"], "aravis");
+  EXPECT_EQ(told["serial_ports"][0]["speaks"], "witmotion");
+  EXPECT_EQ(told["serial_ports"][0]["port"], port.string());
+}
+
+TEST_F(Devices, ThatCannotBeListenedToAreNamedToo) {
+  options_.json = true;
+  fs::create_symlink("/dev/null", options_.dev / "serial/by-id/usb-nothing");
+
+  const auto told = nlohmann::json::parse(list_devices(options_).value());
+
+  EXPECT_TRUE(told["cameras"].empty());
+  EXPECT_FALSE(told["serial_ports"][0]["fault"].get<std::string>().empty());
+}
+
+TEST_F(Devices, MayBeNone) { EXPECT_EQ(list_devices(options_), "no camera\nno serial port\n"); }
+
+}  // namespace
+}  // namespace crepes
