@@ -180,6 +180,7 @@ TEST_F(AravisCameraTest, NamesTheCameraThatIsNotThere) {
   const auto camera = open();
 
   ASSERT_FALSE(camera);
+  EXPECT_EQ(camera.error().code, ErrorCode::kNotFound);
   EXPECT_NE(camera.error().message.find(GigeCamera::kId), std::string::npos);
 }
 
