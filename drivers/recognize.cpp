@@ -19,7 +19,7 @@ struct Candidate {
 
 constexpr std::array kCandidates{
     Candidate{SpokenProtocol::kNlink, "LinkTrack", &examine_nlink},
-    Candidate{SpokenProtocol::kWitMotion, "witmotion", &WitMotionParser::examine},
+    Candidate{SpokenProtocol::kWitMotion, "witmotion", &WitMotion::examine},
     Candidate{SpokenProtocol::kHipnuc, "hipnuc", &Hipnuc::examine},
     Candidate{SpokenProtocol::kXsens, "xsens", &Xsens::examine},
     Candidate{SpokenProtocol::kMavlink, "mavlink", &Mavlink::examine}};

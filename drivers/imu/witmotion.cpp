@@ -1,9 +1,9 @@
 #include "drivers/imu/witmotion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 #include "drivers/serial/byte_fields.hpp"
 
@@ -13,10 +13,10 @@ namespace {
 constexpr std::uint8_t kHeader = 0x55;
 constexpr std::uint8_t kAcceleration = 0x51;
 constexpr std::uint8_t kRate = 0x52;
+constexpr std::size_t kOne = WitMotion::kMaxFrame / 2;
 constexpr double kFullScale = 32768.0;
 constexpr double kAccelerationUnit = 16.0 * 9.80665 / kFullScale;             // m/s^2
 constexpr double kRateUnit = 2000.0 * std::numbers::pi / 180.0 / kFullScale;  // rad/s
-constexpr Duration kWithinSample = std::chrono::milliseconds(5);
 
 using Raw = Eigen::Vector3i;
 
@@ -39,41 +39,47 @@ void encode(std::span<std::uint8_t> frame, std::uint8_t type, const Eigen::Vecto
   frame[10] = byte_sum(frame.first(10));
 }
 
-}  // namespace
+/// Whether a sample begins in it: then its own end is missing, and the sum is right by chance, as
+/// one in 256 is.
+bool begins_inside(Bytes frame) {
+  constexpr std::array<std::uint8_t, 2> kBeginning{kHeader, kAcceleration};
+  return !std::ranges::search(frame.subspan(1), kBeginning).empty();
+}
 
-FrameCheck WitMotionParser::examine(Bytes bytes) {
+FrameCheck examine_one(Bytes bytes) {
   if (bytes[0] != kHeader) return {};
   if (bytes.size() < 2) return {FrameKind::kIncomplete};
   if (bytes[1] < 0x50 || bytes[1] > 0x5f) return {};
-  if (bytes.size() < kMaxFrame) return {FrameKind::kIncomplete};
-  if (byte_sum(bytes.first(10)) != bytes[10]) return {FrameKind::kBadChecksum};
+  if (bytes.size() < kOne) return {FrameKind::kIncomplete};
+  if (byte_sum(bytes.first(kOne - 1)) != bytes[kOne - 1]) return {FrameKind::kBadChecksum};
+  if (begins_inside(bytes.first(kOne))) return {};
+  return {FrameKind::kComplete, kOne};
+}
+
+}  // namespace
+
+FrameCheck WitMotion::examine(Bytes bytes) {
+  const FrameCheck first = examine_one(bytes);
+  if (first.kind != FrameKind::kComplete || bytes[1] != kAcceleration) return first;
+  const Bytes rest = bytes.subspan(kOne);
+  constexpr std::array<std::uint8_t, 2> kBeginning{kHeader, kRate};
+  const std::size_t known = std::min(rest.size(), kBeginning.size());
+  if (!std::ranges::equal(rest.first(known), std::span(kBeginning).first(known))) return first;
+  if (rest.size() < kOne) return {FrameKind::kIncomplete};
+  if (examine_one(rest).kind != FrameKind::kComplete) return first;
   return {FrameKind::kComplete, kMaxFrame};
 }
 
-void WitMotionParser::parse(Bytes frame, Timestamp arrival,
-                            const std::function<void(const ImuSample&)>& sink) {
-  const Raw raw = raw_of(frame);
-  if (frame[1] == kAcceleration) {
-    acceleration_ = Acceleration{.arrival = arrival,
-                                 .mps2 = raw.cast<double>() * kAccelerationUnit,
-                                 .saturated = is_saturated(raw)};
-    return;
-  }
-  const std::optional<Acceleration> acceleration = std::exchange(acceleration_, std::nullopt);
-  if (frame[1] != kRate) return;
-  ImuReading reading{.verdict = ImuVerdict::kPartial, .gyro_radps = raw.cast<double>() * kRateUnit};
-  // Both halves are sent at once; an older first half belongs to a sample that lost its second.
-  if (acceleration && arrival - acceleration->arrival <= kWithinSample) {
-    const bool saturated = acceleration->saturated || is_saturated(raw);
-    reading.verdict = saturated ? ImuVerdict::kSaturated : ImuVerdict::kSample;
-    reading.accel_mps2 = acceleration->mps2;
-  }
-  take(reading, arrival, clock_, counts_, sink);
-}
-
-std::string WitMotionParser::why_nothing() {
-  return "the WitMotion sensor does not send acceleration (51) and rate (52) together; switch both "
-         "on with its set-up program";
+ImuReading WitMotion::read(Bytes frame) {
+  const bool is_half = frame[1] == kAcceleration || frame[1] == kRate;
+  if (frame.size() < kMaxFrame)
+    return {.verdict = is_half ? ImuVerdict::kPartial : ImuVerdict::kOther};
+  const Raw accel = raw_of(frame);
+  const Raw gyro = raw_of(frame.subspan(kOne));
+  const bool saturated = is_saturated(accel) || is_saturated(gyro);
+  return {.verdict = saturated ? ImuVerdict::kSaturated : ImuVerdict::kSample,
+          .gyro_radps = gyro.cast<double>() * kRateUnit,
+          .accel_mps2 = accel.cast<double>() * kAccelerationUnit};
 }
 
 std::array<std::uint8_t, 22> encode_witmotion(const Eigen::Vector3d& gyro_radps,

@@ -4,42 +4,25 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <optional>
-#include <string>
 #include <string_view>
 
 #include "drivers/imu/imu_reading.hpp"
 
 namespace crepes {
 
-/// A sample is an acceleration frame (51) and the rate frame (52) that follows it.
-class WitMotionParser {
- public:
-  using Measurement = ImuSample;
-  static constexpr std::size_t kMaxFrame = 11;
-  static constexpr std::string_view kForeignMeaning = {};
+/// A sample is an acceleration frame (51) and the rate frame (52) that follows it without a gap:
+/// both together count as one frame here. Halves that stand alone are of two samples.
+struct WitMotion {
+  static constexpr std::size_t kMaxFrame = 22;
+  static constexpr std::string_view kNoSamples =
+      "the WitMotion sensor does not send acceleration (51) and rate (52) together; switch both on "
+      "with its set-up program";
 
-  /// `bytes` begin a frame of this protocol?
   [[nodiscard]] static FrameCheck examine(Bytes bytes);
-
-  /// A whole frame; the sample is stamped with the arrival of its second half.
-  void parse(Bytes frame, Timestamp arrival, const std::function<void(const ImuSample&)>& sink);
-
-  [[nodiscard]] static std::string why_nothing();
-  [[nodiscard]] const ImuCounts& counts() const { return counts_; }
-
- private:
-  struct Acceleration {
-    Timestamp arrival{};
-    Eigen::Vector3d mps2 = Eigen::Vector3d::Zero();
-    bool saturated = false;
-  };
-
-  std::optional<Acceleration> acceleration_;
-  DeviceClock clock_;  // without use: no frame has a time
-  ImuCounts counts_;
+  [[nodiscard]] static ImuReading read(Bytes frame);
 };
+
+using WitMotionParser = ImuFrameParser<WitMotion>;
 
 /// The two frames of one sample. What the sensor cannot express saturates, as it does there.
 [[nodiscard]] std::array<std::uint8_t, 22> encode_witmotion(const Eigen::Vector3d& gyro_radps,

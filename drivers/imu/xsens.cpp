@@ -35,7 +35,8 @@ std::optional<Extent> extent_of(Bytes bytes) {
 bool items_can_fill(Bytes bytes, Extent payload) {
   std::size_t at = payload.begin;
   while (at + kItemHeader <= std::min(bytes.size(), payload.end)) at += kItemHeader + bytes[at + 2];
-  return at == payload.end || (at < payload.end && at + kItemHeader > bytes.size());
+  const bool another_fits = at + kItemHeader <= payload.end;
+  return at == payload.end || (another_fits && at + kItemHeader > bytes.size());
 }
 
 /// Three numbers in the format that the low two bits of an item's id name.

@@ -103,6 +103,13 @@ std::vector<std::uint8_t> xsens_message(const std::string& items) {
   return message;
 }
 
+TEST(Xsens, RefusesItemsThatEndWithoutTheMessage) {
+  EXPECT_EQ(Xsens::examine(xsens_message("10 20 02 00 01")).kind, FrameKind::kComplete);
+  EXPECT_EQ(Xsens::examine(xsens_message("10 20 02 00 01 e0")).kind, FrameKind::kNone);
+  EXPECT_EQ(Xsens::examine(xsens_message("10 20 02 00 01 e0 20")).kind, FrameKind::kNone);
+  EXPECT_EQ(Xsens::examine(xsens_message("10 20 09 00 01")).kind, FrameKind::kNone);
+}
+
 TEST(Xsens, ReadsEveryNumberFormat) {
   const auto fixed12_20 = xsens_message(
       "40 21 0c 00 10 00 00 00 20 00 00 00 9d 00 00 80 21 0c ff f0 00 00 00 08 00 00 00 00 00 00");

@@ -111,7 +111,7 @@ TEST_F(SerialReaderTest, TellsThatTheDeviceHungUp) {
 
 TEST_F(SerialReaderTest, SaysThatAModuleIsInAnotherModeUntilItIsNot) {
   auto reader = uwb_reader();
-  for (int i = 0; i < 3; ++i) send(bytes_of("ff 02 11 22 33"));
+  send(bytes_of("ff 02 11 22 33 ff 02 11 22 33 ff 02 11 22 33"));
   ASSERT_TRUE(reader.read_once(1s));
   ASSERT_TRUE(reader.diagnosis());
   EXPECT_NE(reader.diagnosis()->find("ff 02"), std::string::npos);
@@ -136,7 +136,7 @@ TEST_F(SerialReaderTest, SuspectsTheBaudRateWhenNoFrameIsFoundForASecond) {
 
 TEST_F(SerialReaderTest, NamesWhatSpeaksInsteadOfTheConfiguredDevice) {
   auto reader = uwb_reader();
-  for (int i = 0; i < 3; ++i) send(recorded_witmotion());
+  send(recorded_witmotion() + recorded_witmotion() + recorded_witmotion());
 
   ASSERT_TRUE(reader.read_once(1s));
   clock_.set(Timestamp{1s});

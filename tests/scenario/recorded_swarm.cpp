@@ -53,8 +53,7 @@ void record_imu(const fs::path& file, const SimWorld& world, const DemoRobot& ro
       out << to_ns(sample.stamp) << ',' << w.x() << ',' << w.y() << ',' << w.z() << ',' << a.x()
           << ',' << a.y() << ',' << a.z() << '\n';
     };
-    parser.parse(Bytes(bytes).first(11), robot.clock.local(i * 0.01), write);
-    parser.parse(Bytes(bytes).last(11), robot.clock.local(i * 0.01), write);
+    parser.parse(bytes, robot.clock.local(i * 0.01), write);
   }
 }
 

@@ -36,8 +36,7 @@ std::vector<ImuSample> record_imu(const SimWorld& world, const DemoRobot& robot,
   for (int i = 1; i * period_s <= duration_s; ++i) {
     const auto bytes = imu.sample(i * period_s);
     const Timestamp stamp = robot.clock.local(i * period_s);
-    parser.parse(Bytes(bytes).first(11), stamp, keep);
-    parser.parse(Bytes(bytes).last(11), stamp, keep);
+    parser.parse(bytes, stamp, keep);
   }
   return samples;
 }
