@@ -43,7 +43,8 @@ void encode(std::span<std::uint8_t> frame, std::uint8_t type, const Eigen::Vecto
 /// one in 256 is.
 bool begins_inside(Bytes frame) {
   constexpr std::array<std::uint8_t, 2> kBeginning{kHeader, kAcceleration};
-  return !std::ranges::search(frame.subspan(1), kBeginning).empty();
+  return std::search(frame.begin() + 1, frame.end(), kBeginning.begin(), kBeginning.end()) !=
+         frame.end();
 }
 
 FrameCheck examine_one(Bytes bytes) {

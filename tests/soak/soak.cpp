@@ -19,6 +19,7 @@
 #include "estimator/core/contract.hpp"
 #include "net/peer_message.hpp"
 #include "net/udp_socket.hpp"
+#include "tests/soak/soak_camera.hpp"
 
 namespace crepes {
 namespace {
@@ -62,76 +63,6 @@ bool was_sent(const BasicUwbRange<PeerTimestamp>& range) {
          range.first_path_dbm == sent.first_path_dbm && range.received_dbm == sent.received_dbm;
 }
 
-/// A camera as a folder of pictures; away while it is unplugged.
-class SoakCamera {
- public:
-  explicit SoakCamera(fs::path folder, unsigned seed) : folder_(std::move(folder)), random_(seed) {
-    fs::create_directories(folder_ / "data");
-    std::ofstream list(folder_ / "data.csv");
-    for (int i = 0; i < kPictures; ++i) {
-      std::ofstream(folder_ / "data" / (std::to_string(i) + ".pgm"))
-          << "P5 64 64 255\n"
-          << std::string(64UL * 64, static_cast<char>(i));
-    }
-    for (std::int64_t i = 0; i < 20'000; ++i)  // longer than it is ever left alone
-      list << i * 50'000'000 << ',' << i % kPictures << ".pgm\n";
-  }
-
-  [[nodiscard]] CameraConfig config() const {
-    CameraConfig camera;
-    camera.name = "cam0";
-    camera.intrinsics = {-0.17, 0.59, 16.0, 16.0, 32.0, 32.0};
-    camera.resolution = {64, 64};
-    camera.rate_hz = 20.0;
-    camera.driver = CameraDriver::kFolder;
-    camera.folder = folder_ / "data";
-    return camera;
-  }
-
-  void step(Timestamp now) {
-    if (is_away_ && now >= next_change_) {
-      fs::rename(away(), folder_);
-      is_away_ = false;
-      over_ = now;
-      recovering_ = true;
-    } else if (is_well() && now >= next_change_ && !is_calm_) {
-      fs::rename(folder_, away());
-      is_away_ = true;
-      next_change_ = now + between(0.3, 2.5);
-    }
-  }
-  /// STATUS says that pictures come; how long they took to return.
-  std::optional<Duration> heard(Timestamp now) {
-    if (is_away_ || !recovering_) return std::nullopt;
-    recovering_ = false;
-    next_change_ = now + between(1.0, 3.0);
-    return now - over_;
-  }
-  void begin(Timestamp now) { over_ = now; }
-  void stir(bool stirred) { is_calm_ = !stirred; }
-  [[nodiscard]] bool is_well() const { return !is_away_ && !recovering_; }
-  [[nodiscard]] std::optional<Duration> waiting(Timestamp now) const {
-    if (is_away_ || !recovering_) return std::nullopt;
-    return now - over_;
-  }
-
- private:
-  static constexpr int kPictures = 20;
-
-  [[nodiscard]] fs::path away() const { return folder_.string() + ".away"; }
-  [[nodiscard]] Duration between(double least_s, double most_s) {
-    return from_seconds(std::uniform_real_distribution<>(least_s, most_s)(random_));
-  }
-
-  fs::path folder_;
-  std::mt19937 random_;
-  Timestamp next_change_{};
-  Timestamp over_{};
-  bool is_away_ = false;
-  bool recovering_ = true;
-  bool is_calm_ = false;
-};
-
 std::size_t open_descriptors() {
   return static_cast<std::size_t>(
       std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator()));
@@ -167,10 +98,10 @@ class Soak {
     const LogSession log(LogLevel::kError);
     std::optional<Runtime> runtime;
     runtime.emplace(config_, clock_);
-    camera_.begin(clock_.now());
     stir(false);
     run_until(is_well_);
     report_ = {};
+    report_.camera_is_gige = camera_.is_gige();
     report_.descriptors_before = open_descriptors();
     stir(true);
     const Timestamp begin = clock_.now();
@@ -243,6 +174,8 @@ class Soak {
 
   void examine(const BasicReport<PeerTimestamp>& report) {
     const Timestamp now = clock_.now();
+    const Timestamp samples_known_to = last_sample_;
+    const Timestamp ranges_known_to = last_range_;
     for (const auto& sample : report.imu) {
       const Timestamp stamp{sample.stamp.time_since_epoch()};
       if (!was_sent(sample.gyro_radps, sample.accel_mps2)) {
@@ -251,14 +184,14 @@ class Soak {
              << sample.accel_mps2.transpose();
         report_.wrong = text.str();
       }
-      if (stamp > last_sample_) ++report_.samples;
+      if (stamp > samples_known_to) ++report_.samples;
       last_sample_ = std::max(last_sample_, stamp);
       note(imu_.heard(stamp, now));
     }
     for (const auto& range : report.ranges) {
       const Timestamp stamp{range.stamp.time_since_epoch()};
       if (!was_sent(range)) report_.wrong = "range " + std::to_string(range.range_m);
-      if (stamp > last_range_) ++report_.ranges;
+      if (stamp > ranges_known_to) ++report_.ranges;
       last_range_ = std::max(last_range_, stamp);
       note(uwb_.heard(stamp, now));
     }
@@ -340,10 +273,11 @@ std::string to_string(const SoakReport& report) {
     out << kMishapNames[i] << ": " << report.mishaps[i].count << ", recovered within "
         << to_seconds(report.mishaps[i].longest) << " s\n";
   }
-  out << "camera unplugged: " << report.pictures_returned << ", told to work again within "
+  out << (report.camera_is_gige ? "GigE camera" : "folder")
+      << " unplugged: " << report.pictures_returned << ", told to work again within "
       << to_seconds(report.longest_camera) << " s\n"
       << report.samples << " samples, " << report.ranges
-      << " frames with ranges; wrong: " << (report.wrong.empty() ? "none" : report.wrong) << '\n'
+      << " ranges; wrong: " << (report.wrong.empty() ? "none" : report.wrong) << '\n'
       << "descriptors " << report.descriptors_before << " -> " << report.descriptors_after
       << ", resident " << report.memory_before_kb << " -> " << report.memory_after_kb << " kB\n";
   if (!report.stuck.empty()) out << "did not recover: " << report.stuck << '\n';

@@ -25,6 +25,7 @@ struct SoakReport {
   std::array<PerMishap, kMishapNames.size()> mishaps;
   std::uint64_t samples = 0;  ///< of the inertial sensor, as the daemon passed them on
   std::uint64_t ranges = 0;
+  bool camera_is_gige = false;
   std::uint64_t pictures_returned = 0;  ///< recoveries of the camera
   Duration longest_camera{};
   std::string wrong;  ///< the first value that was never sent; empty: none
@@ -38,8 +39,8 @@ struct SoakReport {
 };
 
 /// One daemon in this process, its inertial sensor and ranging module on pseudo-terminals, its
-/// camera a folder: unplugged, stalled, torn, at random by `seed`. What the daemon makes of it is
-/// read off its reports to peers and its STATUS.
+/// camera on GigE Vision (a folder where that may not be): unplugged, stalled, torn, at random by
+/// `seed`. What the daemon makes of it is read off its reports to peers and its STATUS.
 [[nodiscard]] SoakReport run_soak(const SoakPlan& plan);
 
 [[nodiscard]] std::string to_string(const SoakReport& report);
