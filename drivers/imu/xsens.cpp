@@ -81,9 +81,10 @@ ImuReading Xsens::read(Bytes frame) {
   for (std::size_t at = payload.begin; at < payload.end;) {
     const auto id = static_cast<std::uint32_t>(unsigned_at(frame, at, 2, std::endian::big));
     const Bytes data = frame.subspan(at + kItemHeader, frame[at + 2]);
-    if (id == kSampleTimeFine && data.size() == 4)
+    if (id == kSampleTimeFine && data.size() == 4) {
       time = DeviceTime::ticks(unsigned_at(data, 0, 4, std::endian::big),
                                std::chrono::microseconds{100}, 32);
+    }
     // Bits 2 and 3 name the axes of orientations; these two are always the sensor's.
     if ((id & 0xfff0U) == kAcceleration) accel = triad(data, id & 3U);
     if ((id & 0xfff0U) == kRateOfTurn) gyro = triad(data, id & 3U);
