@@ -115,6 +115,18 @@ TEST(NlinkFrame, RefusesEveryTruncationSplitAndBitErrorOfEveryRecordedFrame) {
   }
 }
 
+TEST(NlinkFrame, RefusesDamageToFramesWithoutNodesAndWithMany) {
+  std::vector<NlinkNode> nodes;
+  for (const std::size_t count : {0U, 1U, 30U}) {
+    while (nodes.size() < count) {
+      const auto module = static_cast<std::uint32_t>(nodes.size() + 2);
+      nodes.push_back({module, 1.0 + 0.37 * module, -84.0 - 0.5 * module, -79.5});
+    }
+    SCOPED_TRACE(count);
+    expect_refuses_damage<NlinkParser>(encode_node_frame3(1, 123456789, nodes));
+  }
+}
+
 /// Modules 7 (3 bytes for it) and 300 (none).
 std::vector<std::uint8_t> node_frame6() {
   auto frame = bytes_of(
