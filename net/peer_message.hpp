@@ -7,7 +7,8 @@
 ///              report's stamp i32 [ticks from sent]
 ///   tilt       stamp i32 [ticks], direction, sigma f32
 ///   echoes     count u8; peer u16, sent i64 [ns, peer's clock], age u32 [us before sent]
-///   imu        count u8, exponents i8 i8; stamp, gyro 3 x i16 * 2^e, acceleration 3 x i16 * 2^e
+///   imu        count u8, exponents i8 i8; stamp, gyro 3 x i16 * 2^e, acceleration 3 x i16 * 2^e;
+///              the oldest first
 ///   cameras    count u8; optical center 3 x f32
 ///   sources    count u8; neighbor u16, camera u8
 ///   bearings   count u8; stamp, source u8, direction, sigma u8 (logarithmic)

@@ -139,6 +139,7 @@ class Selection {
       left_out += imu.size() - kMaxImu;
       imu.resize(kMaxImu);
     }
+    std::reverse(imu.begin(), imu.end());  // in the order in which they were taken
     room_ -= imu.size() * kImuSize;
   }
 

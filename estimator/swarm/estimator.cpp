@@ -118,7 +118,7 @@ struct Estimator::State {
 };
 
 Outputs Estimator::State::on(const ImuSample& sample) {
-  if (!tilt_filter.add(sample) || !self.imu.push(sample)) {
+  if (!self.watch.accept(sample) || !tilt_filter.add(sample) || !self.imu.push(sample)) {
     ++refused_samples;
     return {};
   }

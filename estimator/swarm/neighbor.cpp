@@ -51,7 +51,7 @@ void Neighbor::take_range(const UwbRange& range, MeasurementKind kind) {
 void Neighbor::add_report(const ReceivedReport& received, const RobotState& self) {
   const Report& report = received.report;
   last_heard_ = std::max(last_heard_, report.stamp);
-  for (const ImuSample& sample : report.imu) body_.imu.push(sample);
+  for (const ImuSample& sample : report.imu) body_.add(sample);
   if (!body_.tilt || report.tilt.stamp > body_.tilt->stamp) body_.tilt = report.tilt;
   for (const UwbRange& range : report.ranges) {
     if (range.neighbor == self_id_) take_range(range, MeasurementKind::kPeerRange);
@@ -70,7 +70,8 @@ void Neighbor::take_peer_bearing(const Bearing& bearing, double clock_sigma_s,
   enqueue({bearing.stamp, MeasurementKind::kPeerBearing,
            DirectionReading{bearing.u_B, bearing.p_B_C, sigma}});
 
-  const bool wanted = settings_.profile == Profile::kPaper || needs_start(bearing.stamp);
+  const bool wanted = (settings_.profile == Profile::kPaper || needs_start(bearing.stamp)) &&
+                      !self.is_blind(bearing.stamp) && !body_.is_blind(bearing.stamp);
   if (!wanted) return;
   const auto result = sightings_.raw_pose(bearing, self, body_);
   if (const auto* raw = std::get_if<RawPose>(&result)) {
@@ -113,7 +114,7 @@ void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
                              pose.T_B_N.covariance};
     return;
   }
-  if (body_.imu.empty()) return;
+  if (body_.is_blind(stamp)) return;
   if (!track_ || !track_->is_certain()) {
     track_.emplace(stamp, pose, settings_);
     ++starts_;
@@ -139,7 +140,11 @@ void Neighbor::note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion)
 
 void Neighbor::tick(Timestamp now, const RobotState& self) {
   pose_.reset();
-  if (now - last_heard_ > settings_.forget) track_.reset();
+  // Bearings show neither robot's roll about the line between them: without an IMU, a filter holds
+  // what it cannot know for known.
+  if (now - last_heard_ > settings_.forget || self.is_blind(now) || body_.is_blind(now)) {
+    track_.reset();
+  }
   release(now, self);
   look_ahead(now, self);
   if (const auto calibration = keeps_records_ && track_ ? track_->calibration() : std::nullopt) {
@@ -226,8 +231,8 @@ std::optional<NeighborPose> Neighbor::improved_pose() const {
 NoPoseReason Neighbor::reason(Timestamp now, const RobotState& self) const {
   if (last_heard_ == kNever) return NoPoseReason::kNeverHeard;
   if (now - last_heard_ > kSilence) return NoPoseReason::kSilent;
-  if (self.imu.empty() || now - self.imu.newest().stamp > kSilence) return NoPoseReason::kNoOwnImu;
-  if (body_.imu.empty()) return NoPoseReason::kNoPeerImu;
+  if (self.is_blind(now)) return NoPoseReason::kNoOwnImu;
+  if (body_.is_blind(now)) return NoPoseReason::kNoPeerImu;
   if (!self.tilt || !body_.tilt) return NoPoseReason::kTiltUnknown;
   if (now - last_seen_ > kSilence) return NoPoseReason::kNotSeen;
   if (now - last_seen_by_ > kSilence) return NoPoseReason::kDoesNotSeeUs;

@@ -5,6 +5,7 @@
 
 #include "estimator/core/measurements.hpp"
 #include "estimator/relative/imu_history.hpp"
+#include "estimator/relative/imu_watch.hpp"
 
 namespace crepes {
 
@@ -12,6 +13,16 @@ namespace crepes {
 struct RobotState {
   ImuHistory imu;
   std::optional<Tilt> tilt;
+  ImuWatch watch{};
+
+  /// False for a sample that says nothing or is out of place.
+  bool add(const ImuSample& sample) { return watch.accept(sample) && imu.push(sample); }
+
+  /// Whether nothing is known of its turns at `t`: no samples of late, or wrong ones.
+  [[nodiscard]] bool is_blind(Timestamp t) const {
+    constexpr Duration kLongest = std::chrono::milliseconds{500};
+    return imu.empty() || t - imu.newest().stamp > kLongest || watch.is_at_its_end();
+  }
 
   /// The tilt carried to another instant, at most a second away, by the gyroscope. Empty without
   /// tilt or samples.

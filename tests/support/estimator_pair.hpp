@@ -21,9 +21,9 @@ struct Conditions {
   double decoy_rad = 0.0;      ///< our cameras see the neighbor's ring this far to the left instead
   double peer_turn_rad = 0.0;  ///< the neighbor's bearings of us point this far to the left
   bool peer_is_on = true;
-  std::function<ImuSample(const ImuSample&)> own_imu;  ///< what the IMU makes of the truth
-  std::function<ImuSample(const ImuSample&)> peer_imu;
-  std::function<void(UwbRange&)> range;
+  std::function<ImuSample(const ImuSample&)> own_imu{};  ///< what the IMU makes of the truth
+  std::function<ImuSample(const ImuSample&)> peer_imu{};
+  std::function<void(UwbRange&)> range{};
 };
 
 class EstimatorPair {

@@ -1,0 +1,63 @@
+#include "estimator/relative/imu_watch.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/random_geometry.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using test::RandomGeometry;
+
+/// Sample `i` of a body at rest, in steps of a coarse sensor: 1 mrad/s and 5 mm/s^2.
+ImuSample resting(RandomGeometry& random, int i) {
+  const auto stepped = [](const Eigen::Vector3d& v, double step) -> Eigen::Vector3d {
+    return step * (v / step).array().round();
+  };
+  return {Timestamp{i * 10ms}, stepped(random.vector(0.0026), 0.001),
+          Eigen::Vector3d(0, 0, 9.805) + stepped(random.vector(0.018), 0.005)};
+}
+
+TEST(ImuWatch, AcceptsACoarseSensorAtRestForAnHour) {
+  RandomGeometry random(1);
+  ImuWatch watch;
+  int refused = 0;
+  for (int i = 0; i < 360'000; ++i) refused += watch.accept(resting(random, i)) ? 0 : 1;
+
+  EXPECT_EQ(refused, 0);
+}
+
+TEST(ImuWatch, RefusesTheSameSixNumbersFromTheEleventhOn) {
+  RandomGeometry random(2);
+  ImuWatch watch;
+  ImuSample sample = resting(random, 0);
+  int accepted = 0;
+  for (int i = 0; i < 100; ++i) {
+    sample.stamp = Timestamp{i * 10ms};
+    accepted += watch.accept(sample) ? 1 : 0;
+  }
+
+  EXPECT_EQ(accepted, 10);
+  EXPECT_FALSE(watch.is_at_its_end());
+  EXPECT_TRUE(watch.accept(resting(random, 100)));
+}
+
+TEST(ImuWatch, RefusesAnAxisAtTheEndOfItsRangeWhileOthersMove) {
+  RandomGeometry random(3);
+  ImuWatch watch;
+  int accepted = 0;
+  for (int i = 0; i < 20; ++i) {
+    ImuSample sample = resting(random, i);
+    sample.gyro_radps.y() = -4.36;
+    accepted += watch.accept(sample) ? 1 : 0;
+  }
+
+  EXPECT_EQ(accepted, 4);
+  EXPECT_TRUE(watch.is_at_its_end());
+  EXPECT_TRUE(watch.accept(resting(random, 20)));
+  EXPECT_FALSE(watch.is_at_its_end());
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,229 @@
+// What goes wrong around a robot, and what its Estimator makes of it; properties over many seeds.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/support/estimator_pair.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using test::Conditions;
+using test::EstimatorPair;
+using test::RandomGeometry;
+
+constexpr std::uint64_t kSeeds = 20;
+constexpr Duration kWarmUp = 4s;
+
+/// What was published within a time, over all seeds.
+struct Tally {
+  int poses = 0;
+  int direct = 0;
+  int dishonest = 0;  ///< beyond the 99.9 % quantile of chi-square with six degrees of freedom
+  double worst_m = 0.0;
+  double worst_rad = 0.0;
+
+  void add(const EstimatorPair& pair, Duration from, Duration to) {
+    constexpr double kQuantile = 22.46;
+    for (const EstimatorPair::Found& found : pair.found()) {
+      if (found.at <= from || found.at > to) continue;
+      ++poses;
+      direct += found.pose.mode == PoseMode::kDirect ? 1 : 0;
+      dishonest += found.nees <= kQuantile ? 0 : 1;
+      worst_m = std::max(worst_m, found.error.head<3>().norm());
+      worst_rad = std::max(worst_rad, found.error.tail<3>().norm());
+    }
+  }
+  [[nodiscard]] double dishonest_share() const { return 1.0 * dishonest / std::max(1, poses); }
+};
+
+/// Runs a warm pair of each seed through `fault` and then for two seconds with nothing wrong.
+template <class Fault>
+struct Trials {
+  Tally during;
+  Tally after;
+  Tally settled;              ///< the last of the two seconds
+  Duration slowest_return{};  ///< to a measured pose
+  std::uint32_t restarts = 0;
+
+  explicit Trials(const Fault& fault) {
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      EstimatorPair pair(seed);
+      pair.run_for(kWarmUp);
+      const std::uint32_t starts = starts_of(pair);
+      fault(pair, seed);
+      const Duration over = pair.now();
+      pair.run_for(2s);
+      during.add(pair, kWarmUp, over);
+      after.add(pair, over, over + 2s);
+      settled.add(pair, over + 1s, over + 2s);
+      Duration back = 2s;
+      for (const EstimatorPair::Found& found : pair.found()) {
+        if (found.at <= over || found.pose.mode != PoseMode::kDirect) continue;
+        back = found.at - over;
+        break;
+      }
+      slowest_return = std::max(slowest_return, back);
+      restarts += starts_of(pair) - starts;
+    }
+  }
+
+ private:
+  /// Of the filter; there must be a pose.
+  static std::uint32_t starts_of(const EstimatorPair& pair) {
+    EXPECT_NE(pair.latest(), nullptr);
+    return pair.latest() == nullptr ? 0 : pair.latest()->pose.reset_counter;
+  }
+};
+
+TEST(EstimatorFaults, WithNothingWrongPosesAreHonest) {
+  const Trials plain([](EstimatorPair& pair, std::uint64_t) { pair.run_for(1s); });
+
+  EXPECT_EQ(plain.during.poses, static_cast<int>(kSeeds) * 50);
+  EXPECT_EQ(plain.restarts, 0U);
+  EXPECT_LE(plain.during.dishonest_share(), 0.01);
+  EXPECT_LT(plain.after.worst_m, 0.25);  // the range's bias of 0.05 m, four sigma, and some
+  EXPECT_LT(plain.after.worst_rad, 0.03);
+}
+
+/// The same numbers again and again, with stamps that go on.
+auto frozen() {
+  return [held = std::optional<ImuSample>()](const ImuSample& sample) mutable {
+    if (!held) held = sample;
+    return *held;
+  };
+}
+
+/// An accelerometer that reads the end of its range, 2 g.
+ImuSample at_its_end(const ImuSample& sample) {
+  ImuSample read = sample;
+  read.accel_mps2.z() = 2.0 * 9.80665;
+  return read;
+}
+
+/// No pose from half a second on, for this reason; as soon as the sensor speaks again, a new one.
+template <class Fault>
+void expect_unknown_for(NoPoseReason reason, const Fault& fault) {
+  const Trials trials([&](EstimatorPair& pair, std::uint64_t seed) {
+    const Conditions with = fault();
+    pair.run_for(750ms, with);
+    EXPECT_EQ(pair.latest(), nullptr) << seed;
+    EXPECT_EQ(pair.status().reason, reason) << seed;
+    pair.run_for(500ms, with);
+    EXPECT_EQ(pair.latest(), nullptr) << seed;
+  });
+
+  EXPECT_GT(trials.during.poses, static_cast<int>(kSeeds) * 20);
+  EXPECT_LE(trials.during.dishonest_share(), 0.01);
+  EXPECT_LE(trials.slowest_return, 500ms);
+  EXPECT_LE(trials.after.dishonest_share(), 0.01);
+}
+
+TEST(EstimatorFaults, AnImuThatHangsTakesThePoseAwayAndIsTold) {
+  expect_unknown_for(NoPoseReason::kNoOwnImu, [] { return Conditions{.own_imu = frozen()}; });
+}
+
+TEST(EstimatorFaults, APeersImuThatHangsTakesThePoseAwayAndIsTold) {
+  expect_unknown_for(NoPoseReason::kNoPeerImu, [] { return Conditions{.peer_imu = frozen()}; });
+}
+
+TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsTold) {
+  for (const bool own : {true, false}) {
+    const Trials trials([&](EstimatorPair& pair, std::uint64_t seed) {
+      Conditions with;
+      (own ? with.own_imu : with.peer_imu) = at_its_end;
+      pair.run_for(100ms, with);
+      EXPECT_EQ(pair.latest(), nullptr) << seed;
+      pair.run_for(650ms, with);
+      EXPECT_EQ(pair.latest(), nullptr) << seed;
+      EXPECT_EQ(pair.status().reason, own ? NoPoseReason::kNoOwnImu : NoPoseReason::kNoPeerImu);
+    });
+
+    EXPECT_LE(trials.slowest_return, 500ms);
+    // Our tilt starts anew from a single sample in flight, as wrong as the robot then accelerates.
+    EXPECT_LE(trials.after.dishonest_share(), 0.02);
+  }
+}
+
+TEST(EstimatorFaults, AfterTwoSecondsOutOfViewThePoseIsMeasuredAgainWithin200Milliseconds) {
+  const Trials trials(
+      [](EstimatorPair& pair, std::uint64_t) { pair.run_for(2s, {.in_view = false}); });
+
+  EXPECT_LE(trials.slowest_return, 200ms);
+  EXPECT_LE(trials.during.dishonest_share(), 0.01);  // predicted, from half a second on
+  EXPECT_LT(trials.during.direct, trials.during.poses / 3);
+  EXPECT_LE(trials.after.dishonest_share(), 0.01);
+  EXPECT_LT(trials.settled.worst_m, 0.25);
+  EXPECT_LT(trials.settled.worst_rad, 0.03);
+}
+
+TEST(EstimatorFaults, ANeighborThatRebootsWithAnotherClockIsBackWithinASecond) {
+  const Trials trials([](EstimatorPair& pair, std::uint64_t seed) {
+    pair.run_for(1500ms, {.peer_is_on = false});
+    EXPECT_EQ(pair.latest(), nullptr) << seed;
+    EXPECT_EQ(pair.status().reason, NoPoseReason::kNoPeerImu) << seed;
+    pair.reboot_peer(seed % 2 == 0 ? Duration{-3s} : Duration{1h});
+  });
+
+  EXPECT_LE(trials.slowest_return, 1s);
+  EXPECT_LE(trials.during.dishonest_share(), 0.01);
+  EXPECT_LE(trials.after.dishonest_share(), 0.01);
+  EXPECT_LT(trials.settled.worst_rad, 0.03);
+}
+
+TEST(EstimatorFaults, AnOwnClockThatJumpsAheadCostsASecond) {
+  const Trials trials([](EstimatorPair& pair, std::uint64_t) { pair.jump_own_clock(30s); });
+
+  EXPECT_LE(trials.slowest_return, 1s);
+  EXPECT_LE(trials.after.dishonest_share(), 0.01);
+  EXPECT_LT(trials.settled.worst_m, 0.25);
+}
+
+TEST(EstimatorFaults, RangesThroughWallsAreRefusedAndDoNoHarm) {
+  const Trials trials([](EstimatorPair& pair, std::uint64_t seed) {
+    RandomGeometry random(seed);
+    Conditions walls;
+    walls.range = [&random](UwbRange& range) {
+      if (random.uniform(0.0, 1.0) > 0.3) return;
+      range.range_m -= std::log(random.uniform(1e-6, 1.0));  // longer by a meter, exponentially
+      if (random.uniform(0.0, 1.0) < 0.5) range.first_path_dbm -= 12.0;
+    };
+    pair.run_for(4s, walls);
+    const auto gated = pair.count(MeasurementKind::kRange, Verdict::kGated);
+    EXPECT_GT(gated, 15U) << seed;  // 100 ranges, 30 of them long
+    EXPECT_LT(gated, 50U) << seed;
+  });
+
+  EXPECT_EQ(trials.restarts, 0U);
+  EXPECT_LE(trials.during.dishonest_share(), 0.01);
+  EXPECT_LT(trials.during.worst_m, 0.25);
+}
+
+TEST(EstimatorFaults, ANeighborThatTakesAnotherForUsForHalfASecondIsNotBelieved) {
+  const Trials trials([](EstimatorPair& pair, std::uint64_t seed) {
+    const auto before = pair.count(MeasurementKind::kPeerBearing, Verdict::kGated);
+    pair.run_for(500ms, {.peer_turn_rad = 0.5});
+    pair.run_for(500ms);
+    EXPECT_GE(pair.count(MeasurementKind::kPeerBearing, Verdict::kGated) - before, 24U) << seed;
+  });
+
+  EXPECT_EQ(trials.restarts, 0U);
+  EXPECT_LE(trials.during.dishonest_share(), 0.01);
+  EXPECT_LT(trials.during.worst_rad, 0.03);
+}
+
+TEST(EstimatorFaults, ABoardThatBlinksAnothersCodeForHalfASecondDoesLittleHarm) {
+  // 0.2 s pass until the decoy has the neighbor's ID.
+  const Trials trials(
+      [](EstimatorPair& pair, std::uint64_t) { pair.run_for(700ms, {.decoy_rad = 0.5}); });
+
+  EXPECT_LE(trials.during.dishonest_share(), 0.01);
+  EXPECT_LE(trials.after.dishonest_share(), 0.02);
+  EXPECT_LT(trials.settled.worst_m, 0.25);
+  EXPECT_LT(trials.settled.worst_rad, 0.03);
+}
+
+}  // namespace
+}  // namespace crepes
