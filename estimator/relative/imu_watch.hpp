@@ -41,7 +41,7 @@ class ImuWatch {
     };
     for (int i = 0; i < 3; ++i) {
       count(static_cast<std::size_t>(i), before.gyro_radps(i), sample.gyro_radps(i));
-      count(static_cast<std::size_t>(3 + i), before.accel_mps2(i), sample.accel_mps2(i));
+      count(3 + static_cast<std::size_t>(i), before.accel_mps2(i), sample.accel_mps2(i));
     }
   }
 
