@@ -35,10 +35,9 @@ OpenCamera real_camera(const Config& config, std::size_t index, const Clock& clo
   return [camera, number, &clock]() -> Result<std::unique_ptr<Camera>> {
     if (camera.driver == CameraDriver::kFolder)
       return FolderCamera::open(camera.folder, number, clock);
-    return open_device(camera, number, clock).map([&](std::unique_ptr<Camera> opened) {
-      return std::unique_ptr<Camera>(
-          std::make_unique<WatchedCamera>(std::move(opened), camera, clock));
-    });
+    Result<std::unique_ptr<Camera>> opened = open_device(camera, number, clock);
+    if (!opened) return opened;
+    return std::make_unique<WatchedCamera>(std::move(*opened), camera, clock);
   };
 }
 

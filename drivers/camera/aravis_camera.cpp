@@ -156,6 +156,8 @@ Result<void> set_up(ArvCamera* camera, const CameraConfig& config) {
       .and_then([&] { return set_light(camera, config); });
 }
 
+bool is_network_stream(ArvStream* stream) { return ARV_IS_GV_STREAM(stream) != 0; }
+
 /// What a packet socket would miss: it hears nothing on loopback.
 bool is_loopback(ArvCamera* camera) {
   GSocketAddress* address =
@@ -221,7 +223,7 @@ class Session {
     });
     if (!made) return tl::unexpected(made.error());
     stream_.reset(*made);
-    if (ARV_IS_GV_STREAM(stream_.get())) {
+    if (is_network_stream(stream_.get())) {
       // The kernel's default holds a tenth of a picture: packets would be lost. It cuts what it
       // does not allow, see net.core.rmem_max.
       const auto three_frames = static_cast<gint>(std::min<guint>(3 * *payload, 1U << 30U));
@@ -286,7 +288,7 @@ class AravisCamera final : public Camera {
       totals.emplace_back(name, arv_stream_get_info_uint64_by_name(stream, of_aravis));
     };
     add("underruns", "n_underruns");
-    if (!ARV_IS_GV_STREAM(stream)) return totals;
+    if (!is_network_stream(stream)) return totals;
     add("missing_packets", "n_missing_packets");
     add("resent_packets", "n_resent_packets");
     return totals;
@@ -357,13 +359,11 @@ class AravisCamera final : public Camera {
 
 Result<std::unique_ptr<Camera>> open_aravis_camera(const CameraConfig& config, std::uint8_t index,
                                                    const Clock& clock) {
-  return (config.device.empty() ? the_only_camera() : Result<std::string>(config.device))
-      .and_then([&](const std::string& device) {
-        return Session::open(device, config).map([&](std::shared_ptr<Session> session) {
-          return std::unique_ptr<Camera>(
-              std::make_unique<AravisCamera>(std::move(session), device, config, index, clock));
-        });
-      });
+  const Result<std::string> device = config.device.empty() ? the_only_camera() : config.device;
+  if (!device) return tl::unexpected(device.error());
+  Result<std::shared_ptr<Session>> session = Session::open(*device, config);
+  if (!session) return tl::unexpected(session.error());
+  return std::make_unique<AravisCamera>(std::move(*session), *device, config, index, clock);
 }
 
 std::vector<FoundCamera> find_aravis_cameras() {

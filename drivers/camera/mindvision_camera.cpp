@@ -69,13 +69,13 @@ class Session {
     return session->set_up(config).map([&] { return session; });
   }
 
-  int get_frame(MindVisionFrame& frame, std::uint8_t*& pixels, std::uint32_t timeout_ms) {
+  int get_frame(MindVisionFrame& frame, std::uint8_t*& pixels, std::uint32_t timeout_ms) const {
     return library_.get_frame(handle_, &frame, &pixels, timeout_ms);
   }
-  void release_frame(std::uint8_t* pixels) { library_.release_frame(handle_, pixels); }
+  void release_frame(std::uint8_t* pixels) const { library_.release_frame(handle_, pixels); }
 
  private:
-  Result<void> set_up(const CameraConfig& config) {
+  [[nodiscard]] Result<void> set_up(const CameraConfig& config) const {
     const bool free = config.trigger == CameraTrigger::kFree;
     return check(library_.set_trigger_mode(handle_, free ? kFreeRunning : kHardwareTrigger),
                  "trigger")
@@ -182,14 +182,14 @@ Result<std::unique_ptr<Camera>> open_mindvision_camera(const CameraConfig& confi
                                                        std::uint8_t index, const Clock& clock) {
   const Result<MindVisionLibrary> library = MindVisionLibrary::load(config.library);
   if (!library) return tl::unexpected(library.error());
-  return check(library->init(kEnglish), "CameraSdkInit")
-      .and_then([&] { return find_device(*library, config.device); })
-      .and_then(
-          [&](const MindVisionDevice& device) { return Session::open(*library, device, config); })
-      .map([&](std::shared_ptr<Session> session) {
-        return std::unique_ptr<Camera>(
-            std::make_unique<MindVisionCamera>(std::move(session), config, index, clock));
-      });
+  Result<std::shared_ptr<Session>> session =
+      check(library->init(kEnglish), "CameraSdkInit")
+          .and_then([&] { return find_device(*library, config.device); })
+          .and_then([&](const MindVisionDevice& device) {
+            return Session::open(*library, device, config);
+          });
+  if (!session) return tl::unexpected(session.error());
+  return std::make_unique<MindVisionCamera>(std::move(*session), config, index, clock);
 }
 
 }  // namespace crepes

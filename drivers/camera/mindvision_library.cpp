@@ -30,10 +30,11 @@ Result<MindVisionLibrary> MindVisionLibrary::load(const std::string& file) {
   // Never unloaded: it runs threads of its own.
   void* const handle = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
   if (handle == nullptr) {
+    const std::string why = ::dlerror();  // NOLINT(concurrency-mt-unsafe): glibc's is one a thread
     return fail(ErrorCode::kNotFound,
                 "MindVision's library cannot be loaded: install the vendor's SDK, or set library "
                 "to its file (" +
-                    std::string(::dlerror()) + ")");
+                    why + ")");
   }
   MindVisionLibrary library;
   Symbols symbols(handle);
@@ -48,9 +49,10 @@ Result<MindVisionLibrary> MindVisionLibrary::load(const std::string& file) {
   symbols.find("CameraSetExposureTime", library.set_exposure_us);
   symbols.find("CameraSetFrameRate", library.set_frame_rate);
   symbols.find("CameraSetTriggerMode", library.set_trigger_mode);
-  if (!symbols.missing().empty())
+  if (!symbols.missing().empty()) {
     return fail(ErrorCode::kFormat,
                 file + ": no library of MindVision, " + symbols.missing() + " is not in it");
+  }
   return library;
 }
 

@@ -320,10 +320,9 @@ Result<std::unique_ptr<Camera>> run_v4l2_camera(std::unique_ptr<V4l2Device> devi
                                                 const CameraConfig& config, std::uint8_t index,
                                                 const Clock& clock) {
   auto session = std::make_shared<Session>(std::move(device), config.device);
-  return session->start(config).map([&] {
-    return std::unique_ptr<Camera>(
-        std::make_unique<V4l2Camera>(std::move(session), config, index, clock));
-  });
+  if (Result<void> started = session->start(config); !started)
+    return tl::unexpected(started.error());
+  return std::make_unique<V4l2Camera>(std::move(session), config, index, clock);
 }
 
 }  // namespace crepes

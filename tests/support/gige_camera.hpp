@@ -7,8 +7,10 @@
 #include <sched.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <cstdint>
+#include <fstream>
 #include <functional>
 #include <memory>
 #include <string>
@@ -17,15 +19,32 @@
 
 namespace crepes {
 
-/// Moves this thread, and those that it starts from now on, to a network with nothing but loopback:
-/// GigE Vision's port is fixed. False where that is not allowed.
-inline bool enter_own_network() {
-  if (::unshare(CLONE_NEWNET) != 0 && ::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) return false;
+/// Who is not root may have a network within a world of users of its own, where it goes on being
+/// itself.
+inline bool become_user_of_own_world() {
+  const std::string user = std::to_string(::getuid());
+  const std::string group = std::to_string(::getgid());
+  if (::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) return false;
+  std::ofstream("/proc/self/uid_map") << user + " " + user + " 1";
+  std::ofstream("/proc/self/setgroups") << "deny";
+  std::ofstream("/proc/self/gid_map") << group + " " + group + " 1";
+  return true;
+}
+
+inline bool switch_loopback_on() {
   const UniqueFd socket{::socket(AF_INET, SOCK_DGRAM, 0)};
   ifreq request{.ifr_ifrn = {"lo"}, .ifr_ifru = {}};
   if (::ioctl(socket.get(), SIOCGIFFLAGS, &request) != 0) return false;
   request.ifr_flags |= IFF_UP;
   return ::ioctl(socket.get(), SIOCSIFFLAGS, &request) == 0;
+}
+
+/// Moves this thread, and those that it starts from now on, to a network with nothing but loopback:
+/// GigE Vision's port is fixed. Once for a process; false where that is not allowed.
+inline bool enter_own_network() {
+  static const bool kEntered =
+      (::unshare(CLONE_NEWNET) == 0 || become_user_of_own_world()) && switch_loopback_on();
+  return kEntered;
 }
 
 /// Plugged in from construction to destruction; serves one reader at the rate that it asks for.
