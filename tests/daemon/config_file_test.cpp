@@ -343,6 +343,22 @@ TEST(ConfigFile, SaysThatAFileIsNotThere) {
   EXPECT_EQ(load_config("/").error().message, "/: is a directory");
 }
 
+TEST(ConfigFile, RefusesWhatACamerasDriverCannotDo) {
+  const auto with = [](const std::string& keys) {
+    return faults_of(replaced("resolution: [1280, 1024]", "resolution: [1280, 1024]\n    " + keys));
+  };
+
+  EXPECT_EQ(with("exposure_us: 5000"),
+            "f:10: cameras[0].exposure_us: is longer than a frame at rate_hz");
+  EXPECT_EQ(with("exposure_us: 4999"), "");
+  EXPECT_EQ(with("driver: v4l2"), "f:7: cameras[0].device: driver v4l2 needs one, as /dev/video0");
+  EXPECT_NE(with("driver: v4l2\n    device: d\n    trigger: hardware").find(".trigger:"),
+            std::string::npos);
+  EXPECT_NE(with("driver: mindvision\n    gain: 2").find(".gain:"), std::string::npos);
+  EXPECT_NE(with("driver: mindvision\n    offset: [8, 0]").find(".offset:"), std::string::npos);
+  EXPECT_EQ(with("driver: aravis\n    trigger: hardware\n    gain: 2\n    offset: [8, 0]"), "");
+}
+
 TEST(ConfigFile, WritesWhatItReadsBackUnchanged) {
   const Config config = check_config_text(kGood, "f").config;
   const std::string written = write_config(config);
