@@ -26,7 +26,7 @@ for target in "${targets[@]}"; do
   grep -E '^Done|^stat::' "$work/log" || tail -1 "$work/log"
   # As few inputs as reach the same places.
   mkdir -p "$work/$target-kept"
-  "$programs/fuzz_$target" -merge=1 -max_len=600 "$work/$target-kept" "$work/$target" 2>/dev/null
+  "$programs/fuzz_$target" -merge=1 -max_len=300 "$work/$target-kept" "$work/$target" 2>/dev/null
   "$programs"/fuzz_corpus pack "$target" "$work/$target-kept"
   wc -lc "tests/fuzz/corpus/$target.hex"
 done

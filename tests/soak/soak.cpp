@@ -193,7 +193,7 @@ class Soak {
       if (!was_sent(range)) report_.wrong = "range " + std::to_string(range.range_m);
       if (stamp > ranges_known_to) ++report_.ranges;
       last_range_ = std::max(last_range_, stamp);
-      note(uwb_.heard(stamp, now));
+      note(uwb_.heard(stamp, now, imu_.well_since()));  // reports need an inertial sensor
     }
   }
 

@@ -90,11 +90,12 @@ void SoakDevice::send(Timestamp now) {
   line_->write(bytes);
 }
 
-std::optional<Recovery> SoakDevice::heard(Timestamp stamp, Timestamp now) {
+std::optional<Recovery> SoakDevice::heard(Timestamp stamp, Timestamp now, Timestamp told_since) {
   if (!recovering_ || mishap_ != Mishap::kNone || stamp < over_) return std::nullopt;
   recovering_ = false;
+  well_since_ = now;
   next_change_ = now + between(0.2, 1.5);
-  return Recovery{last_mishap_, now - over_};
+  return Recovery{last_mishap_, now - std::max(over_, told_since)};
 }
 
 std::optional<Duration> SoakDevice::waiting(Timestamp now) const {

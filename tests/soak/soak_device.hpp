@@ -46,10 +46,13 @@ class SoakDevice {
              Timestamp now);
 
   void step(Timestamp now);
-  /// A measurement with this stamp came out of the daemon; what it ended.
-  std::optional<Recovery> heard(Timestamp stamp, Timestamp now);
+  /// A measurement with this stamp came out of the daemon, which said nothing at all before
+  /// `told_since`; what it ended.
+  std::optional<Recovery> heard(Timestamp stamp, Timestamp now, Timestamp told_since = {});
   /// Whether mishaps begin.
   void stir(bool stirred) { is_calm_ = !stirred; }
+  /// When it last recovered.
+  [[nodiscard]] Timestamp well_since() const { return well_since_; }
   [[nodiscard]] bool is_well() const { return mishap_ == Mishap::kNone && !recovering_; }
   /// How long the last mishap is over without a measurement; empty: all is well.
   [[nodiscard]] std::optional<Duration> waiting(Timestamp now) const;
@@ -71,6 +74,7 @@ class SoakDevice {
   Timestamp next_frame_{};
   Timestamp next_change_{};
   Timestamp over_{};  ///< when the last mishap ended
+  Timestamp well_since_{};
   Duration period_{};
   std::uint32_t number_ = 0;
   Mishap mishap_ = Mishap::kNone;

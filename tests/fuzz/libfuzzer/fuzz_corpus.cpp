@@ -24,7 +24,7 @@ void unpack(const FuzzTarget& target, const fs::path& directory) {
 }
 
 void pack(const FuzzTarget& target, const fs::path& directory) {
-  constexpr std::size_t kLongest = 600;
+  constexpr std::size_t kLongest = 300;
   std::vector<FuzzInput> inputs;
   for (const auto& entry : fs::directory_iterator(directory)) {
     std::ifstream file(entry.path(), std::ios::binary);
