@@ -20,7 +20,7 @@ using namespace nlohmann::literals;
 
 using std::chrono::seconds;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(__SANITIZE_ADDRESS__)
 constexpr bool kIsSlow = true;  // a tenth of the pace: a picture of a quarter of the pixels then
 #else
 constexpr bool kIsSlow = false;
@@ -29,6 +29,9 @@ constexpr bool kIsSlow = false;
 class LiveCamera : public LiveDaemon {
  protected:
   void SetUp() override {
+#if defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "Aravis is not instrumented: how it hands buffers over looks like a race";
+#endif
     if (!enter_own_network()) GTEST_SKIP() << "no right to a network of our own";
     simulated_ = pair_config(1, mesh_port_);
     if (!kIsSlow) {
