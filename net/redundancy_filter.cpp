@@ -26,7 +26,9 @@ void RedundancyFilter::apply(PeerReport& report) {
                     [](const auto& sample) { return std::tuple{to_ns(sample.stamp)}; });
   keep_first_copies(report.bearings, bearings_, forget_before, [](const auto& bearing) {
     const Eigen::Vector3d& p = bearing.p_B_C;
-    return BearingKey{to_ns(bearing.stamp), bearing.neighbor, p.x(), p.y(), p.z()};
+    const Eigen::Vector3d& u = bearing.u_B;
+    return BearingKey{
+        to_ns(bearing.stamp), bearing.neighbor, {p.x(), p.y(), p.z(), u.x(), u.y(), u.z()}};
   });
   const auto stamp_and_neighbor = [](const auto& item) {
     return std::tuple{to_ns(item.stamp), item.neighbor};

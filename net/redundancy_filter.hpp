@@ -1,6 +1,7 @@
 /// Senders repeat recent measurements because datagrams get lost; this passes each one once.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <set>
 #include <tuple>
@@ -17,7 +18,8 @@ class RedundancyFilter {
 
  private:
   using Time = std::int64_t;
-  using BearingKey = std::tuple<Time, RobotId, double, double, double>;  ///< camera by its position
+  /// A board and its mirror image differ by their direction alone.
+  using BearingKey = std::tuple<Time, RobotId, std::array<double, 6>>;  ///< camera and direction
 
   std::set<std::tuple<Time>> imu_;
   std::set<BearingKey> bearings_;

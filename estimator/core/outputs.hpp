@@ -119,8 +119,9 @@ struct Fusion {
   static constexpr std::size_t kMaxDimension = 9;
 
   Verdict verdict = Verdict::kDegenerate;
-  double nis = 0.0;           ///< residual^T S^-1 residual, before the correction
-  std::size_t dimension = 0;  ///< of the residual; 0 where there was none
+  double nis = 0.0;             ///< residual^T S^-1 residual, before the correction
+  double log_likelihood = 0.0;  ///< ln of the residual's density, -(NIS + ln |2 pi S|) / 2
+  std::size_t dimension = 0;    ///< of the residual; 0 where there was none
   std::array<double, kMaxDimension> residual{};  ///< bearings [rad], ranges [m], poses p, theta
   std::array<double, kMaxDimension> sigma{};     ///< roots of S's diagonal
 };

@@ -3,6 +3,8 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <cmath>
+#include <numbers>
 #include <tuple>
 
 #include "estimator/core/outputs.hpp"
@@ -20,7 +22,8 @@ struct Innovation {
 template <int M, int N>
 struct UpdateOutcome {
   Verdict verdict = Verdict::kDegenerate;
-  double nis = 0.0;  ///< residual^T S^-1 residual
+  double nis = 0.0;             ///< residual^T S^-1 residual
+  double log_likelihood = 0.0;  ///< -(NIS + ln |2 pi S|) / 2
   Eigen::Matrix<double, M, 1> sigma = Eigen::Matrix<double, M, 1>::Zero();  ///< sqrt(S_ii)
   Eigen::Matrix<double, N, 1> correction = Eigen::Matrix<double, N, 1>::Zero();
   Eigen::Matrix<double, N, M> K = Eigen::Matrix<double, N, M>::Zero();
@@ -43,6 +46,8 @@ template <int M, int N>
   if (S_chol.info() != Eigen::Success) return {};
   UpdateOutcome<M, N> outcome;
   outcome.nis = z.residual.dot(S_chol.solve(z.residual));
+  const double log_det = 2.0 * S_chol.matrixLLT().diagonal().array().log().sum();
+  outcome.log_likelihood = -0.5 * (outcome.nis + log_det + M * std::log(2.0 * std::numbers::pi));
   outcome.sigma = S.diagonal().cwiseSqrt();
   if (!(outcome.nis <= gate_nis)) {
     outcome.verdict = Verdict::kGated;
@@ -82,8 +87,12 @@ template <int M, int N>
 /// What there is to tell of an update.
 template <int M, int N>
 [[nodiscard]] Fusion fusion_of(const Innovation<M, N>& z, const UpdateOutcome<M, N>& outcome) {
-  Fusion fusion{
-      .verdict = outcome.verdict, .nis = outcome.nis, .dimension = M, .residual{}, .sigma{}};
+  Fusion fusion{.verdict = outcome.verdict,
+                .nis = outcome.nis,
+                .log_likelihood = outcome.log_likelihood,
+                .dimension = M,
+                .residual{},
+                .sigma{}};
   Eigen::Matrix<double, M, 1>::Map(fusion.residual.data()) = z.residual;
   Eigen::Matrix<double, M, 1>::Map(fusion.sigma.data()) = outcome.sigma;
   return fusion;

@@ -1,5 +1,8 @@
 #include "estimator/relative/neighbor_filter.hpp"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <type_traits>
@@ -129,6 +132,38 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
   if (is_far) reset(so3_right_jacobian(theta), P_);
   inject(outcome.correction, state_);
   return fusion;
+}
+
+// The error along one axis of the attitude, a, takes the others with it: x = g a + rest, g = P a /
+// s^2. Parts are moved along g, and narrower in it.
+std::vector<NeighborFilter::Part> NeighborFilter::split() const {
+  constexpr double kNarrow = 0.03;  // rad
+  constexpr double kSpacing = 1.5;  // in sigmas of a part: without a ripple in their sum
+  constexpr double kReach = 2.5;    // in sigmas of the whole
+  constexpr int kMaxSide = 8;
+
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> attitude;
+  attitude.computeDirect(P_.block<3, 3>(E::kTheta, E::kTheta));
+  const double variance = attitude.eigenvalues()(2);
+  const double sigma = std::sqrt(variance);
+  if (!(sigma > kNarrow)) return {{*this}};
+
+  const double narrow = std::max(kNarrow, kReach * sigma / (kSpacing * kMaxSide));
+  const double cut = variance - narrow * narrow;  // variance of the parts' centers
+  const int side = static_cast<int>(std::ceil(kReach * std::sqrt(cut) / (kSpacing * narrow)));
+  const Eigen::Vector3d axis = attitude.eigenvectors().col(2);
+  const E::Vector g = P_.middleCols<3>(E::kTheta) * axis / variance;
+
+  std::vector<Part> parts;
+  for (int i = -side; i <= side; ++i) {
+    const double angle = i * kSpacing * narrow;
+    Part part{*this, -0.5 * angle * angle / cut};
+    part.filter.P_ -= cut * g * g.transpose();
+    reset(so3_right_jacobian(angle * axis), part.filter.P_);
+    inject(angle * g, part.filter.state_);
+    parts.push_back(part);
+  }
+  return parts;
 }
 
 Fusion NeighborFilter::fuse_bearing(const DirectionReading& z, const Eigen::Vector3d& p_N_M,

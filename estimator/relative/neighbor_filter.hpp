@@ -1,6 +1,8 @@
 /// The tight filter of one neighbor: every measurement by itself, at its own time.
 #pragma once
 
+#include <vector>
+
 #include "estimator/core/outputs.hpp"
 #include "estimator/relative/error_state.hpp"
 #include "estimator/relative/imu_history.hpp"
@@ -55,6 +57,11 @@ class NeighborFilter {
                     const Eigen::Vector3d& p_N_Q, double gate_nis);
   Fusion fuse_pose(const GaussianPose& T_B_N, double gate_nis);
 
+  struct Part;
+  /// As Gaussians that are narrow enough for one linearization each, the attitude cut across its
+  /// most uncertain axis; their weighted sum is about the whole.
+  [[nodiscard]] std::vector<Part> split() const;
+
   [[nodiscard]] const RelativeMotion& motion() const { return state_.motion; }
   [[nodiscard]] const NominalState& state() const { return state_; }
   [[nodiscard]] const ErrorState::Covariance& covariance() const { return P_; }
@@ -70,6 +77,11 @@ class NeighborFilter {
   NominalState state_;
   ErrorState::Covariance P_ = ErrorState::Covariance::Zero();
   ProcessNoise noise_;
+};
+
+struct NeighborFilter::Part {
+  NeighborFilter filter;
+  double log_weight = 0.0;  ///< up to a constant
 };
 
 }  // namespace crepes

@@ -5,6 +5,13 @@
 
 namespace crepes {
 
+std::span<const Measurement> leading_group(std::span<const Measurement> ordered) {
+  const auto end = std::find_if(ordered.begin(), ordered.end(), [&](const Measurement& m) {
+    return m.stamp != ordered.front().stamp || m.kind != ordered.front().kind;
+  });
+  return {ordered.begin(), end};
+}
+
 bool EventSequencer::push(Measurement measurement) {
   if (measurement.stamp < released_) return false;
   const auto place = std::upper_bound(
@@ -18,12 +25,13 @@ bool EventSequencer::push(Measurement measurement) {
   return true;
 }
 
-std::optional<Measurement> EventSequencer::pop_ready(Timestamp now) {
-  if (pending_.empty() || pending_.front().stamp > now - lag_) return std::nullopt;
-  Measurement oldest = std::move(pending_.front());
-  pending_.erase(pending_.begin());
-  released_ = oldest.stamp;
-  return oldest;
+std::span<const Measurement> EventSequencer::pop_ready(Timestamp now) {
+  if (pending_.empty() || pending_.front().stamp > now - lag_) return {};
+  released_ = pending_.front().stamp;
+  const auto count = static_cast<std::ptrdiff_t>(leading_group(pending_).size());
+  ready_.assign(pending_.begin(), pending_.begin() + count);
+  pending_.erase(pending_.begin(), pending_.begin() + count);
+  return ready_;
 }
 
 }  // namespace crepes

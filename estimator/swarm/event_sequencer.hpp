@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
+#include <span>
 #include <variant>
 #include <vector>
 
@@ -12,12 +12,22 @@
 
 namespace crepes {
 
-/// One reading that a neighbor's filter can be corrected with.
+/// A raw pose and the two bearings that it came from.
+struct MutualStart {
+  RawPose raw;
+  DirectionReading bearing;
+  DirectionReading peer_bearing;
+};
+
+/// One reading that a neighbor's filter can be started or corrected with.
 struct Measurement {
   Timestamp stamp{};
   MeasurementKind kind = MeasurementKind::kBearing;
-  std::variant<DirectionReading, RangeReading, RawPose, GaussianPose> reading;
+  std::variant<DirectionReading, RangeReading, MutualStart, GraphPose> reading;
 };
+
+/// The leading ones of one kind and instant: candidates, of which at most one is true.
+[[nodiscard]] std::span<const Measurement> leading_group(std::span<const Measurement> ordered);
 
 /// Waits `lag` for late data: what has waited so long is released in order, what comes later is
 /// refused. Bounded: beyond `kCapacity` the oldest is dropped and counted.
@@ -30,8 +40,9 @@ class EventSequencer {
   /// False if the stamp lies before what was released already.
   bool push(Measurement measurement);
 
-  /// The oldest measurement with a stamp of at most `now - lag`.
-  [[nodiscard]] std::optional<Measurement> pop_ready(Timestamp now);
+  /// The oldest group with a stamp of at most `now - lag`, or nothing. It stays until the next
+  /// call.
+  [[nodiscard]] std::span<const Measurement> pop_ready(Timestamp now);
 
   /// What still waits, oldest first.
   [[nodiscard]] const std::vector<Measurement>& pending() const { return pending_; }
@@ -42,6 +53,7 @@ class EventSequencer {
   Duration lag_;
   Timestamp released_ = Timestamp::min();
   std::vector<Measurement> pending_;
+  std::vector<Measurement> ready_;
   std::uint64_t dropped_ = 0;
 };
 

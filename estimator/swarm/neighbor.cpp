@@ -10,6 +10,9 @@ namespace {
 constexpr Duration kMaxAge = std::chrono::milliseconds{20};  // of a published state
 constexpr Duration kMaxBehind = std::chrono::seconds{1};
 constexpr Duration kSilence = std::chrono::seconds{2};
+// The tight filter takes the bearings of its raw pose once more, by themselves: what the raw pose
+// says of them must not count.
+constexpr double kLooseBearing = 0.05;  // rad
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
 
 }  // namespace
@@ -20,9 +23,12 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
       self_id_(self.id),
       mounting_{self.p_body_led, self.p_body_uwb, neighbor.p_body_led, neighbor.p_body_uwb},
       settings_(settings),
-      sightings_(self, neighbor, settings.priors.misalignment_rad,
-                 std::hypot(settings.range_sigma_m, settings.priors.range_bias_m)),
-      sequencer_(settings.lag) {
+      sightings_(
+          self, neighbor,
+          settings.profile == Profile::kTight ? kLooseBearing : settings.priors.misalignment_rad,
+          std::hypot(settings.range_sigma_m, settings.priors.range_bias_m)),
+      sequencer_(settings.lag),
+      hypotheses_(settings, mounting_) {
   status_.neighbor = neighbor.id;
   status_.name = neighbor.name;
 }
@@ -70,58 +76,34 @@ void Neighbor::take_peer_bearing(const Bearing& bearing, double clock_sigma_s,
   enqueue({bearing.stamp, MeasurementKind::kPeerBearing,
            DirectionReading{bearing.u_B, bearing.p_B_C, sigma}});
 
-  const bool wanted = (settings_.profile == Profile::kPaper || needs_start(bearing.stamp)) &&
-                      !self.is_blind(bearing.stamp) && !body_.is_blind(bearing.stamp);
-  if (!wanted) return;
-  const auto result = sightings_.raw_pose(bearing, self, body_);
-  if (const auto* raw = std::get_if<RawPose>(&result)) {
+  sightings_.add_peer(bearing);
+  const bool wanted =
+      settings_.profile == Profile::kPaper || hypotheses_.wants_start(bearing.stamp);
+  if (!wanted || self.is_blind(bearing.stamp) || body_.is_blind(bearing.stamp)) return;
+  const auto result = sightings_.starts(bearing, self, body_);
+  if (const auto* starts = std::get_if<std::vector<MutualStart>>(&result)) {
     raw_reason_ = NoPoseReason::kNone;
-    start_or_feed(bearing.stamp, *raw);
+    for (const MutualStart& start : *starts)
+      enqueue({bearing.stamp, MeasurementKind::kRawPose, start});
   } else {
     raw_reason_ = std::get<NoPoseReason>(result);
     note(bearing.stamp, MeasurementKind::kRawPose, {.verdict = Verdict::kDegenerate});
   }
 }
 
-bool Neighbor::needs_start(Timestamp stamp) const {
-  if (!track_ || !track_->is_certain() || track_->has_lost_its_way()) return true;
-  // Seen and refused ever since, while raw poses are there: the filter has lost its way.
-  return stamp - track_->last_sighting() > kPatience + settings_.lag;
-}
-
-void Neighbor::start_or_feed(Timestamp stamp, const RawPose& raw) {
-  if (needs_start(stamp)) {
-    if (track_ && stamp <= track_->stamp()) return;
-    track_.emplace(stamp, raw, settings_);
-    correction_.reset();
-    ++starts_;
-    note(stamp, MeasurementKind::kRawPose, {.verdict = Verdict::kFused});
-    return;
-  }
-  if (settings_.profile == Profile::kPaper) {
-    enqueue({stamp, MeasurementKind::kRawPose, raw});
-  }
-}
-
 void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
   const bool sighted =
-      track_ && stamp - track_->last_sighting() <= settings_.recent + settings_.lag;
-  if (sighted) {
-    // The graph rests on this filter's own edge: fusing it back would count that twice. It is laid
-    // over what is published instead.
-    if (!pose_ || pose_->stamp < stamp) return;
-    correction_ = Correction{stamp, pose_difference(pose_->T_B_N.pose, pose.T_B_N.pose),
-                             pose.T_B_N.covariance};
+      !hypotheses_.empty() &&
+      stamp - hypotheses_.leader().heaviest().last_sighting() <= settings_.recent + settings_.lag;
+  if (!sighted) {
+    if (!body_.is_blind(stamp)) enqueue({stamp, MeasurementKind::kGraphPose, pose});
     return;
   }
-  if (body_.is_blind(stamp)) return;
-  if (!track_ || !track_->is_certain()) {
-    track_.emplace(stamp, pose, settings_);
-    ++starts_;
-    note(stamp, MeasurementKind::kGraphPose, {.verdict = Verdict::kFused});
-    return;
-  }
-  enqueue({stamp, MeasurementKind::kGraphPose, pose.T_B_N});
+  // The graph rests on this filter's own edge: fusing it back would count that twice. It is laid
+  // over what is published instead.
+  if (!pose_ || pose_->stamp < stamp) return;
+  correction_ =
+      Correction{stamp, pose_difference(pose_->T_B_N.pose, pose.T_B_N.pose), pose.T_B_N.covariance};
 }
 
 void Neighbor::enqueue(Measurement measurement) {
@@ -143,50 +125,81 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
   // Bearings show neither robot's roll about the line between them: without an IMU, a filter holds
   // what it cannot know for known.
   if (now - last_heard_ > settings_.forget || self.is_blind(now) || body_.is_blind(now)) {
-    track_.reset();
+    hypotheses_.clear();
   }
   release(now, self);
   look_ahead(now, self);
-  if (const auto calibration = keeps_records_ && track_ ? track_->calibration() : std::nullopt) {
-    records_.calibrations.push_back(*calibration);
-    records_.calibrations.back().neighbor = member_.id;
+  if (keeps_records_ && !hypotheses_.empty()) {
+    if (const auto calibration = hypotheses_.leader().heaviest().calibration()) {
+      records_.calibrations.push_back(*calibration);
+      records_.calibrations.back().neighbor = member_.id;
+    }
   }
   reason_ = pose_ ? NoPoseReason::kNone : reason(now, self);
 }
 
 void Neighbor::release(Timestamp now, const RobotState& self) {
-  while (const auto measurement = sequencer_.pop_ready(now)) {
-    const bool usable =
-        track_ && measurement->stamp >= track_->stamp() && !self.imu.empty() && !body_.imu.empty();
-    if (!usable) {
-      note(measurement->stamp, measurement->kind, {.verdict = Verdict::kNoState});
+  const bool can_move = !self.imu.empty() && !body_.imu.empty();
+  for (auto group = sequencer_.pop_ready(now); !group.empty(); group = sequencer_.pop_ready(now)) {
+    const Measurement& first = group.front();
+    const bool is_late = !hypotheses_.empty() && first.stamp < hypotheses_.stamp();
+    if (can_move && !is_late) hypotheses_.advance_to(first.stamp, self.imu, body_.imu);
+    if (can_move && !is_late && is_a_start(first)) {
+      for (const Measurement& measurement : group) start(measurement);
       continue;
     }
-    track_->advance_to(measurement->stamp, self.imu, body_.imu);
-    note(measurement->stamp, measurement->kind,
-         track_->fuse(*measurement, mounting_, settings_.gates));
+    const bool usable = can_move && !is_late && !hypotheses_.empty();
+    const Association association =
+        usable ? hypotheses_.fuse(group) : Association{.fusion{.verdict = Verdict::kNoState}};
+    const Fusion other{.verdict = usable ? Verdict::kGated : Verdict::kNoState};
+    for (std::size_t i = 0; i < group.size(); ++i)
+      note(first.stamp, first.kind, i == association.chosen ? association.fusion : other);
   }
+  hypotheses_.settle();
   // Without readings the filter follows all the same: no further behind than IMU samples are kept,
   // and looking ahead costs no more as a silence grows.
   const Timestamp latest_start = now - settings_.lag - kMaxBehind;
-  if (track_ && track_->stamp() < latest_start && !self.imu.empty() && !body_.imu.empty()) {
-    track_->advance_to(latest_start, self.imu, body_.imu);
-  }
+  if (can_move && !hypotheses_.empty() && hypotheses_.stamp() < latest_start)
+    hypotheses_.advance_to(latest_start, self.imu, body_.imu);
+}
+
+bool Neighbor::is_a_start(const Measurement& measurement) const {
+  if (measurement.kind == MeasurementKind::kRawPose)
+    return settings_.profile == Profile::kTight || hypotheses_.wants_start(measurement.stamp);
+  return measurement.kind == MeasurementKind::kGraphPose &&
+         (hypotheses_.empty() || !hypotheses_.leader().heaviest().is_certain());
+}
+
+void Neighbor::start(const Measurement& measurement) {
+  const auto* mutual = std::get_if<MutualStart>(&measurement.reading);
+  const bool started =
+      mutual == nullptr
+          ? hypotheses_.start(measurement.stamp, std::get<GraphPose>(measurement.reading))
+          : hypotheses_.start(measurement.stamp, *mutual);
+  if (started) note(measurement.stamp, measurement.kind, {.verdict = Verdict::kFused});
 }
 
 void Neighbor::look_ahead(Timestamp now, const RobotState& self) {
-  if (!track_ || self.imu.empty() || body_.imu.empty()) return;
+  if (!hypotheses_.is_settled() || self.imu.empty() || body_.imu.empty()) return;
   const Timestamp state_time = std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
-  if (track_->stamp() > state_time) return;
-  NeighborTrack head = *track_;
-  for (const Measurement& measurement : sequencer_.pending()) {
-    if (measurement.stamp > state_time) break;
-    if (measurement.stamp < head.stamp()) continue;
-    head.advance_to(measurement.stamp, self.imu, body_.imu);
-    static_cast<void>(head.fuse(measurement, mounting_, settings_.gates));
+  if (hypotheses_.stamp() > state_time) return;
+  NeighborTrack head = hypotheses_.leader().heaviest();
+  for (std::span rest(sequencer_.pending()); !rest.empty() && rest.front().stamp <= state_time;) {
+    const auto group = leading_group(rest);
+    rest = rest.subspan(group.size());
+    const Timestamp stamp = group.front().stamp;
+    if (stamp < head.stamp()) continue;
+    head.advance_to(stamp, self.imu, body_.imu);
+    static_cast<void>(
+        head.fuse(group[head.likeliest(group, mounting_)], mounting_, settings_.gates));
   }
   head.advance_to(state_time, self.imu, body_.imu);
-  if (!head.is_certain()) return;
+  const GaussianPose T_B_N = hypotheses_.leader().mean(head.pose());
+  if (!is_certain(T_B_N.covariance)) return;
+  if (hypotheses_.generation() != std::exchange(generation_, hypotheses_.generation())) {
+    ++starts_;
+    correction_.reset();
+  }
 
   const auto is_recent = [&](Timestamp t) { return state_time - t <= settings_.recent; };
   const Timestamp graph = head.last(MeasurementKind::kGraphPose);
@@ -198,7 +211,7 @@ void Neighbor::look_ahead(Timestamp now, const RobotState& self) {
   pose.mode = sighted            ? PoseMode::kDirect
               : is_recent(graph) ? PoseMode::kGraph
                                  : PoseMode::kPredicted;
-  pose.T_B_N = head.pose();
+  pose.T_B_N = T_B_N;
   pose.v_B_N = head.motion().v_B_N;
   const Timestamp range =
       std::max(head.last(MeasurementKind::kRange), head.last(MeasurementKind::kPeerRange));

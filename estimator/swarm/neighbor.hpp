@@ -9,7 +9,7 @@
 #include "estimator/core/outputs.hpp"
 #include "estimator/swarm/event_sequencer.hpp"
 #include "estimator/swarm/filter_settings.hpp"
-#include "estimator/swarm/neighbor_track.hpp"
+#include "estimator/swarm/hypotheses.hpp"
 #include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/sighting_log.hpp"
 
@@ -49,12 +49,12 @@ class Neighbor {
  private:
   void take_range(const UwbRange& range, MeasurementKind kind);
   void take_peer_bearing(const Bearing& bearing, double clock_sigma_s, const RobotState& self);
-  void start_or_feed(Timestamp stamp, const RawPose& raw);
   void enqueue(Measurement measurement);
   void note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion);
   void release(Timestamp now, const RobotState& self);
   void look_ahead(Timestamp now, const RobotState& self);
-  [[nodiscard]] bool needs_start(Timestamp stamp) const;
+  void start(const Measurement& measurement);
+  [[nodiscard]] bool is_a_start(const Measurement& measurement) const;
   [[nodiscard]] NoPoseReason reason(Timestamp now, const RobotState& self) const;
 
   MemberConfig member_;
@@ -65,7 +65,8 @@ class Neighbor {
   RobotState body_;
   SightingLog sightings_;
   EventSequencer sequencer_;
-  std::optional<NeighborTrack> track_;
+  Hypotheses hypotheses_;
+  std::uint32_t generation_ = 0;  ///< of the hypothesis that was published last
   std::uint32_t starts_ = 0;
 
   // What the last tick found.

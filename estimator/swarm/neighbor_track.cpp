@@ -40,7 +40,7 @@ Fusion fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounti
       return filter.fuse_range(std::get<RangeReading>(m.reading), mounting.p_B_U, mounting.p_N_Q,
                                gates.range);
     case MeasurementKind::kGraphPose:
-      return filter.fuse_pose(std::get<GaussianPose>(m.reading), gates.pose);
+      return filter.fuse_pose(std::get<GraphPose>(m.reading).T_B_N, gates.pose);
     case MeasurementKind::kRawPose:
       break;
   }
@@ -49,13 +49,18 @@ Fusion fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounti
 
 Fusion fuse_paper(PaperFilter& filter, const Measurement& m, const Gates& gates) {
   if (m.kind == MeasurementKind::kRawPose) {
-    return filter.fuse(std::get<RawPose>(m.reading), gates.raw_pose);
+    return filter.fuse(std::get<MutualStart>(m.reading).raw, gates.raw_pose);
   }
   CREPES_EXPECT(m.kind == MeasurementKind::kGraphPose, "the paper's filter takes poses only");
-  return filter.fuse(std::get<GaussianPose>(m.reading), gates.pose);
+  return filter.fuse(std::get<GraphPose>(m.reading).T_B_N, gates.pose);
 }
 
 }  // namespace
+
+bool is_certain(const Matrix6d& covariance) {
+  return covariance.allFinite() && largest_sigma(covariance.topLeftCorner<3, 3>()) <= kMaxSigma &&
+         largest_sigma(covariance.bottomRightCorner<3, 3>()) <= kMaxAttitudeSigma;
+}
 
 NeighborTrack::NeighborTrack(Timestamp stamp, const RawPose& first, const FilterSettings& settings)
     : filter_(make_filter(stamp, first, settings)) {
@@ -94,6 +99,34 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
   return fusion;
 }
 
+std::size_t NeighborTrack::likeliest(std::span<const Measurement> candidates,
+                                     const PairMounting& mounting) const {
+  const auto* tight = std::get_if<NeighborFilter>(&filter_);
+  if (candidates.size() == 1 || tight == nullptr) return 0;
+  NeighborFilter asked = *tight;
+  std::size_t best = 0;
+  double least_nis = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Fusion fusion = fuse_tight(asked, candidates[i], mounting, Gates{});  // nothing passes
+    if (fusion.verdict == Verdict::kGated && fusion.nis < least_nis) {
+      least_nis = fusion.nis;
+      best = i;
+    }
+  }
+  return best;
+}
+
+std::vector<NeighborTrack::Part> NeighborTrack::split() const {
+  const auto* tight = std::get_if<NeighborFilter>(&filter_);
+  if (tight == nullptr) return {{*this}};
+  std::vector<Part> parts;
+  for (const NeighborFilter::Part& part : tight->split()) {
+    parts.push_back({*this, part.log_weight});
+    parts.back().track.filter_ = part.filter;
+  }
+  return parts;
+}
+
 RelativeMotion NeighborTrack::motion() const {
   return std::visit([](const auto& filter) { return filter.motion(); }, filter_);
 }
@@ -122,12 +155,6 @@ std::optional<CalibrationRecord> NeighborTrack::calibration() const {
     record.sigma.at(k) = std::sqrt(tight->covariance()(row, row));
   }
   return record;
-}
-
-bool NeighborTrack::is_certain() const {
-  const Matrix6d P = pose().covariance;
-  return P.allFinite() && largest_sigma(P.topLeftCorner<3, 3>()) <= kMaxSigma &&
-         largest_sigma(P.bottomRightCorner<3, 3>()) <= kMaxAttitudeSigma;
 }
 
 Timestamp NeighborTrack::last_sighting() const {

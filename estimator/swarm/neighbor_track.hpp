@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <variant>
+#include <vector>
 
 #include "estimator/relative/neighbor_filter.hpp"
 #include "estimator/relative/paper_filter.hpp"
@@ -26,7 +28,10 @@ struct PairMounting {
 inline constexpr Timestamp kNever{Duration{std::numeric_limits<std::int64_t>::min() / 4}};
 
 /// A filter whose sightings were all refused for so long is wrong, not unlucky.
-inline constexpr Duration kPatience = std::chrono::milliseconds{500};
+inline constexpr Duration kPatience = std::chrono::milliseconds{250};
+
+/// At most 1 m and 20 deg, one sigma, in any direction.
+[[nodiscard]] bool is_certain(const Matrix6d& covariance);
 
 /// A value: copies are used to look ahead over readings that still wait for late ones.
 class NeighborTrack {
@@ -36,13 +41,20 @@ class NeighborTrack {
 
   [[nodiscard]] Timestamp stamp() const;
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
+  /// The one of some readings of the same kind, taken at `stamp()`, that is nearest to what this
+  /// filter expects. Of poses the first.
+  [[nodiscard]] std::size_t likeliest(std::span<const Measurement> candidates,
+                                      const PairMounting& mounting) const;
   /// Corrects with a reading taken at `stamp()`.
   Fusion fuse(const Measurement& measurement, const PairMounting& mounting, const Gates& gates);
 
+  struct Part;
+  /// NeighborFilter::split; the paper's filter is one part.
+  [[nodiscard]] std::vector<Part> split() const;
+
   [[nodiscard]] RelativeMotion motion() const;
   [[nodiscard]] GaussianPose pose() const;
-  /// Its own covariance says at most 1 m and 20 deg, one sigma, in any direction.
-  [[nodiscard]] bool is_certain() const;
+  [[nodiscard]] bool is_certain() const { return crepes::is_certain(pose().covariance); }
   /// What the tight filter believes of the sensors; nothing of the paper's.
   [[nodiscard]] std::optional<CalibrationRecord> calibration() const;
   /// When a reading of this kind was last used; kNever if never.
@@ -51,7 +63,7 @@ class NeighborTrack {
   }
   /// When anything that shows the neighbor itself (not the graph) was last used.
   [[nodiscard]] Timestamp last_sighting() const;
-  /// Of either direction, all sightings of the last half second were refused: a filter that was
+  /// Of either direction, all sightings of the last quarter second were refused: a filter that was
   /// led astray, by a mirror image for example. The other direction alone may still agree with it.
   [[nodiscard]] bool has_lost_its_way() const;
 
@@ -70,6 +82,11 @@ class NeighborTrack {
     return never;
   }();
   std::array<Refusals, kMeasurementKindCount> refused_{};
+};
+
+struct NeighborTrack::Part {
+  NeighborTrack track;
+  double log_weight = 0.0;  ///< up to a constant
 };
 
 }  // namespace crepes

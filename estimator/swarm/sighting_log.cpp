@@ -18,6 +18,19 @@ constexpr double kLineRate = 0.3;  // rad/s
 constexpr double kMountingSigma = 0.01;   // m
 constexpr double kAttitudeSigma = 0.002;  // rad
 
+// Sightings of one ring follow each other within this, the gyroscope's turn taken out.
+constexpr Duration kAgain = std::chrono::milliseconds{100};
+constexpr double kAgainReach = 0.02;  // rad, and what kLineRate adds
+
+bool is_seen_again(const Bearing& bearing, const Recent<Bearing, 256>& log, const ImuHistory& imu) {
+  return std::any_of(log.all().begin(), log.all().end(), [&](const Bearing& other) {
+    const Duration apart = std::chrono::abs(other.stamp - bearing.stamp);
+    if (apart == Duration{0} || apart > kAgain) return false;
+    const Eigen::Vector3d turned = imu.rotation(other.stamp, bearing.stamp).conjugate() * other.u_B;
+    return (turned - bearing.u_B).norm() < kAgainReach + kLineRate * to_seconds(apart);
+  });
+}
+
 }  // namespace
 
 SightingLog::SightingLog(const MemberConfig& self, const MemberConfig& neighbor,
@@ -32,25 +45,31 @@ void SightingLog::add_own(const Bearing& bearing) {
   own_.forget_before(bearing.stamp - kKept);
 }
 
+void SightingLog::add_peer(const Bearing& bearing) {
+  peer_.add(bearing);
+  peer_.forget_before(bearing.stamp - kKept);
+}
+
 void SightingLog::add_range(Timestamp stamp, double range_m) {
   ranges_.add({stamp, range_m});
   ranges_.forget_before(stamp - kKept);
 }
 
-std::optional<Bearing> SightingLog::own_at(Timestamp t, const ImuHistory& imu) const {
-  const auto nearest =
-      std::min_element(own_.all().begin(), own_.all().end(), [t](const auto& a, const auto& b) {
-        return std::chrono::abs(a.stamp - t) < std::chrono::abs(b.stamp - t);
-      });
-  if (nearest == own_.all().end() || std::chrono::abs(nearest->stamp - t) > kBearingReach) {
-    return std::nullopt;
+// What the nearest frame showed, of what was seen more than once.
+std::vector<Bearing> SightingLog::own_at(Timestamp t, const ImuHistory& imu) const {
+  const auto distance = [t](const Bearing& bearing) { return std::chrono::abs(bearing.stamp - t); };
+  std::vector<Bearing> nearest;
+  for (const Bearing& bearing : own_.all()) {
+    if (distance(bearing) > kBearingReach || !is_seen_again(bearing, own_, imu)) continue;
+    if (!nearest.empty() && distance(bearing) < distance(nearest.front())) nearest.clear();
+    if (nearest.empty() || bearing.stamp == nearest.front().stamp) nearest.push_back(bearing);
   }
-  Bearing turned = *nearest;
-  turned.u_B = imu.rotation(nearest->stamp, t).conjugate() * nearest->u_B;
-  turned.sigma_rad =
-      std::hypot(nearest->sigma_rad, kLineRate * to_seconds(std::chrono::abs(nearest->stamp - t)));
-  turned.stamp = t;
-  return turned;
+  for (Bearing& bearing : nearest) {
+    bearing.u_B = imu.rotation(bearing.stamp, t).conjugate() * bearing.u_B;
+    bearing.sigma_rad = std::hypot(bearing.sigma_rad, kLineRate * to_seconds(distance(bearing)));
+    bearing.stamp = t;
+  }
+  return nearest;
 }
 
 // The median of what both modules said around t: an outlier does not pass.
@@ -65,15 +84,15 @@ std::optional<double> SightingLog::range_at(Timestamp t) const {
   return *middle;
 }
 
-std::variant<RawPose, NoPoseReason> SightingLog::raw_pose(const Bearing& peer_bearing,
-                                                          const RobotState& self,
-                                                          const RobotState& neighbor) const {
+std::variant<std::vector<MutualStart>, NoPoseReason> SightingLog::starts(
+    const Bearing& peer_bearing, const RobotState& self, const RobotState& neighbor) const {
   const Timestamp t = peer_bearing.stamp;
   const auto tilt_B = self.tilt_at(t);
   const auto tilt_N = neighbor.tilt_at(t);
   if (!tilt_B || !tilt_N) return NoPoseReason::kTiltUnknown;
-  const auto own = own_at(t, self.imu);
-  if (!own) return NoPoseReason::kNotSeen;
+  if (!is_seen_again(peer_bearing, peer_, neighbor.imu)) return NoPoseReason::kDoesNotSeeUs;
+  const std::vector<Bearing> own = own_at(t, self.imu);
+  if (own.empty()) return NoPoseReason::kNotSeen;
   const auto range_m = range_at(t);
   if (!range_m) return NoPoseReason::kNoRange;
 
@@ -84,15 +103,25 @@ std::variant<RawPose, NoPoseReason> SightingLog::raw_pose(const Bearing& peer_be
                     .bearing_sigma_rad = std::hypot(bearing.sigma_rad, calibration_sigma_rad_),
                     .tilt_sigma_rad = tilt.sigma_rad};
   };
-  auto result = compute_raw_pose({.B = sighting(*own, *tilt_B, self_),
-                                  .N = sighting(peer_bearing, *tilt_N, neighbor_),
-                                  .range_m = *range_m,
-                                  .range_sigma_m = range_sigma_m_});
-  if (auto* raw = std::get_if<RawPose>(&result)) {
-    raw->covariance.diagonal().head<6>().array() += kMountingSigma * kMountingSigma;
-    raw->covariance.diagonal().tail<3>().array() += kAttitudeSigma * kAttitudeSigma;
+  std::vector<MutualStart> starts;
+  NoPoseReason reason = NoPoseReason::kNone;
+  for (const Bearing& bearing : own) {
+    auto result = compute_raw_pose({.B = sighting(bearing, *tilt_B, self_),
+                                    .N = sighting(peer_bearing, *tilt_N, neighbor_),
+                                    .range_m = *range_m,
+                                    .range_sigma_m = range_sigma_m_});
+    if (auto* raw = std::get_if<RawPose>(&result)) {
+      raw->covariance.diagonal().head<6>().array() += kMountingSigma * kMountingSigma;
+      raw->covariance.diagonal().tail<3>().array() += kAttitudeSigma * kAttitudeSigma;
+      starts.push_back({*raw,
+                        {bearing.u_B, bearing.p_B_C, bearing.sigma_rad},
+                        {peer_bearing.u_B, peer_bearing.p_B_C, peer_bearing.sigma_rad}});
+    } else {
+      reason = std::get<NoPoseReason>(result);
+    }
   }
-  return result;
+  if (starts.empty()) return reason;
+  return starts;
 }
 
 }  // namespace crepes

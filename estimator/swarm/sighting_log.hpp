@@ -3,10 +3,11 @@
 
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
-#include "estimator/relative/raw_pose.hpp"
+#include "estimator/swarm/event_sequencer.hpp"
 #include "estimator/swarm/recent.hpp"
 #include "estimator/swarm/robot_state.hpp"
 
@@ -21,15 +22,17 @@ class SightingLog {
               double range_sigma_m);
 
   void add_own(const Bearing& bearing);
+  void add_peer(const Bearing& bearing);
   void add_range(Timestamp stamp, double range_m);
 
-  /// The raw pose at the instant when the neighbor saw us; or what is missing.
-  [[nodiscard]] std::variant<RawPose, NoPoseReason> raw_pose(const Bearing& peer_bearing,
-                                                             const RobotState& self,
-                                                             const RobotState& neighbor) const;
+  /// What could be started from at the instant when the neighbor saw us, one for each place where
+  /// we saw it then; or what is missing. A bearing counts that another of the last moments agrees
+  /// with: what flickers here and there is no robot.
+  [[nodiscard]] std::variant<std::vector<MutualStart>, NoPoseReason> starts(
+      const Bearing& peer_bearing, const RobotState& self, const RobotState& neighbor) const;
 
  private:
-  [[nodiscard]] std::optional<Bearing> own_at(Timestamp t, const ImuHistory& imu) const;
+  [[nodiscard]] std::vector<Bearing> own_at(Timestamp t, const ImuHistory& imu) const;
   [[nodiscard]] std::optional<double> range_at(Timestamp t) const;
 
   struct StampedRange {
@@ -41,6 +44,7 @@ class SightingLog {
   double calibration_sigma_rad_;
   double range_sigma_m_;
   Recent<Bearing, 256> own_;
+  Recent<Bearing, 256> peer_;
   Recent<StampedRange, 256> ranges_;
 };
 

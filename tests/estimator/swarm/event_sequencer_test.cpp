@@ -17,7 +17,8 @@ Measurement at(Duration t, double range_m = 1.0) {
 
 std::vector<std::int64_t> release_all(EventSequencer& sequencer, Timestamp now) {
   std::vector<std::int64_t> stamps;
-  while (const auto ready = sequencer.pop_ready(now)) stamps.push_back(to_ns(ready->stamp));
+  for (auto group = sequencer.pop_ready(now); !group.empty(); group = sequencer.pop_ready(now))
+    for (const Measurement& measurement : group) stamps.push_back(to_ns(measurement.stamp));
   return stamps;
 }
 
@@ -48,11 +49,22 @@ TEST(EventSequencer, KeepsTheOrderOfArrivalAmongEqualStamps) {
   for (const double range_m : {1.0, 2.0, 3.0}) ASSERT_TRUE(sequencer.push(at(10ms, range_m)));
 
   std::vector<double> ranges;
-  while (const auto ready = sequencer.pop_ready(Timestamp{10ms})) {
-    ranges.push_back(std::get<RangeReading>(ready->reading).range_m);
-  }
+  for (const Measurement& measurement : sequencer.pop_ready(Timestamp{10ms}))
+    ranges.push_back(std::get<RangeReading>(measurement.reading).range_m);
 
   EXPECT_EQ(ranges, (std::vector<double>{1.0, 2.0, 3.0}));
+}
+
+TEST(EventSequencer, ReleasesCandidatesOfOneInstantTogether) {
+  EventSequencer sequencer(0ms);
+  ASSERT_TRUE(sequencer.push(at(10ms)));
+  ASSERT_TRUE(sequencer.push({Timestamp{10ms}, MeasurementKind::kPeerRange, RangeReading{}}));
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(sequencer.push(at(20ms)));
+
+  EXPECT_EQ(sequencer.pop_ready(Timestamp{20ms}).size(), 1U);
+  EXPECT_EQ(sequencer.pop_ready(Timestamp{20ms}).size(), 1U);
+  EXPECT_EQ(sequencer.pop_ready(Timestamp{20ms}).size(), 3U);
+  EXPECT_TRUE(sequencer.pop_ready(Timestamp{20ms}).empty());
 }
 
 TEST(EventSequencer, IsBoundedAndDropsTheOldest) {

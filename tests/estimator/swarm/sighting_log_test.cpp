@@ -22,6 +22,13 @@ class Sighted : public testing::Test {
     const MutualSighting z = pair_.sighting(kNow);
     self_ = {pair_.imu_B, Tilt{kNow, z.B.up, 0.01}};
     neighbor_ = {pair_.imu_N, Tilt{kNow, z.N.up, 0.01}};
+    see_once(own(kNow - 60ms), peer(kNow - 60ms));
+  }
+
+  /// What was seen before counts for what is seen now.
+  void see_once(const Bearing& own, const Bearing& peer) {
+    log_.add_own(own);
+    log_.add_peer(peer);
   }
 
   static MemberConfig member(std::uint16_t id, const Mounting& mounting) {
@@ -40,8 +47,16 @@ class Sighted : public testing::Test {
     return {t, RobotId{1}, u.u, u.camera, 0.003};
   }
   void add_range(Timestamp t) { log_.add_range(t, pair_.range(t).range_m); }
+  using Starts = std::variant<std::vector<MutualStart>, NoPoseReason>;
+  static std::size_t count(const Starts& starts) {
+    const auto* some = std::get_if<std::vector<MutualStart>>(&starts);
+    return some == nullptr ? 0 : some->size();
+  }
+  static const MutualStart& first(const Starts& starts) {
+    return std::get<std::vector<MutualStart>>(starts).front();
+  }
   [[nodiscard]] NoPoseReason reason(const Bearing& peer_bearing) const {
-    const auto result = log_.raw_pose(peer_bearing, self_, neighbor_);
+    const auto result = log_.starts(peer_bearing, self_, neighbor_);
     const auto* why = std::get_if<NoPoseReason>(&result);
     return why == nullptr ? NoPoseReason::kNone : *why;
   }
@@ -56,23 +71,54 @@ TEST_F(Sighted, JoinsReadingsOfOneInstantToTheTruePose) {
   log_.add_own(own(kNow));
   add_range(kNow);
 
-  const auto result = log_.raw_pose(peer(kNow), self_, neighbor_);
+  const auto result = log_.starts(peer(kNow), self_, neighbor_);
 
-  ASSERT_TRUE(std::holds_alternative<RawPose>(result));
+  ASSERT_EQ(count(result), 1U);
   const Pose truth = pair_.truth(kNow).motion.T_B_N;
-  EXPECT_LT(pose_difference(truth, std::get<RawPose>(result).T_B_N).norm(), 1e-9);
+  EXPECT_LT(pose_difference(truth, first(result).raw.T_B_N).norm(), 1e-9);
 }
 
 TEST_F(Sighted, TurnsABearingOfANearbyInstantByTheGyroscope) {
   log_.add_own(own(kNow - 15ms));
   add_range(kNow);
 
-  const auto result = log_.raw_pose(peer(kNow), self_, neighbor_);
+  const auto result = log_.starts(peer(kNow), self_, neighbor_);
 
-  ASSERT_TRUE(std::holds_alternative<RawPose>(result));
+  ASSERT_EQ(count(result), 1U);
   // What is left is the line of sight's own turn, 15 ms at up to 0.6 rad/s here.
   const Pose truth = pair_.truth(kNow).motion.T_B_N;
-  EXPECT_LT(pose_difference(truth, std::get<RawPose>(result).T_B_N).head<3>().norm(), 0.05);
+  EXPECT_LT(pose_difference(truth, first(result).raw.T_B_N).head<3>().norm(), 0.05);
+}
+
+TEST_F(Sighted, OffersAStartForEveryPlaceWhereItWasSeen) {
+  Bearing mirrored = own(kNow);
+  mirrored.u_B = so3_exp(0.2 * self_.tilt->up_B) * mirrored.u_B;
+  Bearing before = mirrored;
+  before.stamp -= 10ms;
+  log_.add_own(before);
+  log_.add_own(own(kNow - 10ms));
+  log_.add_own(mirrored);
+  log_.add_own(own(kNow));
+  add_range(kNow);
+
+  const auto result = log_.starts(peer(kNow), self_, neighbor_);
+
+  ASSERT_EQ(count(result), 2U);  // the nearest frame's
+  EXPECT_LT((first(result).bearing.u - mirrored.u_B).norm(), 1e-9);
+}
+
+TEST_F(Sighted, TakesNothingForARobotThatWasSeenOnlyOnce) {
+  Bearing glint = own(kNow);
+  glint.u_B = so3_exp(0.2 * self_.tilt->up_B) * glint.u_B;
+  log_.add_own(glint);
+  add_range(kNow);
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNotSeen);
+
+  log_.add_own(own(kNow));
+  Bearing peers_glint = peer(kNow);
+  peers_glint.u_B = so3_exp(0.2 * neighbor_.tilt->up_B) * peers_glint.u_B;
+  EXPECT_EQ(reason(peers_glint), NoPoseReason::kDoesNotSeeUs);
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNone);
 }
 
 TEST_F(Sighted, SaysWhatIsMissing) {
@@ -100,17 +146,17 @@ TEST_F(Sighted, AnOutlierAmongRangesDoesNotPass) {
   log_.add_range(kNow, 40.0);
   add_range(kNow + 20ms);
 
-  const auto result = log_.raw_pose(peer(kNow), self_, neighbor_);
+  const auto result = log_.starts(peer(kNow), self_, neighbor_);
 
-  ASSERT_TRUE(std::holds_alternative<RawPose>(result));
-  EXPECT_LT(std::get<RawPose>(result).T_B_N.p.norm(), 10.0);
+  ASSERT_EQ(count(result), 1U);
+  EXPECT_LT(first(result).raw.T_B_N.p.norm(), 10.0);
 }
 
 TEST_F(Sighted, ItsCovarianceIsPositiveDefinite) {
   log_.add_own(own(kNow));
   add_range(kNow);
 
-  const auto raw = std::get<RawPose>(log_.raw_pose(peer(kNow), self_, neighbor_));
+  const RawPose raw = first(log_.starts(peer(kNow), self_, neighbor_)).raw;
 
   EXPECT_EQ(raw.covariance.llt().info(), Eigen::Success);
 }

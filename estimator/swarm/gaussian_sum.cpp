@@ -1,0 +1,101 @@
+#include "estimator/swarm/gaussian_sum.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace crepes {
+namespace {
+
+// How many readings out of nowhere are reckoned with for each true one: per steradian, per meter.
+constexpr double kFalseBearings = 0.1;
+constexpr double kFalseRanges = 0.05;
+
+constexpr double kEqual = 0.25;  // squared, in sigmas
+
+// A pose in the metric of another's own covariance.
+double distance2(const GaussianPose& from, const Pose& to) {
+  const Vector6d step = pose_difference(from.pose, to);
+  return step.dot(from.covariance.llt().solve(step));
+}
+
+}  // namespace
+
+double score_of(const Fusion& fusion, MeasurementKind kind) {
+  if (fusion.verdict != Verdict::kFused) return 0.0;  // clutter, by either account
+  const bool is_range = kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange;
+  return fusion.log_likelihood - std::log(is_range ? kFalseRanges : kFalseBearings);
+}
+
+GaussianSum::GaussianSum(const NeighborTrack& whole) {
+  for (auto& [track, log_weight] : whole.split()) parts_.push_back({std::move(track), log_weight});
+  normalize();
+}
+
+void GaussianSum::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
+  for (Part& part : parts_) part.track.advance_to(to, imu_B, imu_N);
+}
+
+Association GaussianSum::fuse(std::span<const Measurement> candidates, const PairMounting& mounting,
+                              const Gates& gates) {
+  const std::size_t chosen = heaviest().likeliest(candidates, mounting);
+  const Measurement& reading = candidates[chosen];
+  Association association{.chosen = chosen, .fusion{}};
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const Fusion fusion = parts_[i].track.fuse(reading, mounting, gates);
+    if (i == heaviest_) association.fusion = fusion;
+    parts_[i].log_weight += score_of(fusion, reading.kind);
+  }
+  association.score = normalize();
+  return association;
+}
+
+/// Back to a sum of weights of one; the logarithm of what it was.
+double GaussianSum::normalize() {
+  const auto heaviest =
+      std::max_element(parts_.begin(), parts_.end(),
+                       [](const Part& a, const Part& b) { return a.log_weight < b.log_weight; });
+  heaviest_ = static_cast<std::size_t>(heaviest - parts_.begin());
+  const double most = heaviest->log_weight;
+  double sum = 0.0;
+  for (const Part& part : parts_) sum += std::exp(part.log_weight - most);
+  const double log_sum = most + std::log(sum);
+  for (Part& part : parts_) part.log_weight -= log_sum;
+  return log_sum;
+}
+
+void GaussianSum::prune() {
+  constexpr double kUnlikely = -9.0;  // against the heaviest
+  if (parts_.size() == 1) return;
+  std::swap(parts_.front(), parts_[heaviest_]);
+  const Part& first = parts_.front();
+  const GaussianPose pose = first.track.pose();
+  const auto superfluous = [&](const Part& part) {
+    return part.log_weight - first.log_weight < kUnlikely ||
+           distance2(pose, part.track.pose().pose) < kEqual;
+  };
+  parts_.erase(std::remove_if(parts_.begin() + 1, parts_.end(), superfluous), parts_.end());
+  normalize();
+}
+
+bool GaussianSum::is_like(const GaussianSum& other) const {
+  return distance2(heaviest().pose(), other.heaviest().pose().pose) < kEqual;
+}
+
+const NeighborTrack& GaussianSum::heaviest() const { return parts_[heaviest_].track; }
+
+GaussianPose GaussianSum::mean(const GaussianPose& heaviest) const {
+  if (parts_.size() == 1) return heaviest;
+  const GaussianPose center = this->heaviest().pose();
+  Vector6d mean = Vector6d::Zero();
+  Matrix6d moment = Matrix6d::Zero();
+  for (const Part& part : parts_) {
+    const double weight = std::exp(part.log_weight);
+    const GaussianPose pose = part.track.pose();
+    const Vector6d step = pose_difference(center.pose, pose.pose);
+    mean += weight * step;
+    moment += weight * (step * step.transpose() + pose.covariance - center.covariance);
+  }
+  return {perturbed(heaviest.pose, mean), heaviest.covariance + moment - mean * mean.transpose()};
+}
+
+}  // namespace crepes

@@ -1,0 +1,140 @@
+#include "estimator/swarm/hypotheses.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace crepes {
+namespace {
+
+constexpr double kMemory = 0.5;  // s, of the scores
+// Of each direction; a few bearings' worth: a chance agreement brings one or two.
+constexpr double kConfirmed = 25.0;
+constexpr double kMargin = 10.0;  // between rivals
+// Rivals may come as long after the leader, and have as long to win.
+constexpr Duration kProbation = std::chrono::seconds{1};
+constexpr std::size_t kMaxStarts = 8;
+
+std::array<Measurement, 2> bearings_of(Timestamp stamp, const MutualStart& start) {
+  return {Measurement{stamp, MeasurementKind::kBearing, start.bearing},
+          Measurement{stamp, MeasurementKind::kPeerBearing, start.peer_bearing}};
+}
+
+const auto is_worse = [](const auto& a, const auto& b) {
+  return std::pair(a.confirmed, a.score()) < std::pair(b.confirmed, b.score());
+};
+
+}  // namespace
+
+bool Hypotheses::wants_start(Timestamp now) const {
+  if (empty()) return true;
+  const Start& leader = starts_.front();
+  const NeighborTrack& track = leader.sum.heaviest();
+  return !leader.confirmed || now - leader.born < kProbation + settings_.lag ||
+         !track.is_certain() || track.has_lost_its_way() ||
+         now - track.last_sighting() > kPatience + settings_.lag;
+}
+
+bool Hypotheses::is_explained(Timestamp stamp, const MutualStart& first) const {
+  const auto [bearing, peer_bearing] = bearings_of(stamp, first);
+  return std::any_of(starts_.begin(), starts_.end(), [&](const Start& start) {
+    NeighborTrack asked = start.sum.heaviest();
+    const auto fits = [&](const Measurement& reading) {
+      return asked.fuse(reading, mounting_, settings_.gates).verdict == Verdict::kFused;
+    };
+    return fits(bearing) && fits(peer_bearing);
+  });
+}
+
+Hypotheses::Start Hypotheses::make(const NeighborTrack& track) {
+  return {.sum = GaussianSum(track), .born = track.stamp(), .generation = ++generations_};
+}
+
+bool Hypotheses::start(Timestamp stamp, const MutualStart& first) {
+  NeighborTrack track(stamp, first.raw, settings_);
+  if (settings_.profile == Profile::kPaper) {
+    clear();
+    starts_.push_back(make(track));
+    starts_.back().confirmed = true;
+    return true;
+  }
+  if (is_explained(stamp, first)) return false;
+  std::array<double, 2> scores{};
+  const auto readings = bearings_of(stamp, first);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Fusion fusion = track.fuse(readings[i], mounting_, settings_.gates);
+    if (fusion.verdict != Verdict::kFused) return false;
+    scores[i] = score_of(fusion, readings[i].kind);
+  }
+  if (starts_.size() >= kMaxStarts) {
+    const auto worst = std::min_element(starts_.begin() + 1, starts_.end(), is_worse);
+    if (worst->confirmed || worst->score() >= scores[0] + scores[1]) return false;
+    starts_.erase(worst);
+  }
+  starts_.push_back(make(track));
+  for (std::size_t i = 0; i < 2; ++i) starts_.back().count(readings[i].kind, scores[i]);
+  return true;
+}
+
+bool Hypotheses::start(Timestamp stamp, const GraphPose& first) {
+  clear();
+  starts_.push_back(make(NeighborTrack(stamp, first, settings_)));
+  starts_.back().confirmed = true;
+  return true;
+}
+
+void Hypotheses::Start::count(MeasurementKind kind, double score) {
+  if (kind == MeasurementKind::kBearing) seeing += score;
+  if (kind == MeasurementKind::kPeerBearing) seen += score;
+  confirmed = confirmed || std::min(seeing, seen) >= kConfirmed;
+}
+
+void Hypotheses::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
+  if (empty()) return;
+  const double keep = std::exp(-to_seconds(to - stamp()) / kMemory);
+  for (Start& start : starts_) {
+    start.sum.advance_to(to, imu_B, imu_N);
+    start.seeing *= keep;
+    start.seen *= keep;
+  }
+}
+
+Association Hypotheses::fuse(std::span<const Measurement> candidates) {
+  Association led;
+  for (Start& start : starts_) {
+    const Association association = start.sum.fuse(candidates, mounting_, settings_.gates);
+    start.count(candidates.front().kind, association.score);
+    if (&start == &starts_.front()) led = association;
+  }
+  return led;
+}
+
+void Hypotheses::settle() {
+  if (empty()) return;
+  for (Start& start : starts_) start.sum.prune();
+
+  const auto best = std::max_element(starts_.begin(), starts_.end(), is_worse);
+  const Start& leader = starts_.front();
+  if (!leader.confirmed || (best->confirmed && best->score() > leader.score() + kMargin))
+    std::swap(starts_.front(), *best);
+
+  const Timestamp now = stamp();
+  const auto is_tried = [now](const Start& start) { return now - start.born > kProbation; };
+  const auto has_lost = [&](const Start& start) {
+    return leader.sum.is_like(start.sum) ||
+           (is_tried(start) && (!start.confirmed || start.score() < leader.score() - kMargin));
+  };
+  starts_.erase(std::remove_if(starts_.begin() + 1, starts_.end(), has_lost), starts_.end());
+  if (!leader.confirmed && is_tried(leader)) clear();
+}
+
+bool Hypotheses::is_settled() const {
+  if (empty() || !starts_.front().confirmed) return false;
+  const double margin = starts_.front().score() - kMargin;
+  return std::none_of(starts_.begin() + 1, starts_.end(), [margin](const Start& start) {
+    return start.confirmed && start.score() > margin;
+  });
+}
+
+}  // namespace crepes

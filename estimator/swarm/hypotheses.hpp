@@ -1,0 +1,66 @@
+/// The starts of a neighbor's filter that may be right, and how much speaks for each.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "estimator/swarm/gaussian_sum.hpp"
+
+namespace crepes {
+
+/// A board and its image in the floor give different first poses, and one sighting does not tell
+/// which is the robot. So starts compete: each takes the readings that fit it, and counts what they
+/// say for it against their being clutter, the last half second weighing most. One that both
+/// directions speak for may lead. A leader that is refused while a rival is believed gives way.
+class Hypotheses {
+ public:
+  Hypotheses(const FilterSettings& settings, const PairMounting& mounting)
+      : settings_(settings), mounting_(mounting) {}
+
+  [[nodiscard]] bool empty() const { return starts_.empty(); }
+  void clear() { starts_.clear(); }
+
+  /// Whether a raw pose would be welcome.
+  [[nodiscard]] bool wants_start(Timestamp now) const;
+  /// A new rival at `stamp()`. False, and nothing changes: one that is there explains it already,
+  /// or there are too many that are better.
+  bool start(Timestamp stamp, const MutualStart& first);
+  /// Instead of all others: the graph knows. True.
+  bool start(Timestamp stamp, const GraphPose& first);
+
+  void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
+  /// Corrects each with the likeliest of readings of one kind and instant; what the leader did.
+  Association fuse(std::span<const Measurement> candidates);
+  /// Drops what is not needed any more and lets the best lead.
+  void settle();
+
+  [[nodiscard]] const GaussianSum& leader() const { return starts_.front().sum; }
+  [[nodiscard]] Timestamp stamp() const { return leader().heaviest().stamp(); }
+  /// Enough readings agree with the leader, and with no rival as well.
+  [[nodiscard]] bool is_settled() const;
+  /// Of the leader, among all starts ever.
+  [[nodiscard]] std::uint32_t generation() const { return starts_.front().generation; }
+
+ private:
+  struct Start {
+    GaussianSum sum;
+    Timestamp born;
+    std::uint32_t generation;
+    double seeing = 0.0;  ///< the score of our bearings
+    double seen = 0.0;    ///< of the neighbor's
+    bool confirmed = false;
+
+    void count(MeasurementKind kind, double score);
+    [[nodiscard]] double score() const { return seeing + seen; }
+  };
+  [[nodiscard]] bool is_explained(Timestamp stamp, const MutualStart& first) const;
+  [[nodiscard]] Start make(const NeighborTrack& track);
+
+  FilterSettings settings_;
+  PairMounting mounting_;
+  std::vector<Start> starts_;  ///< the leader first
+  std::uint32_t generations_ = 0;
+};
+
+}  // namespace crepes
