@@ -39,6 +39,16 @@ struct GaussianPose {
   Matrix6d covariance = Matrix6d::Zero();
 };
 
+/// T_B_A of T_A_B:  dp' = -R^T dp + [p']x dtheta,  dtheta' = -R dtheta.
+[[nodiscard]] inline GaussianPose inverse(const GaussianPose& T_A_B) {
+  const Pose T_B_A = T_A_B.pose.inverse();
+  Matrix6d J = Matrix6d::Zero();
+  J.topLeftCorner<3, 3>() = -T_B_A.R();
+  J.topRightCorner<3, 3>() = hat(T_B_A.p);
+  J.bottomRightCorner<3, 3>() = -T_A_B.pose.R();
+  return {T_B_A, J * T_A_B.covariance * J.transpose()};
+}
+
 /// The perturbation d that takes `from` to `to`, in GaussianPose's error convention.
 [[nodiscard]] inline Vector6d pose_difference(const Pose& from, const Pose& to) {
   Vector6d d;

@@ -86,6 +86,14 @@ NeighborFilter::NeighborFilter(Timestamp stamp, const RawPose& first, const Proc
   state_.motion.T_B_N = first.T_B_N;
 }
 
+NeighborFilter::NeighborFilter(Timestamp stamp, const GaussianPose& T_B_N,
+                               const ProcessNoise& noise, const Priors& priors)
+    : stamp_(stamp),
+      P_(first_covariance(T_B_N.covariance, priors.speed_mps, priors)),
+      noise_(noise) {
+  state_.motion.T_B_N = T_B_N.pose;
+}
+
 NeighborFilter::NeighborFilter(Timestamp stamp, const GraphPose& first, const ProcessNoise& noise,
                                const Priors& priors)
     : stamp_(stamp),

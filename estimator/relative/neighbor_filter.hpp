@@ -41,6 +41,9 @@ class NeighborFilter {
   /// `first` shares its errors of calibration with all that follows; the speed is unknown.
   NeighborFilter(Timestamp stamp, const RawPose& first, const ProcessNoise& noise,
                  const Priors& priors);
+  /// With errors of its own; the speed is unknown.
+  NeighborFilter(Timestamp stamp, const GaussianPose& T_B_N, const ProcessNoise& noise,
+                 const Priors& priors);
   /// From the pose graph: the speed is known as well as that of the robots between.
   NeighborFilter(Timestamp stamp, const GraphPose& first, const ProcessNoise& noise,
                  const Priors& priors);

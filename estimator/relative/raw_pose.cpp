@@ -191,4 +191,31 @@ std::variant<RawPose, NoPoseReason> compute_raw_pose(const MutualSighting& sight
                  calibration_jacobian(sighting, *J)};
 }
 
+std::vector<GaussianPose> poses_by_heading(const Sighting& seer, const Sighting& seen,
+                                           double range_m, double range_sigma_m, int count) {
+  const auto square = [](double x) { return x * x; };
+  const double step = 2.0 * std::numbers::pi / count;
+  const Eigen::Quaterniond q_seer_L = leveling(seer.up).conjugate();
+  const Eigen::Quaterniond q_L_seen = leveling(seen.up);
+  const Eigen::Matrix3d along = seer.u * seer.u.transpose();
+  const Eigen::Matrix3d vertical = seen.up * seen.up.transpose();
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+
+  std::vector<GaussianPose> poses;
+  for (int i = 0; i < count; ++i) {
+    GaussianPose pose;
+    pose.pose.q = q_seer_L * Eigen::AngleAxisd(i * step, Eigen::Vector3d::UnitZ()) * q_L_seen;
+    const auto p = position(seer, seen.mounting, pose.pose.R(), range_m);
+    if (!p) return {};
+    pose.pose.p = *p;
+    pose.covariance.topLeftCorner<3, 3>() =
+        square(range_sigma_m) * along + square(range_m * seer.bearing_sigma_rad) * (I - along);
+    pose.covariance.bottomRightCorner<3, 3>() =
+        (square(seer.tilt_sigma_rad) + square(seen.tilt_sigma_rad)) * (I - vertical) +
+        square(step / 1.5) * vertical;
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
 }  // namespace crepes

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <variant>
+#include <vector>
 
 #include "estimator/core/outputs.hpp"
 #include "estimator/core/pose.hpp"
@@ -62,5 +63,12 @@ struct RawPose {
 /// With all mountings zero this is the paper's formula:  p = d u;  psi = psi_B - psi_N + pi;
 /// R = (R_pitch R_roll)_B^T R_yaw(psi) (R_pitch R_roll)_N. Lever arms enter by iterating it.
 [[nodiscard]] std::variant<RawPose, NoPoseReason> compute_raw_pose(const MutualSighting& sighting);
+
+/// The pose of `seen` in `seer` from one robot's bearing, the range and both tilts: its heading
+/// could be any. So there are poses all around, `count` of them, each a Gaussian wide enough for
+/// its share. Empty where the range is shorter than the mountings allow. `seen.u` plays no part.
+[[nodiscard]] std::vector<GaussianPose> poses_by_heading(const Sighting& seer, const Sighting& seen,
+                                                         double range_m, double range_sigma_m,
+                                                         int count);
 
 }  // namespace crepes

@@ -19,11 +19,16 @@ struct MutualStart {
   DirectionReading peer_bearing;
 };
 
+/// All poses that one robot's bearing allows, for want of the other's.
+struct OneWayStart {
+  std::vector<GaussianPose> T_B_N;
+};
+
 /// One reading that a neighbor's filter can be started or corrected with.
 struct Measurement {
   Timestamp stamp{};
   MeasurementKind kind = MeasurementKind::kBearing;
-  std::variant<DirectionReading, RangeReading, MutualStart, GraphPose> reading;
+  std::variant<DirectionReading, RangeReading, MutualStart, OneWayStart, GraphPose> reading;
 };
 
 /// The leading ones of one kind and instant: candidates, of which at most one is true.

@@ -10,6 +10,9 @@ namespace {
 constexpr double kFalseBearings = 0.1;
 constexpr double kFalseRanges = 0.05;
 
+constexpr std::size_t kCrowd = 20;
+constexpr Duration kCrowdPeriod = std::chrono::milliseconds{15};
+
 constexpr double kEqual = 0.25;  // squared, in sigmas
 
 // A pose in the metric of another's own covariance.
@@ -31,12 +34,21 @@ GaussianSum::GaussianSum(const NeighborTrack& whole) {
   normalize();
 }
 
+GaussianSum::GaussianSum(std::vector<NeighborTrack> parts) {
+  for (NeighborTrack& track : parts) parts_.push_back({std::move(track)});
+  normalize();
+}
+
 void GaussianSum::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
   for (Part& part : parts_) part.track.advance_to(to, imu_B, imu_N);
 }
 
 Association GaussianSum::fuse(std::span<const Measurement> candidates, const PairMounting& mounting,
                               const Gates& gates) {
+  if (parts_.size() > kCrowd) {
+    if (candidates.front().stamp - fused_ < kCrowdPeriod) return {};
+    fused_ = candidates.front().stamp;
+  }
   const std::size_t chosen = heaviest().likeliest(candidates, mounting);
   const Measurement& reading = candidates[chosen];
   Association association{.chosen = chosen, .fusion{}};

@@ -24,9 +24,12 @@ struct Association {
 class GaussianSum {
  public:
   explicit GaussianSum(const NeighborTrack& whole);
+  /// Of parts that are as likely one as the other.
+  explicit GaussianSum(std::vector<NeighborTrack> parts);
 
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
-  /// Corrects every part with the candidate that is likeliest to the heaviest part.
+  /// Corrects every part with the candidate that is likeliest to the heaviest part. A crowd takes
+  /// only so many readings a second, and calls the others degenerate: it may last for long.
   Association fuse(std::span<const Measurement> candidates, const PairMounting& mounting,
                    const Gates& gates);
   void prune();
@@ -47,6 +50,7 @@ class GaussianSum {
   double normalize();
 
   std::vector<Part> parts_;
+  Timestamp fused_ = kNever;  ///< the last reading of a crowd
   std::size_t heaviest_ = 0;
 };
 

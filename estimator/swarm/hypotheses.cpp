@@ -31,9 +31,9 @@ bool Hypotheses::wants_start(Timestamp now) const {
   if (empty()) return true;
   const Start& leader = starts_.front();
   const NeighborTrack& track = leader.sum.heaviest();
-  return !leader.confirmed || now - leader.born < kProbation + settings_.lag ||
-         !track.is_certain() || track.has_lost_its_way() ||
-         now - track.last_sighting() > kPatience + settings_.lag;
+  const bool on_trial = !leader.confirmed || now - leader.born < kProbation + settings_.lag;
+  return (on_trial && settings_.profile == Profile::kTight) || !track.is_certain() ||
+         track.has_lost_its_way() || now - track.last_sighting() > kPatience + settings_.lag;
 }
 
 bool Hypotheses::is_explained(Timestamp stamp, const MutualStart& first) const {
@@ -47,15 +47,16 @@ bool Hypotheses::is_explained(Timestamp stamp, const MutualStart& first) const {
   });
 }
 
-Hypotheses::Start Hypotheses::make(const NeighborTrack& track) {
-  return {.sum = GaussianSum(track), .born = track.stamp(), .generation = ++generations_};
+Hypotheses::Start Hypotheses::make(GaussianSum sum) {
+  const Timestamp born = sum.heaviest().stamp();
+  return {.sum = std::move(sum), .born = born, .generation = ++generations_};
 }
 
 bool Hypotheses::start(Timestamp stamp, const MutualStart& first) {
   NeighborTrack track(stamp, first.raw, settings_);
   if (settings_.profile == Profile::kPaper) {
     clear();
-    starts_.push_back(make(track));
+    starts_.push_back(make(GaussianSum(track)));
     starts_.back().confirmed = true;
     return true;
   }
@@ -72,14 +73,23 @@ bool Hypotheses::start(Timestamp stamp, const MutualStart& first) {
     if (worst->confirmed || worst->score() >= scores[0] + scores[1]) return false;
     starts_.erase(worst);
   }
-  starts_.push_back(make(track));
+  starts_.push_back(make(GaussianSum(track)));
   for (std::size_t i = 0; i < 2; ++i) starts_.back().count(readings[i].kind, scores[i]);
+  return true;
+}
+
+bool Hypotheses::start(Timestamp stamp, const OneWayStart& first) {
+  if (!empty()) return false;
+  std::vector<NeighborTrack> parts;
+  for (const GaussianPose& T_B_N : first.T_B_N) parts.emplace_back(stamp, T_B_N, settings_);
+  starts_.push_back(make(GaussianSum(std::move(parts))));
+  starts_.back().one_way = true;
   return true;
 }
 
 bool Hypotheses::start(Timestamp stamp, const GraphPose& first) {
   clear();
-  starts_.push_back(make(NeighborTrack(stamp, first, settings_)));
+  starts_.push_back(make(GaussianSum(NeighborTrack(stamp, first, settings_))));
   starts_.back().confirmed = true;
   return true;
 }
@@ -87,7 +97,8 @@ bool Hypotheses::start(Timestamp stamp, const GraphPose& first) {
 void Hypotheses::Start::count(MeasurementKind kind, double score) {
   if (kind == MeasurementKind::kBearing) seeing += score;
   if (kind == MeasurementKind::kPeerBearing) seen += score;
-  confirmed = confirmed || std::min(seeing, seen) >= kConfirmed;
+  const double believed = one_way ? std::max(seeing, seen) : std::min(seeing, seen);
+  confirmed = confirmed || believed >= kConfirmed;
 }
 
 void Hypotheses::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {

@@ -26,6 +26,8 @@ class Hypotheses {
   /// A new rival at `stamp()`. False, and nothing changes: one that is there explains it already,
   /// or there are too many that are better.
   bool start(Timestamp stamp, const MutualStart& first);
+  /// While there is nothing else. False if there is.
+  bool start(Timestamp stamp, const OneWayStart& first);
   /// Instead of all others: the graph knows. True.
   bool start(Timestamp stamp, const GraphPose& first);
 
@@ -47,15 +49,16 @@ class Hypotheses {
     GaussianSum sum;
     Timestamp born;
     std::uint32_t generation;
-    double seeing = 0.0;  ///< the score of our bearings
-    double seen = 0.0;    ///< of the neighbor's
+    double seeing = 0.0;   ///< the score of our bearings
+    double seen = 0.0;     ///< of the neighbor's
+    bool one_way = false;  ///< only one direction can speak for it
     bool confirmed = false;
 
     void count(MeasurementKind kind, double score);
     [[nodiscard]] double score() const { return seeing + seen; }
   };
   [[nodiscard]] bool is_explained(Timestamp stamp, const MutualStart& first) const;
-  [[nodiscard]] Start make(const NeighborTrack& track);
+  [[nodiscard]] Start make(GaussianSum sum);
 
   FilterSettings settings_;
   PairMounting mounting_;

@@ -65,6 +65,18 @@ void Neighbor::add_report(const ReceivedReport& received, const RobotState& self
   for (const Bearing& bearing : report.bearings) {
     if (bearing.neighbor == self_id_) take_peer_bearing(bearing, received.clock_sigma_s, self);
   }
+  for (const NeighborEstimate& estimate : report.estimates) {
+    if (estimate.neighbor == self_id_) take_peer_estimate(estimate);
+  }
+}
+
+// It sees us and we do not see it: what it makes of us, the other way round, is better than
+// nothing.
+void Neighbor::take_peer_estimate(const NeighborEstimate& estimate) {
+  if (settings_.profile == Profile::kPaper || !hypotheses_.empty() || !one_way_lasts_) return;
+  const GaussianPose T_B_N = inverse(estimate.T_B_N);
+  enqueue({estimate.stamp, MeasurementKind::kGraphPose,
+           GraphPose{member_.id, T_B_N, -(T_B_N.pose.q * estimate.v_B_N)}});
 }
 
 void Neighbor::take_peer_bearing(const Bearing& bearing, double clock_sigma_s,
@@ -127,6 +139,7 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
   if (now - last_heard_ > settings_.forget || self.is_blind(now) || body_.is_blind(now)) {
     hypotheses_.clear();
   }
+  try_one_way(now, self);
   release(now, self);
   look_ahead(now, self);
   if (keeps_records_ && !hypotheses_.empty()) {
@@ -136,6 +149,19 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
     }
   }
   reason_ = pose_ ? NoPoseReason::kNone : reason(now, self);
+}
+
+// Where for a second just one of the two has seen the other, that has to do.
+void Neighbor::try_one_way(Timestamp now, const RobotState& self) {
+  constexpr Duration kRecent = std::chrono::milliseconds{500};
+  constexpr Duration kLasting = std::chrono::seconds{1};
+  const bool we_see = now - last_seen_ < kRecent;
+  const bool it_sees = now - last_seen_by_ < kRecent;
+  if (one_way_since_ == kNever || we_see == it_sees) one_way_since_ = now;
+  one_way_lasts_ = now - one_way_since_ > kLasting;
+  if (!one_way_lasts_ || !we_see || !hypotheses_.empty() || settings_.profile == Profile::kPaper)
+    return;
+  if (auto start = sightings_.one_way_start(self, body_)) enqueue(std::move(*start));
 }
 
 void Neighbor::release(Timestamp now, const RobotState& self) {
@@ -171,11 +197,14 @@ bool Neighbor::is_a_start(const Measurement& measurement) const {
 }
 
 void Neighbor::start(const Measurement& measurement) {
-  const auto* mutual = std::get_if<MutualStart>(&measurement.reading);
-  const bool started =
-      mutual == nullptr
-          ? hypotheses_.start(measurement.stamp, std::get<GraphPose>(measurement.reading))
-          : hypotheses_.start(measurement.stamp, *mutual);
+  const bool started = std::visit(
+      [&](const auto& first) {
+        if constexpr (requires { hypotheses_.start(measurement.stamp, first); })
+          return hypotheses_.start(measurement.stamp, first);
+        else
+          return false;
+      },
+      measurement.reading);
   if (started) note(measurement.stamp, measurement.kind, {.verdict = Verdict::kFused});
 }
 

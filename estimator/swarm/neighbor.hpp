@@ -48,12 +48,14 @@ class Neighbor {
 
  private:
   void take_range(const UwbRange& range, MeasurementKind kind);
+  void take_peer_estimate(const NeighborEstimate& estimate);
   void take_peer_bearing(const Bearing& bearing, double clock_sigma_s, const RobotState& self);
   void enqueue(Measurement measurement);
   void note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion);
   void release(Timestamp now, const RobotState& self);
   void look_ahead(Timestamp now, const RobotState& self);
   void start(const Measurement& measurement);
+  void try_one_way(Timestamp now, const RobotState& self);
   [[nodiscard]] bool is_a_start(const Measurement& measurement) const;
   [[nodiscard]] NoPoseReason reason(Timestamp now, const RobotState& self) const;
 
@@ -85,6 +87,8 @@ class Neighbor {
   Timestamp last_seen_ = kNever;
   Timestamp last_seen_by_ = kNever;
   Timestamp last_range_ = kNever;
+  Timestamp one_way_since_ = kNever;
+  bool one_way_lasts_ = false;
   NoPoseReason raw_reason_ = NoPoseReason::kNotSeen;
   NeighborStatus status_;
 

@@ -73,6 +73,10 @@ NeighborTrack::NeighborTrack(Timestamp stamp, const GraphPose& first,
   last_[static_cast<std::size_t>(MeasurementKind::kGraphPose)] = stamp;
 }
 
+NeighborTrack::NeighborTrack(Timestamp stamp, const GaussianPose& T_B_N,
+                             const FilterSettings& settings)
+    : filter_(NeighborFilter(stamp, T_B_N, settings.noise, settings.priors)) {}
+
 Timestamp NeighborTrack::stamp() const {
   return std::visit([](const auto& filter) { return filter.stamp(); }, filter_);
 }

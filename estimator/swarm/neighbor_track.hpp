@@ -38,6 +38,8 @@ class NeighborTrack {
  public:
   NeighborTrack(Timestamp stamp, const RawPose& first, const FilterSettings& settings);
   NeighborTrack(Timestamp stamp, const GraphPose& first, const FilterSettings& settings);
+  /// At rest or at any speed.
+  NeighborTrack(Timestamp stamp, const GaussianPose& T_B_N, const FilterSettings& settings);
 
   [[nodiscard]] Timestamp stamp() const;
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace crepes {
@@ -84,6 +85,15 @@ std::optional<double> SightingLog::range_at(Timestamp t) const {
   return *middle;
 }
 
+Sighting SightingLog::sighting(const Bearing& bearing, const Tilt& tilt,
+                               const MemberConfig& member) const {
+  return {.u = bearing.u_B,
+          .up = tilt.up_B,
+          .mounting = {bearing.p_B_C, member.p_body_led, member.p_body_uwb},
+          .bearing_sigma_rad = std::hypot(bearing.sigma_rad, calibration_sigma_rad_),
+          .tilt_sigma_rad = tilt.sigma_rad};
+}
+
 std::variant<std::vector<MutualStart>, NoPoseReason> SightingLog::starts(
     const Bearing& peer_bearing, const RobotState& self, const RobotState& neighbor) const {
   const Timestamp t = peer_bearing.stamp;
@@ -96,13 +106,6 @@ std::variant<std::vector<MutualStart>, NoPoseReason> SightingLog::starts(
   const auto range_m = range_at(t);
   if (!range_m) return NoPoseReason::kNoRange;
 
-  const auto sighting = [&](const Bearing& bearing, const Tilt& tilt, const MemberConfig& member) {
-    return Sighting{.u = bearing.u_B,
-                    .up = tilt.up_B,
-                    .mounting = {bearing.p_B_C, member.p_body_led, member.p_body_uwb},
-                    .bearing_sigma_rad = std::hypot(bearing.sigma_rad, calibration_sigma_rad_),
-                    .tilt_sigma_rad = tilt.sigma_rad};
-  };
   std::vector<MutualStart> starts;
   NoPoseReason reason = NoPoseReason::kNone;
   for (const Bearing& bearing : own) {
@@ -122,6 +125,21 @@ std::variant<std::vector<MutualStart>, NoPoseReason> SightingLog::starts(
   }
   if (starts.empty()) return reason;
   return starts;
+}
+
+std::optional<Measurement> SightingLog::one_way_start(const RobotState& self,
+                                                      const RobotState& neighbor) const {
+  constexpr int kHeadings = 24;
+  if (own_.all().empty() || !is_seen_again(own_.all().back(), own_, self.imu)) return std::nullopt;
+  const Bearing& bearing = own_.all().back();
+  const auto tilt_B = self.tilt_at(bearing.stamp);
+  const auto tilt_N = neighbor.tilt_at(bearing.stamp);
+  const auto range_m = range_at(bearing.stamp);
+  if (!tilt_B || !tilt_N || !range_m) return std::nullopt;
+  auto poses = poses_by_heading(sighting(bearing, *tilt_B, self_), sighting({}, *tilt_N, neighbor_),
+                                *range_m, range_sigma_m_, kHeadings);
+  if (poses.empty()) return std::nullopt;
+  return Measurement{bearing.stamp, MeasurementKind::kRawPose, OneWayStart{std::move(poses)}};
 }
 
 }  // namespace crepes

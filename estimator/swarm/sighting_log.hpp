@@ -31,7 +31,13 @@ class SightingLog {
   [[nodiscard]] std::variant<std::vector<MutualStart>, NoPoseReason> starts(
       const Bearing& peer_bearing, const RobotState& self, const RobotState& neighbor) const;
 
+  /// What could be started from at our newest bearing, while the neighbor does not see us.
+  [[nodiscard]] std::optional<Measurement> one_way_start(const RobotState& self,
+                                                         const RobotState& neighbor) const;
+
  private:
+  [[nodiscard]] Sighting sighting(const Bearing& bearing, const Tilt& tilt,
+                                  const MemberConfig& member) const;
   [[nodiscard]] std::vector<Bearing> own_at(Timestamp t, const ImuHistory& imu) const;
   [[nodiscard]] std::optional<double> range_at(Timestamp t) const;
 

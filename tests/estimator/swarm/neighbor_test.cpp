@@ -63,6 +63,20 @@ class View {
     for (; now_ <= end; now_ += 1s) neighbor_.tick(now_, self_);
   }
 
+  /// What the other makes of us at this instant, off by a few centimeters and degrees.
+  void add_estimate_of_us() {
+    ReceivedReport received = report({});
+    const RelativeMotion motion = pair_.truth(received.report.stamp).motion;
+    Vector6d sigma;
+    sigma << Eigen::Vector3d::Constant(0.05), Eigen::Vector3d::Constant(0.03);
+    const Matrix6d P = sigma.cwiseAbs2().asDiagonal();
+    received.report.estimates = {{received.report.stamp,
+                                  kSelf,
+                                  {perturbed(motion.T_B_N.inverse(), sigma), P},
+                                  -(motion.T_B_N.q.conjugate() * motion.v_B_N)}};
+    neighbor_.add_report(received, self_);
+  }
+
   [[nodiscard]] Vector6d error() const {
     return pose_difference(neighbor_.pose()->T_B_N.pose,
                            pair_.truth(neighbor_.pose()->stamp).motion.T_B_N);
@@ -165,7 +179,6 @@ INSTANTIATE_TEST_SUITE_P(
                     Missing{"PeerImu", {.peer_imu = false}, NoPoseReason::kNoPeerImu},
                     Missing{"OwnTilt", {.own_tilt = false}, NoPoseReason::kTiltUnknown},
                     Missing{"Bearings", {.bearings = false}, NoPoseReason::kNotSeen},
-                    Missing{"PeerBearings", {.peer_bearings = false}, NoPoseReason::kDoesNotSeeUs},
                     Missing{"Ranges", {.ranges = false}, NoPoseReason::kNoRange}),
     [](const auto& test) { return test.param.name; });
 
@@ -190,6 +203,30 @@ TEST(Neighbor, LocatedInAMirrorIsFoundWithinASecondOfBeingSeenItself) {
   ASSERT_TRUE(view.neighbor().pose());
   EXPECT_LT(view.error().head<3>().norm(), 0.35);
   EXPECT_LT(view.error().tail<3>().norm(), 0.06);
+}
+
+TEST(Neighbor, IsLocatedInTimeAlthoughItDoesNotSeeUs) {
+  View view;
+
+  view.run_until(Timestamp{8s}, {.peer_bearings = false});
+
+  ASSERT_TRUE(view.neighbor().pose());
+  EXPECT_LT(view.error().head<3>().norm(), 0.35);  // the range's bias
+  EXPECT_LT(view.error().tail<3>().norm(), 0.15);
+  EXPECT_EQ(view.neighbor().pose()->reset_counter, 1U);
+}
+
+TEST(Neighbor, IsLocatedByItsOwnEstimateOfUsWhereWeDoNotSeeIt) {
+  View view;
+  view.run_until(Timestamp{2s}, {.bearings = false});
+  ASSERT_EQ(view.reason(), NoPoseReason::kNotSeen);
+
+  view.add_estimate_of_us();
+  view.run_until(Timestamp{3s}, {.bearings = false});
+
+  ASSERT_TRUE(view.neighbor().pose());
+  EXPECT_LT(view.error().head<3>().norm(), 0.35);
+  EXPECT_LT(view.error().tail<3>().norm(), 0.1);
 }
 
 TEST(Neighbor, IsPredictedForAWhileAndSaysSo) {
