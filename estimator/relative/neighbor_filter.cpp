@@ -147,8 +147,8 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
 std::vector<NeighborFilter::Part> NeighborFilter::split() const {
   constexpr double kNarrow = 0.03;  // rad
   constexpr double kSpacing = 1.5;  // in sigmas of a part: without a ripple in their sum
-  constexpr double kReach = 2.5;    // in sigmas of the whole
-  constexpr int kMaxSide = 8;
+  constexpr double kReach = 3.5;    // in sigmas of the whole
+  constexpr int kMaxSide = 9;
 
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> attitude;
   attitude.computeDirect(P_.block<3, 3>(E::kTheta, E::kTheta));

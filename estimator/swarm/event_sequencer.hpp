@@ -19,7 +19,8 @@ struct MutualStart {
   DirectionReading peer_bearing;
 };
 
-/// All poses that one robot's bearing allows, for want of the other's.
+/// All poses that one robot's bearing allows, for want of the other's; or what the other makes of
+/// it.
 struct OneWayStart {
   std::vector<GaussianPose> T_B_N;
 };

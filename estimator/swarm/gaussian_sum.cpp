@@ -13,8 +13,6 @@ constexpr double kFalseRanges = 0.05;
 constexpr std::size_t kCrowd = 20;
 constexpr Duration kCrowdPeriod = std::chrono::milliseconds{15};
 
-constexpr double kEqual = 0.25;  // squared, in sigmas
-
 // A pose in the metric of another's own covariance.
 double distance2(const GaussianPose& from, const Pose& to) {
   const Vector6d step = pose_difference(from.pose, to);
@@ -77,6 +75,7 @@ double GaussianSum::normalize() {
 
 void GaussianSum::prune() {
   constexpr double kUnlikely = -9.0;  // against the heaviest
+  constexpr double kEqual = 0.25;     // squared, in sigmas
   if (parts_.size() == 1) return;
   std::swap(parts_.front(), parts_[heaviest_]);
   const Part& first = parts_.front();
@@ -90,7 +89,8 @@ void GaussianSum::prune() {
 }
 
 bool GaussianSum::is_like(const GaussianSum& other) const {
-  return distance2(heaviest().pose(), other.heaviest().pose().pose) < kEqual;
+  constexpr double kAlike = 12.0;  // squared, in sigmas; a mirror image is hundreds off
+  return distance2(heaviest().pose(), other.heaviest().pose().pose) < kAlike;
 }
 
 const NeighborTrack& GaussianSum::heaviest() const { return parts_[heaviest_].track; }

@@ -34,7 +34,7 @@ class GaussianSum {
                    const Gates& gates);
   void prune();
 
-  /// Whether the two are the same by what the heaviest part knows.
+  /// Whether the other may be the same, by what the heaviest part knows.
   [[nodiscard]] bool is_like(const GaussianSum& other) const;
   [[nodiscard]] const NeighborTrack& heaviest() const;
   [[nodiscard]] std::size_t size() const { return parts_.size(); }

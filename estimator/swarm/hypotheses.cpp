@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 namespace crepes {
@@ -22,7 +23,8 @@ std::array<Measurement, 2> bearings_of(Timestamp stamp, const MutualStart& start
 }
 
 const auto is_worse = [](const auto& a, const auto& b) {
-  return std::pair(a.confirmed, a.score()) < std::pair(b.confirmed, b.score());
+  return std::tuple(a.confirmed, !a.one_way, a.score()) <
+         std::tuple(b.confirmed, !b.one_way, b.score());
 };
 
 }  // namespace
@@ -32,8 +34,9 @@ bool Hypotheses::wants_start(Timestamp now) const {
   const Start& leader = starts_.front();
   const NeighborTrack& track = leader.sum.heaviest();
   const bool on_trial = !leader.confirmed || now - leader.born < kProbation + settings_.lag;
-  return (on_trial && settings_.profile == Profile::kTight) || !track.is_certain() ||
-         track.has_lost_its_way() || now - track.last_sighting() > kPatience + settings_.lag;
+  return (on_trial && settings_.profile == Profile::kTight) || leader.one_way ||
+         !track.is_certain() || track.has_lost_its_way() ||
+         now - track.last_sighting() > kPatience + settings_.lag;
 }
 
 bool Hypotheses::is_explained(Timestamp stamp, const MutualStart& first) const {
@@ -43,7 +46,7 @@ bool Hypotheses::is_explained(Timestamp stamp, const MutualStart& first) const {
     const auto fits = [&](const Measurement& reading) {
       return asked.fuse(reading, mounting_, settings_.gates).verdict == Verdict::kFused;
     };
-    return fits(bearing) && fits(peer_bearing);
+    return !start.one_way && fits(bearing) && fits(peer_bearing);
   });
 }
 
@@ -127,13 +130,14 @@ void Hypotheses::settle() {
 
   const auto best = std::max_element(starts_.begin(), starts_.end(), is_worse);
   const Start& leader = starts_.front();
-  if (!leader.confirmed || (best->confirmed && best->score() > leader.score() + kMargin))
-    std::swap(starts_.front(), *best);
+  const bool is_mutual_for_one_way = leader.one_way && !best->one_way;
+  const bool is_better = best->score() > leader.score() + kMargin || is_mutual_for_one_way;
+  if (!leader.confirmed || (best->confirmed && is_better)) std::swap(starts_.front(), *best);
 
   const Timestamp now = stamp();
   const auto is_tried = [now](const Start& start) { return now - start.born > kProbation; };
   const auto has_lost = [&](const Start& start) {
-    return leader.sum.is_like(start.sum) ||
+    return (!leader.one_way && leader.sum.is_like(start.sum)) ||
            (is_tried(start) && (!start.confirmed || start.score() < leader.score() - kMargin));
   };
   starts_.erase(std::remove_if(starts_.begin() + 1, starts_.end(), has_lost), starts_.end());

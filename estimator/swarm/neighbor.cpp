@@ -74,9 +74,7 @@ void Neighbor::add_report(const ReceivedReport& received, const RobotState& self
 // nothing.
 void Neighbor::take_peer_estimate(const NeighborEstimate& estimate) {
   if (settings_.profile == Profile::kPaper || !hypotheses_.empty() || !one_way_lasts_) return;
-  const GaussianPose T_B_N = inverse(estimate.T_B_N);
-  enqueue({estimate.stamp, MeasurementKind::kGraphPose,
-           GraphPose{member_.id, T_B_N, -(T_B_N.pose.q * estimate.v_B_N)}});
+  enqueue({estimate.stamp, MeasurementKind::kRawPose, OneWayStart{{inverse(estimate.T_B_N)}}});
 }
 
 void Neighbor::take_peer_bearing(const Bearing& bearing, double clock_sigma_s,
@@ -151,10 +149,10 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
   reason_ = pose_ ? NoPoseReason::kNone : reason(now, self);
 }
 
-// Where for a second just one of the two has seen the other, that has to do.
+// Where for two seconds just one of the two has seen the other, that has to do.
 void Neighbor::try_one_way(Timestamp now, const RobotState& self) {
   constexpr Duration kRecent = std::chrono::milliseconds{500};
-  constexpr Duration kLasting = std::chrono::seconds{1};
+  constexpr Duration kLasting = std::chrono::seconds{2};
   const bool we_see = now - last_seen_ < kRecent;
   const bool it_sees = now - last_seen_by_ < kRecent;
   if (one_way_since_ == kNever || we_see == it_sees) one_way_since_ = now;

@@ -218,11 +218,11 @@ TEST(Neighbor, IsLocatedInTimeAlthoughItDoesNotSeeUs) {
 
 TEST(Neighbor, IsLocatedByItsOwnEstimateOfUsWhereWeDoNotSeeIt) {
   View view;
-  view.run_until(Timestamp{2s}, {.bearings = false});
+  view.run_until(Timestamp{3s}, {.bearings = false});
   ASSERT_EQ(view.reason(), NoPoseReason::kNotSeen);
 
   view.add_estimate_of_us();
-  view.run_until(Timestamp{3s}, {.bearings = false});
+  view.run_until(Timestamp{4s}, {.bearings = false});
 
   ASSERT_TRUE(view.neighbor().pose());
   EXPECT_LT(view.error().head<3>().norm(), 0.35);
