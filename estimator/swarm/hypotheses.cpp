@@ -22,7 +22,7 @@ std::array<Measurement, 2> bearings_of(Timestamp stamp, const MutualStart& start
           Measurement{stamp, MeasurementKind::kPeerBearing, start.peer_bearing}};
 }
 
-const auto is_worse = [](const auto& a, const auto& b) {
+constexpr auto kIsWorse = [](const auto& a, const auto& b) {
   return std::tuple(a.confirmed, !a.one_way, a.score()) <
          std::tuple(b.confirmed, !b.one_way, b.score());
 };
@@ -40,13 +40,13 @@ bool Hypotheses::wants_start(Timestamp now) const {
 }
 
 bool Hypotheses::is_explained(Timestamp stamp, const MutualStart& first) const {
-  const auto [bearing, peer_bearing] = bearings_of(stamp, first);
+  const auto readings = bearings_of(stamp, first);
   return std::any_of(starts_.begin(), starts_.end(), [&](const Start& start) {
     NeighborTrack asked = start.sum.heaviest();
     const auto fits = [&](const Measurement& reading) {
       return asked.fuse(reading, mounting_, settings_.gates).verdict == Verdict::kFused;
     };
-    return !start.one_way && fits(bearing) && fits(peer_bearing);
+    return !start.one_way && fits(readings[0]) && fits(readings[1]);
   });
 }
 
@@ -72,7 +72,7 @@ bool Hypotheses::start(Timestamp stamp, const MutualStart& first) {
     scores[i] = score_of(fusion, readings[i].kind);
   }
   if (starts_.size() >= kMaxStarts) {
-    const auto worst = std::min_element(starts_.begin() + 1, starts_.end(), is_worse);
+    const auto worst = std::min_element(starts_.begin() + 1, starts_.end(), kIsWorse);
     if (worst->confirmed || worst->score() >= scores[0] + scores[1]) return false;
     starts_.erase(worst);
   }
@@ -128,7 +128,7 @@ void Hypotheses::settle() {
   if (empty()) return;
   for (Start& start : starts_) start.sum.prune();
 
-  const auto best = std::max_element(starts_.begin(), starts_.end(), is_worse);
+  const auto best = std::max_element(starts_.begin(), starts_.end(), kIsWorse);
   const Start& leader = starts_.front();
   const bool is_mutual_for_one_way = leader.one_way && !best->one_way;
   const bool is_better = best->score() > leader.score() + kMargin || is_mutual_for_one_way;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "estimator/swarm/gaussian_sum.hpp"
@@ -15,8 +16,8 @@ namespace crepes {
 /// directions speak for may lead. A leader that is refused while a rival is believed gives way.
 class Hypotheses {
  public:
-  Hypotheses(const FilterSettings& settings, const PairMounting& mounting)
-      : settings_(settings), mounting_(mounting) {}
+  Hypotheses(FilterSettings settings, PairMounting mounting)
+      : settings_(std::move(settings)), mounting_(std::move(mounting)) {}
 
   [[nodiscard]] bool empty() const { return starts_.empty(); }
   void clear() { starts_.clear(); }
@@ -48,7 +49,7 @@ class Hypotheses {
   struct Start {
     GaussianSum sum;
     Timestamp born;
-    std::uint32_t generation;
+    std::uint32_t generation = 0;
     double seeing = 0.0;   ///< the score of our bearings
     double seen = 0.0;     ///< of the neighbor's
     bool one_way = false;  ///< only one direction can speak for it

@@ -197,10 +197,11 @@ bool Neighbor::is_a_start(const Measurement& measurement) const {
 void Neighbor::start(const Measurement& measurement) {
   const bool started = std::visit(
       [&](const auto& first) {
-        if constexpr (requires { hypotheses_.start(measurement.stamp, first); })
+        if constexpr (requires { hypotheses_.start(measurement.stamp, first); }) {
           return hypotheses_.start(measurement.stamp, first);
-        else
+        } else {
           return false;
+        }
       },
       measurement.reading);
   if (started) note(measurement.stamp, measurement.kind, {.verdict = Verdict::kFused});

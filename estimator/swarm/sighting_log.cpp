@@ -34,10 +34,10 @@ bool is_seen_again(const Bearing& bearing, const Recent<Bearing, 256>& log, cons
 
 }  // namespace
 
-SightingLog::SightingLog(const MemberConfig& self, const MemberConfig& neighbor,
-                         double calibration_sigma_rad, double range_sigma_m)
-    : self_(self),
-      neighbor_(neighbor),
+SightingLog::SightingLog(MemberConfig self, MemberConfig neighbor, double calibration_sigma_rad,
+                         double range_sigma_m)
+    : self_(std::move(self)),
+      neighbor_(std::move(neighbor)),
       calibration_sigma_rad_(calibration_sigma_rad),
       range_sigma_m_(range_sigma_m) {}
 

@@ -18,7 +18,7 @@ class SightingLog {
  public:
   /// `self` and `neighbor` give the mountings. `calibration_sigma_rad` and `range_bias_sigma_m` are
   /// what a single sighting cannot average out.
-  SightingLog(const MemberConfig& self, const MemberConfig& neighbor, double calibration_sigma_rad,
+  SightingLog(MemberConfig self, MemberConfig neighbor, double calibration_sigma_rad,
               double range_sigma_m);
 
   void add_own(const Bearing& bearing);
