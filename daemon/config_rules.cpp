@@ -181,19 +181,20 @@ void check_imu(const ImuConfig& imu, Faults& faults) {
   check_triad("imu.gyroscope", imu.gyroscope);
 }
 
-bool is_loopback(const std::string& address) {
-  in_addr v4{};
-  if (::inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
-  in6_addr v6{};
-  return ::inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+bool is_numeric(const std::string& address) {
+  in6_addr binary{};
+  return ::inet_pton(AF_INET, address.c_str(), &binary) == 1 ||
+         ::inet_pton(AF_INET6, address.c_str(), &binary) == 1;
 }
 
 void check_network(const Config& config, Faults& faults) {
   if (config.net.port == config.subscription.port)
     faults.push_back({"subscription.port", "is taken by net.port"});
   for (const std::string& address : config.subscription.listen) {
-    if (!is_loopback(address))
-      faults.push_back({"subscription.listen", '"' + address + "\" is not a loopback address"});
+    if (!is_numeric(address)) {
+      faults.push_back(
+          {"subscription.listen", '"' + address + "\" is not a numeric IPv4 or IPv6 address"});
+    }
   }
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "daemon/logging.hpp"
+#include "daemon/process_load.hpp"
 #include "daemon/subscription_server.hpp"
 #include "net/peer_link.hpp"
 #include "net/udp_socket.hpp"
@@ -137,10 +138,13 @@ class NetLoop {
       if (member.id == status.self) status.name = member.name;
     }
     status.uptime_s = to_seconds(clock_.now() - start_);
+    status.cpu_s = process_cpu_s();
+    status.rss_mb = process_rss_mb();
     for (const auto& [name, sensor] : sensors_) status.sensors.push_back(sensor);
     status.sensors.push_back({"mesh", 0.0, mesh_.fault().empty(), mesh_.fault(), {}});
     status.estimator = estimator_;
     status.clocks = link_.clocks();
+    status.traffic = link_.traffic(clock_.now());
     status.queues = stage_.queues();
     status.network = link_.counters();
     for (auto& counter : server_.counters()) status.network.push_back(std::move(counter));

@@ -1,5 +1,7 @@
 #include "daemon/subscription_server.hpp"
 
+#include <sodium.h>
+
 #include <chrono>
 #include <utility>
 
@@ -18,13 +20,17 @@ std::string_view text_of(const Datagram& datagram) {
 
 std::vector<std::uint8_t> bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
 
+HashKey random_key() {
+  HashKey key{};
+  randombytes_buf(key.data(), key.size());
+  return key;
+}
+
 }  // namespace
 
-SubscriptionServer::SubscriptionServer(const Config& config, StatusSource status)
+SubscriptionServer::SubscriptionServer(const Config& config, SubscriptionDesk::StatusSource status)
     : self_(config.robot.id),
-      lease_s_(config.subscription.lease_s),
-      status_(std::move(status)),
-      table_(config.subscription) {
+      desk_(config.subscription, std::string(kVersion), std::move(status), random_key()) {
   for (const MemberConfig& member : config.swarm.members) names_[member.id] = member.name;
   for (const std::string& address : config.subscription.listen) {
     Result<UdpSocket> socket =
@@ -38,25 +44,24 @@ SubscriptionServer::SubscriptionServer(const Config& config, StatusSource status
 }
 
 void SubscriptionServer::serve(Timestamp now) {
-  table_.expire(now);
-  for (UdpSocket& socket : sockets_) {
+  for (std::size_t via = 0; via < sockets_.size(); ++via) {
     for (int i = 0; i < kMaxRequestsAtOnce; ++i) {
-      const Result<std::optional<Datagram>> request = socket.receive(std::chrono::milliseconds{0});
+      const Result<std::optional<Datagram>> request =
+          sockets_[via].receive(std::chrono::milliseconds{0});
       // An error here is a client that went away (ICMP): the next datagram is another's.
       if (!request || !*request) break;
-      answer(socket, **request, now);
+      const Datagram& datagram = **request;
+      if (const auto answer = desk_.answer(datagram.from, text_of(datagram), now, via))
+        send(via, *answer, datagram.from);
     }
   }
 }
 
 void SubscriptionServer::publish(const NeighborPose& pose, Timestamp now) {
-  table_.expire(now);
   const auto name = names_.find(pose.neighbor);
   if (name == names_.end()) return;
-  for (const PoseDelivery& delivery : table_.deliveries(pose.neighbor, pose.stamp)) {
-    UdpSocket* socket = socket_for(delivery.client);
-    if (socket == nullptr) continue;
-    send(*socket, pose_json(delivery.sequence, self_, name->second, pose), delivery.client);
+  for (const PoseDelivery& delivery : desk_.deliveries(pose.neighbor, pose.stamp, now)) {
+    send(delivery.via, pose_json(delivery.sequence, self_, name->second, pose), delivery.client);
     ++poses_;
   }
 }
@@ -68,39 +73,13 @@ std::vector<int> SubscriptionServer::descriptors() const {
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> SubscriptionServer::counters() const {
-  return {{"subscribers", table_.size()},
-          {"requests", requests_},
-          {"requests_refused", refused_},
-          {"poses_sent", poses_},
-          {"answers_unsent", unsent_}};
+  auto totals = desk_.counters();
+  totals.insert(totals.end(), {{"poses_sent", poses_}, {"answers_unsent", unsent_}});
+  return totals;
 }
 
-void SubscriptionServer::answer(UdpSocket& socket, const Datagram& request, Timestamp now) {
-  if (!SubscriberTable::is_served(request.from)) return;
-  ++requests_;
-  const auto refuse = [&](const Error& error) {
-    ++refused_;
-    if (table_.admits_error(request.from, now))
-      send(socket, error_json(error.message), request.from);
-  };
-  const Result<SubscriptionRequest> parsed = parse_request(text_of(request));
-  if (!parsed) return refuse(parsed.error());
-  if (std::holds_alternative<PollRequest>(*parsed))
-    return send(socket, status_json(status_()), request.from);
-  const Result<void> watched = table_.watch(request.from, std::get<WatchRequest>(*parsed), now);
-  if (!watched) return refuse(watched.error());
-  send(socket, version_json(kVersion, lease_s_), request.from);
-}
-
-void SubscriptionServer::send(UdpSocket& socket, const std::string& json, const Endpoint& to) {
-  if (!socket.send_to(bytes_of(json), to)) ++unsent_;
-}
-
-UdpSocket* SubscriptionServer::socket_for(const Endpoint& client) {
-  for (UdpSocket& socket : sockets_) {
-    if (socket.local().is_ipv4() == client.is_ipv4()) return &socket;
-  }
-  return nullptr;
+void SubscriptionServer::send(std::size_t via, const std::string& json, const Endpoint& to) {
+  if (!sockets_[via].send_to(bytes_of(json), to)) ++unsent_;
 }
 
 }  // namespace crepes

@@ -1,25 +1,22 @@
-/// Serves poses to programs on this robot: the sockets around SubscriberTable and its JSON.
+/// Serves poses to programs: the sockets around SubscriptionDesk.
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/outputs.hpp"
-#include "net/subscriber_table.hpp"
+#include "net/subscription_desk.hpp"
 #include "net/udp_socket.hpp"
 
 namespace crepes {
 
 class SubscriptionServer {
  public:
-  using StatusSource = std::function<SystemStatus()>;
-
   /// Addresses that cannot be served are left out and told by `faults`.
-  SubscriptionServer(const Config& config, StatusSource status);
+  SubscriptionServer(const Config& config, SubscriptionDesk::StatusSource status);
 
   /// Answers the requests that wait on all sockets, a bounded number of them.
   void serve(Timestamp now);
@@ -33,19 +30,13 @@ class SubscriptionServer {
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
 
  private:
-  void answer(UdpSocket& socket, const Datagram& request, Timestamp now);
-  void send(UdpSocket& socket, const std::string& json, const Endpoint& to);
-  [[nodiscard]] UdpSocket* socket_for(const Endpoint& client);
+  void send(std::size_t via, const std::string& json, const Endpoint& to);
 
   RobotId self_;
-  double lease_s_;
   std::map<RobotId, std::string> names_;
-  StatusSource status_;
-  SubscriberTable table_;
+  SubscriptionDesk desk_;
   std::vector<UdpSocket> sockets_;
   std::vector<std::string> faults_;
-  std::uint64_t requests_ = 0;
-  std::uint64_t refused_ = 0;
   std::uint64_t poses_ = 0;
   std::uint64_t unsent_ = 0;
 };

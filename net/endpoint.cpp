@@ -20,6 +20,16 @@ bool Endpoint::is_loopback() const {
   return is_ipv4() ? address[12] == 127 : address == kLoopback6;
 }
 
+bool Endpoint::is_unicast() const {
+  constexpr std::uint8_t kFirstMulticast4 = 224;  // from there on: multicast, reserved, broadcast
+  constexpr std::array<std::uint8_t, 4> kLoopbackBroadcast{127, 255, 255, 255};
+  if (port == 0) return false;
+  if (!is_ipv4()) return address[0] != 0xFF && address != std::array<std::uint8_t, 16>{};
+  const bool is_broadcast =
+      std::equal(kLoopbackBroadcast.begin(), kLoopbackBroadcast.end(), &address[12]);
+  return address[12] != 0 && address[12] < kFirstMulticast4 && !is_broadcast;
+}
+
 std::string Endpoint::to_string() const {
   std::array<char, INET6_ADDRSTRLEN> text{};
   if (is_ipv4()) {
@@ -28,6 +38,15 @@ std::string Endpoint::to_string() const {
   }
   ::inet_ntop(AF_INET6, address.data(), text.data(), text.size());
   return "[" + std::string(text.data()) + "]:" + std::to_string(port);
+}
+
+std::optional<Endpoint> Endpoint::parse(const std::string& address, std::uint16_t port) {
+  if (std::array<std::uint8_t, 4> v4{}; ::inet_pton(AF_INET, address.c_str(), v4.data()) == 1)
+    return ipv4(v4, port);
+  Endpoint endpoint;
+  endpoint.port = port;
+  if (::inet_pton(AF_INET6, address.c_str(), endpoint.address.data()) == 1) return endpoint;
+  return std::nullopt;
 }
 
 Endpoint Endpoint::ipv4(const std::array<std::uint8_t, 4>& address, std::uint16_t port) {

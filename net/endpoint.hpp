@@ -4,6 +4,7 @@
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace crepes {
@@ -19,9 +20,15 @@ struct Endpoint {
   [[nodiscard]] bool is_ipv4() const;
   /// From this machine: 127.0.0.0/8 or ::1.
   [[nodiscard]] bool is_loopback() const;
+  /// One host and one of its ports: neither a broadcast or multicast address nor port 0. A
+  /// network's own broadcast address is not known here; sockets refuse that.
+  [[nodiscard]] bool is_unicast() const;
   /// "127.0.0.1:47475" or "[::1]:47475".
   [[nodiscard]] std::string to_string() const;
 
+  /// Of a numeric address; empty for anything else: names are never resolved.
+  [[nodiscard]] static std::optional<Endpoint> parse(const std::string& address,
+                                                     std::uint16_t port);
   [[nodiscard]] static Endpoint ipv4(const std::array<std::uint8_t, 4>& address,
                                      std::uint16_t port);
 };

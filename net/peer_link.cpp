@@ -52,7 +52,9 @@ std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> da
     return std::nullopt;
   }
   Peer* const peer = admit(*message);
-  if (peer == nullptr || !tell_clock(*peer, *message, arrival)) return std::nullopt;
+  if (peer == nullptr) return std::nullopt;
+  peer->last_arrival = arrival;
+  if (!tell_clock(*peer, *message, arrival)) return std::nullopt;
   if (!peer->clock.is_usable()) {
     count("held_clock_unknown");
     return std::nullopt;
@@ -168,13 +170,14 @@ std::vector<ClockStatus> PeerLink::clocks() const {
   return known;
 }
 
-std::vector<PeerTraffic> PeerLink::traffic() const {
+std::vector<PeerTraffic> PeerLink::traffic(Timestamp now) const {
   std::vector<PeerTraffic> heard;
   for (const auto& [id, peer] : peers_) {
     if (!peer) continue;
     heard.push_back(peer->traffic);
     heard.back().received += peer->sequence.received();
     heard.back().lost += peer->sequence.lost();
+    heard.back().age_s = to_seconds(now - peer->last_arrival);
   }
   return heard;
 }

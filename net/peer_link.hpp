@@ -17,14 +17,6 @@
 
 namespace crepes {
 
-/// What came of one peer's datagrams.
-struct PeerTraffic {
-  RobotId peer{};
-  std::uint64_t received = 0;
-  std::uint64_t lost = 0;      ///< missing in the peer's sequence
-  std::uint64_t restarts = 0;  ///< the peer or its clock began anew
-};
-
 class PeerLink {
  public:
   /// `members` are all robots of the swarm; `self` may be among them.
@@ -41,7 +33,7 @@ class PeerLink {
   /// Peers whose clock is known, ordered by id.
   [[nodiscard]] std::vector<ClockStatus> clocks() const;
   /// All peers that were ever heard, ordered by id.
-  [[nodiscard]] std::vector<PeerTraffic> traffic() const;
+  [[nodiscard]] std::vector<PeerTraffic> traffic(Timestamp now) const;
   /// Totals by name: bytes and datagrams in and out, refusals by reason.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
 
@@ -53,6 +45,7 @@ class PeerLink {
     SequenceWindow sequence;
     RedundancyFilter redundancy;
     PeerTraffic traffic;
+    Timestamp last_arrival{};
   };
 
   [[nodiscard]] Peer* admit(const PeerMessage& message);

@@ -16,36 +16,57 @@ bool wants(const WatchRequest& wish, RobotId neighbor) {
 
 }  // namespace
 
+bool PoseRate::is_due(RobotId neighbor, Timestamp stamp) {
+  if (!rate_hz_) return true;
+  Timestamp& next = next_.try_emplace(neighbor, stamp).first->second;
+  if (stamp < next - from_seconds(kSlack / *rate_hz_)) return false;
+  next =
+      std::max(next + from_seconds(1 / *rate_hz_), stamp);  // after a pause, no burst to catch up
+  return true;
+}
+
 Result<void> SubscriberTable::watch(const Endpoint& client, const WatchRequest& request,
-                                    Timestamp now) {
+                                    Timestamp now, std::size_t via) {
   expire(now);
   if (!request.enable) {
     subscribers_.erase(client);
     return {};
   }
-  const auto limit = static_cast<std::size_t>(config_.max_subscribers);
-  if (!subscribers_.contains(client) && subscribers_.size() >= limit)
-    return fail(ErrorCode::kUsage, "too many subscribers, at most " + std::to_string(limit));
-
+  if (!subscribers_.contains(client)) {
+    if (Result<void> room = check_room(client); !room) return room;
+  }
   Subscriber& subscriber = subscribers_[client];
-  if (subscriber.wish.rate_hz != request.rate_hz) subscriber.next_due.clear();
+  if (subscriber.rate.rate_hz() != request.rate_hz) subscriber.rate = PoseRate(request.rate_hz);
   subscriber.wish = request;
+  subscriber.via = via;
   subscriber.lease_end = now + from_seconds(config_.lease_s);
   return {};
+}
+
+Result<void> SubscriberTable::check_room(const Endpoint& client) const {
+  const auto limit = static_cast<std::size_t>(config_.max_subscribers);
+  if (subscribers_.size() >= limit)
+    return fail(ErrorCode::kUsage, "too many subscribers, at most " + std::to_string(limit));
+  const auto neighbors = std::ranges::count_if(
+      subscribers_, [&](const auto& entry) { return entry.first.address == client.address; });
+  if (neighbors >= config_.max_per_address) {
+    return fail(ErrorCode::kUsage, "too many subscribers at this address, at most " +
+                                       std::to_string(config_.max_per_address));
+  }
+  return {};
+}
+
+std::optional<bool> SubscriberTable::admits(const Endpoint& client, Timestamp now) {
+  const auto subscriber = subscribers_.find(client);
+  if (subscriber == subscribers_.end()) return std::nullopt;
+  return subscriber->second.requests.take(now);
 }
 
 std::vector<PoseDelivery> SubscriberTable::deliveries(RobotId neighbor, Timestamp stamp) {
   std::vector<PoseDelivery> due;
   for (auto& [client, subscriber] : subscribers_) {
-    if (!wants(subscriber.wish, neighbor)) continue;
-    if (subscriber.wish.rate_hz) {
-      const Duration period = from_seconds(1 / *subscriber.wish.rate_hz);
-      const auto slack = from_seconds(kSlack / *subscriber.wish.rate_hz);
-      Timestamp& next = subscriber.next_due.try_emplace(neighbor, stamp).first->second;
-      if (stamp < next - slack) continue;
-      next = std::max(next + period, stamp);  // after a pause, no burst to catch up
-    }
-    due.push_back({client, subscriber.sequence++});
+    if (!wants(subscriber.wish, neighbor) || !subscriber.rate.is_due(neighbor, stamp)) continue;
+    due.push_back({client, subscriber.sequence++, subscriber.via});
   }
   return due;
 }

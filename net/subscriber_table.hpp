@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/result.hpp"
 #include "net/endpoint.hpp"
+#include "net/request_limiter.hpp"
 #include "net/subscription_json.hpp"
 
 namespace crepes {
@@ -16,18 +18,35 @@ namespace crepes {
 struct PoseDelivery {
   Endpoint client;
   std::uint64_t sequence = 0;  ///< counts this client's poses, from 0
+  std::size_t via = 0;         ///< the socket over which it asked
+};
+
+/// Thins out the poses of each neighbor to a rate.
+class PoseRate {
+ public:
+  /// `rate_hz` empty: every pose.
+  explicit PoseRate(std::optional<double> rate_hz = {}) : rate_hz_(rate_hz) {}
+
+  [[nodiscard]] std::optional<double> rate_hz() const { return rate_hz_; }
+  /// Whether a pose at `stamp` is due; stamps of one neighbor must not go back. Counts as sent.
+  [[nodiscard]] bool is_due(RobotId neighbor, Timestamp stamp);
+
+ private:
+  std::optional<double> rate_hz_;
+  std::map<RobotId, Timestamp> next_;
 };
 
 class SubscriberTable {
  public:
   explicit SubscriberTable(SubscriptionConfig config) : config_(std::move(config)) {}
 
-  /// Only loopback sources are answered at all.
-  [[nodiscard]] static bool is_served(const Endpoint& client) { return client.is_loopback(); }
-
-  /// Begins, renews, changes or ends a subscription; refused when the table is full.
+  /// Begins, renews, changes or ends a subscription; refused when the table is full or the address
+  /// has its share. `via` says over which socket to answer.
   [[nodiscard]] Result<void> watch(const Endpoint& client, const WatchRequest& request,
-                                   Timestamp now);
+                                   Timestamp now, std::size_t via = 0);
+
+  /// Whether a subscriber may ask now; empty for others.
+  [[nodiscard]] std::optional<bool> admits(const Endpoint& client, Timestamp now);
 
   /// The clients for which a pose of `neighbor` at `stamp` is due, counted as delivered; stamps of
   /// one neighbor must not go back. Call `expire` first.
@@ -46,9 +65,13 @@ class SubscriberTable {
   struct Subscriber {
     WatchRequest wish;
     Timestamp lease_end{};
+    std::size_t via = 0;
     std::uint64_t sequence = 0;
-    std::map<RobotId, Timestamp> next_due;
+    PoseRate rate;
+    TokenBucket requests{kClientRate};
   };
+
+  [[nodiscard]] Result<void> check_room(const Endpoint& client) const;
 
   SubscriptionConfig config_;
   std::map<Endpoint, Subscriber> subscribers_;

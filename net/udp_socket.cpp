@@ -123,15 +123,6 @@ Result<Endpoint> broadcast_address(const std::string& interface, std::uint16_t p
               interface + ": interface has no IPv4 address; give it one, see `ip address`");
 }
 
-Result<Endpoint> parse_address(const std::string& text, std::uint16_t port) {
-  if (std::array<std::uint8_t, 4> v4{}; ::inet_pton(AF_INET, text.c_str(), v4.data()) == 1)
-    return Endpoint::ipv4(v4, port);
-  Endpoint endpoint;
-  endpoint.port = port;
-  if (::inet_pton(AF_INET6, text.c_str(), endpoint.address.data()) == 1) return endpoint;
-  return fail(ErrorCode::kConfig, text + ": not a numeric IPv4 or IPv6 address");
-}
-
 int set_option(int fd, int level, int option) {
   const int on = 1;
   return ::setsockopt(fd, level, option, &on, sizeof(on));
@@ -182,9 +173,9 @@ Result<UdpSocket> UdpSocket::open_broadcast(const std::string& interface, std::u
 }
 
 Result<UdpSocket> UdpSocket::bind(const std::string& address, std::uint16_t port) {
-  return parse_address(address, port).and_then([](const Endpoint& endpoint) {
-    return open(endpoint, endpoint.to_string(), false);
-  });
+  const std::optional<Endpoint> endpoint = Endpoint::parse(address, port);
+  if (!endpoint) return fail(ErrorCode::kConfig, address + ": not a numeric IPv4 or IPv6 address");
+  return open(*endpoint, endpoint->to_string(), false);
 }
 
 Result<void> UdpSocket::broadcast(std::span<const std::uint8_t> bytes) {
@@ -202,10 +193,12 @@ Result<void> UdpSocket::send_to(std::span<const std::uint8_t> bytes, const Endpo
 
 Result<std::optional<Datagram>> UdpSocket::receive(std::chrono::milliseconds timeout) {
   CREPES_EXPECT(fd_ >= 0, "the socket was moved away");
-  pollfd ready{.fd = fd_, .events = POLLIN, .revents = 0};
-  const int count = ::poll(&ready, 1, static_cast<int>(timeout.count()));
-  if (count < 0 && errno != EINTR) return fail_errno(name_, errno);
-  if (count <= 0) return std::nullopt;
+  if (timeout.count() > 0) {  // without one, recvfrom tells by itself that nothing is there
+    pollfd ready{.fd = fd_, .events = POLLIN, .revents = 0};
+    const int count = ::poll(&ready, 1, static_cast<int>(timeout.count()));
+    if (count < 0 && errno != EINTR) return fail_errno(name_, errno);
+    if (count <= 0) return std::nullopt;
+  }
 
   Datagram datagram;
   datagram.bytes.resize(kMaxDatagram);

@@ -1,18 +1,9 @@
 #include "daemon/ctl/daemon_client.hpp"
 
-#include <arpa/inet.h>
+#include <utility>
 
 namespace crepes {
 namespace {
-
-Result<Endpoint> endpoint_of(const std::string& address, std::uint16_t port) {
-  std::array<std::uint8_t, 4> ipv4{};
-  if (::inet_pton(AF_INET, address.c_str(), ipv4.data()) == 1) return Endpoint::ipv4(ipv4, port);
-  Endpoint endpoint;
-  endpoint.port = port;
-  if (::inet_pton(AF_INET6, address.c_str(), endpoint.address.data()) == 1) return endpoint;
-  return fail(ErrorCode::kUsage, "'" + address + "' is not a numeric IPv4 or IPv6 address");
-}
 
 /// The local address from which `daemon` can be reached.
 std::string local_address_for(const Endpoint& daemon) {
@@ -23,20 +14,43 @@ std::string local_address_for(const Endpoint& daemon) {
 }  // namespace
 
 Result<DaemonClient> DaemonClient::open(const std::string& address, std::uint16_t port) {
-  const Result<Endpoint> daemon = endpoint_of(address, port);
-  if (!daemon) return tl::unexpected(daemon.error());
+  const std::optional<Endpoint> daemon = Endpoint::parse(address, port);
+  if (!daemon)
+    return fail(ErrorCode::kUsage, "'" + address + "' is not a numeric IPv4 or IPv6 address");
   return UdpSocket::bind(local_address_for(*daemon), 0).map([&](UdpSocket&& socket) {
     return DaemonClient(std::move(socket), *daemon);
   });
 }
 
-Result<void> DaemonClient::watch() { return send(R"({"class":"WATCH","enable":true})"); }
-Result<void> DaemonClient::unwatch() { return send(R"({"class":"WATCH","enable":false})"); }
-Result<void> DaemonClient::poll() { return send(R"({"class":"POLL"})"); }
+Result<void> DaemonClient::watch() { return ask(R"({"class":"WATCH","enable":true)"); }
+Result<void> DaemonClient::unwatch() { return ask(R"({"class":"WATCH","enable":false)"); }
+Result<void> DaemonClient::poll() { return ask(R"({"class":"POLL")"); }
+Result<void> DaemonClient::poll(RobotId neighbor) {
+  return ask(R"({"class":"POLL","peer":)" + std::to_string(neighbor.value));
+}
+Result<void> DaemonClient::poll(std::string_view part) {
+  return ask(R"({"class":"POLL","about":")" + std::string(part) + "\"");
+}
 
-Result<void> DaemonClient::send(std::string_view request) {
-  const std::vector<std::uint8_t> bytes(request.begin(), request.end());
-  return socket_.send_to(bytes, daemon_);
+Result<void> DaemonClient::ask(const std::string& request) {
+  constexpr std::size_t kMaxUnanswered = 4;
+  if (cookie_.empty() && unanswered_.size() < kMaxUnanswered) unanswered_.push_back(request);
+  return send(request);
+}
+
+/// Room for the cookie, or the cookie: a daemon elsewhere gives none for a shorter request.
+Result<void> DaemonClient::send(const std::string& request) {
+  constexpr std::size_t kCookieAnswer = 64;
+  const std::string end = cookie_.empty() ? R"(,"pad":")" + std::string(kCookieAnswer, ' ') + "\"}"
+                                          : R"(,"cookie":")" + cookie_ + "\"}";
+  const std::string text = request + end;
+  return socket_.send_to(std::vector<std::uint8_t>(text.begin(), text.end()), daemon_);
+}
+
+/// What gets lost here is asked again by whoever waits for it.
+void DaemonClient::take_cookie(const std::string& cookie) {
+  cookie_ = cookie;
+  for (const std::string& request : std::exchange(unanswered_, {})) (void)send(request);
 }
 
 Result<std::optional<DaemonAnswer>> DaemonClient::receive(std::chrono::milliseconds timeout) {
@@ -50,6 +64,11 @@ Result<std::optional<DaemonAnswer>> DaemonClient::receive(std::chrono::milliseco
     ++malformed_;
     return std::nullopt;
   }
+  if (const auto* cookie = std::get_if<CookieMessage>(&*message)) {
+    take_cookie(cookie->cookie);
+    return std::nullopt;
+  }
+  unanswered_.clear();
   answer.message = std::move(*message);
   return answer;
 }

@@ -55,11 +55,17 @@ struct StatusMessage {
   std::vector<Clock> clocks;
 };
 
+/// What a daemon elsewhere wants to see again before it says more.
+struct CookieMessage {
+  std::string cookie;
+};
+
 struct ErrorMessage {
   std::string message;
 };
 
-using DaemonMessage = std::variant<VersionMessage, PoseMessage, StatusMessage, ErrorMessage>;
+using DaemonMessage =
+    std::variant<VersionMessage, PoseMessage, StatusMessage, CookieMessage, ErrorMessage>;
 
 /// Classes that are not known, and what does not parse, are errors.
 [[nodiscard]] Result<DaemonMessage> parse_message(std::string_view datagram);
@@ -79,9 +85,13 @@ class DaemonClient {
   [[nodiscard]] Result<void> watch();
   [[nodiscard]] Result<void> unwatch();
   [[nodiscard]] Result<void> poll();
+  /// Asks for everything about one neighbor.
+  [[nodiscard]] Result<void> poll(RobotId neighbor);
+  /// Asks for one part of the status: "sensors" or "network".
+  [[nodiscard]] Result<void> poll(std::string_view part);
 
-  /// The next message, or nothing within `timeout`. Datagrams from elsewhere and what does not
-  /// parse count as nothing.
+  /// The next message, or nothing within `timeout`. Datagrams from elsewhere, cookies (which it
+  /// echoes by itself) and what does not parse count as nothing.
   [[nodiscard]] Result<std::optional<DaemonAnswer>> receive(std::chrono::milliseconds timeout);
 
   [[nodiscard]] int descriptor() const { return socket_.descriptor(); }
@@ -90,10 +100,15 @@ class DaemonClient {
  private:
   DaemonClient(UdpSocket socket, Endpoint daemon) : socket_(std::move(socket)), daemon_(daemon) {}
 
-  [[nodiscard]] Result<void> send(std::string_view request);
+  /// `request` is a JSON object but for its end.
+  [[nodiscard]] Result<void> ask(const std::string& request);
+  [[nodiscard]] Result<void> send(const std::string& request);
+  void take_cookie(const std::string& cookie);
 
   UdpSocket socket_;
   Endpoint daemon_;
+  std::string cookie_;
+  std::vector<std::string> unanswered_;  ///< asked again once there is a cookie
   std::uint64_t malformed_ = 0;
 };
 

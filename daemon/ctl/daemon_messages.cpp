@@ -83,6 +83,7 @@ DaemonMessage message_from(const Json& json) {
   if (name == "STATUS") return status_from(json);
   if (name == "VERSION")
     return VersionMessage{json.value("release", ""), json.value("lease_s", 0.0)};
+  if (name == "COOKIE") return CookieMessage{json.at("cookie").get<std::string>()};
   if (name == "ERROR") return ErrorMessage{json.value("message", "")};
   throw nlohmann::json::other_error::create(0, "unknown class " + name, nullptr);
 }

@@ -366,13 +366,15 @@ struct SubscriptionConfig {
   int port = 47475;
   double lease_s = 10.0;
   int max_subscribers = 32;
+  int max_per_address = 4;
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("listen", listen, "addresses to serve; loopback only");
+    v.field("listen", listen, "numeric addresses to serve; beyond loopback, clients echo a cookie");
     v.field("port", port, Bounds{1, 65535}, "UDP port");
     v.field("lease_s", lease_s, Bounds{1, 3600}, "a WATCH not renewed for longer ends");
     v.field("max_subscribers", max_subscribers, Bounds{1, 1024}, "further ones get an ERROR");
+    v.field("max_per_address", max_per_address, Bounds{1, 1024}, "of them, at one address");
   }
 };
 

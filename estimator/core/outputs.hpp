@@ -187,6 +187,15 @@ struct ClockStatus {
   double sigma_s = 0.0;
 };
 
+/// What came of one peer's datagrams.
+struct PeerTraffic {
+  RobotId peer{};
+  std::uint64_t received = 0;
+  std::uint64_t lost = 0;      ///< missing in the peer's sequence
+  std::uint64_t restarts = 0;  ///< the peer or its clock began anew
+  double age_s = 0.0;          ///< since the last one
+};
+
 struct QueueStatus {
   std::string name;
   std::uint64_t dropped = 0;
@@ -197,9 +206,12 @@ struct SystemStatus {
   RobotId self{};
   std::string name;
   double uptime_s = 0.0;
+  double cpu_s = 0.0;   ///< of all threads since start
+  double rss_mb = 0.0;  ///< resident memory [10^6 bytes]
   std::vector<SensorStatus> sensors;
   EstimatorStatus estimator;
   std::vector<ClockStatus> clocks;
+  std::vector<PeerTraffic> traffic;
   std::vector<QueueStatus> queues;
   std::vector<std::pair<std::string, std::uint64_t>> network;  ///< datagrams and refusals by reason
 };

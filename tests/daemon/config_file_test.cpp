@@ -288,8 +288,8 @@ TEST(ConfigFile, RefusesASecondCameraOfTheSameName) {
 
 TEST(ConfigFile, ServesPosesOnLoopbackOnly) {
   EXPECT_EQ(
-      faults_of(replaced("uwb: {noise_m: 0.05}", "subscription: {listen: [\"::1\", 0.0.0.0]}")),
-      "f:11: subscription.listen: \"0.0.0.0\" is not a loopback address");
+      faults_of(replaced("uwb: {noise_m: 0.05}", "subscription: {listen: [\"::1\", 0.0.0.0, localhost]}")),
+      "f:11: subscription.listen: \"localhost\" is not a numeric IPv4 or IPv6 address");
 }
 
 TEST(ConfigFile, TellsAllFaultsAtOnceInOrderOfLines) {

@@ -92,7 +92,7 @@ TEST(DaemonClient, TalksToWhoeverIsAtItsPortAndNobodyElse) {
 
   ASSERT_TRUE(request);
   const std::string text(request->bytes.begin(), request->bytes.end());
-  EXPECT_TRUE(std::holds_alternative<PollRequest>(parse_request(text).value()));
+  EXPECT_TRUE(std::holds_alternative<PollRequest>(parse_request(text).value().what));
   ASSERT_TRUE(stranger.send_to(bytes(error_json("not me")), request->from));
   EXPECT_FALSE(client.receive(1000ms).value());
   ASSERT_TRUE(daemon.send_to(bytes("garbage"), request->from));
@@ -102,6 +102,31 @@ TEST(DaemonClient, TalksToWhoeverIsAtItsPortAndNobodyElse) {
   const auto answer = client.receive(1000ms).value();
   ASSERT_TRUE(answer);
   EXPECT_EQ(std::get<ErrorMessage>(answer->message).message, "busy");
+}
+
+TEST(DaemonClient, EchoesTheCookieThatItsDaemonWants) {
+  auto daemon = UdpSocket::bind("127.0.0.1", 0).value();
+  auto client = DaemonClient::open("127.0.0.1", daemon.local().port).value();
+  const auto next_request = [&] {
+    const Datagram datagram = daemon.receive(10'000ms).value().value();
+    return std::pair{datagram.from, std::string(datagram.bytes.begin(), datagram.bytes.end())};
+  };
+  ASSERT_TRUE(client.watch());
+  ASSERT_TRUE(client.poll(RobotId{3}));
+  const auto [from, first] = next_request();
+  (void)next_request();
+  const std::string wanted = cookie_json("0123456789abcdef");
+  EXPECT_GE(first.size(), wanted.size());
+
+  ASSERT_TRUE(daemon.send_to(std::vector<std::uint8_t>(wanted.begin(), wanted.end()), from));
+  EXPECT_FALSE(client.receive(10'000ms).value());
+
+  const SubscriptionRequest watch = parse_request(next_request().second).value();
+  const SubscriptionRequest poll = parse_request(next_request().second).value();
+  EXPECT_EQ(watch.cookie, "0123456789abcdef");
+  EXPECT_TRUE(std::get<WatchRequest>(watch.what).enable);
+  EXPECT_EQ(poll.cookie, "0123456789abcdef");
+  EXPECT_EQ(std::get<PollRequest>(poll.what).peer, RobotId{3});
 }
 
 TEST(DaemonClient, RefusesAnAddressThatIsNone) {

@@ -18,7 +18,7 @@
 #include "firmware/protocol/led_messages.h"
 #include "net/crc32.hpp"
 #include "net/peer_message.hpp"
-#include "net/subscription_json.hpp"
+#include "net/subscription_desk.hpp"
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/recorded_files.hpp"
 
@@ -167,15 +167,18 @@ std::string_view text_of(Bytes data) {
 FuzzInput input_of(std::string_view text) { return {text.begin(), text.end()}; }
 
 void run_subscription(Bytes data) {
-  const auto request = parse_request(text_of(data));
-  if (request) return;
-  const std::string answer = error_json(request.error().message);
-  CREPES_EXPECT(answer.size() <= kMaxSubscriptionDatagram, "answers fit into a datagram");
+  SubscriptionDesk desk({}, "0", [] { return SystemStatus{}; }, {});
+  const Timestamp now{std::chrono::seconds{1}};
+  const auto local = desk.answer(Endpoint::ipv4({127, 0, 0, 1}, 4000), text_of(data), now);
+  CREPES_EXPECT(!local || local->size() <= kMaxSubscriptionDatagram, "answers fit a datagram");
+  const auto remote = desk.answer(Endpoint::ipv4({10, 0, 0, 1}, 4000), text_of(data), now);
+  CREPES_EXPECT(!remote || remote->size() <= data.size(), "nothing is amplified");
 }
 
 std::vector<FuzzInput> subscription_seeds() {
   return {input_of(R"({"class":"WATCH","enable":true,"rate_hz":10,"peers":[2,3]})"),
-          input_of(R"({"class":"WATCH","enable":false})"), input_of(R"({"class":"POLL"})")};
+          input_of(R"({"class":"WATCH","enable":false})"), input_of(R"({"class":"POLL"})"),
+          input_of(R"({"class":"POLL","peer":2,"cookie":"0123456789abcdef"})")};
 }
 
 /// What is valid is still that after it was written and read again.

@@ -115,7 +115,7 @@ TEST(PeerLink, TellsEveryMeasurementOnceAlthoughOneDatagramInThreeIsLost) {
 
   EXPECT_EQ(stamps.size(), distinct.size());
   EXPECT_GE(distinct.size(), 745U);  // of 750: eight copies all lost is 1 in 7000
-  const auto traffic = mesh.one.traffic();
+  const auto traffic = mesh.one.traffic(Timestamp{});
   ASSERT_EQ(traffic.size(), 1U);
   EXPECT_NEAR(static_cast<double>(traffic[0].lost), 165.0, 50.0);
 }
@@ -133,7 +133,7 @@ TEST(PeerLink, StartsAnewWhenAPeerReboots) {
   for (const auto& received : mesh.received)
     EXPECT_NEAR(to_seconds(received.report.stamp.time_since_epoch()), 106.0, 1.1);
   EXPECT_NEAR(mesh.one.clocks().at(0).offset_s, -99.0, 1e-3);
-  EXPECT_EQ(mesh.one.traffic().at(0).restarts, 1U);
+  EXPECT_EQ(mesh.one.traffic(Timestamp{}).at(0).restarts, 1U);
 }
 
 TEST(PeerLink, RefusesAndCountsWhatIsNotOfTheSwarm) {
@@ -190,7 +190,7 @@ TEST(PeerLink, SaysNothingOfAPeerThatDoesNotHearUs) {
   }
 
   EXPECT_TRUE(one.clocks().empty());
-  EXPECT_EQ(one.traffic().at(0).received, 100U);
+  EXPECT_EQ(one.traffic(Timestamp{}).at(0).received, 100U);
 }
 
 TEST(SequenceWindow, CountsLossesAndForgivesLateComers) {

@@ -127,14 +127,47 @@ TEST(SubscriberTable, RemembersABoundedNumberOfScoldedClients) {
   EXPECT_TRUE(table.admits_error(client(60000), kStart + seconds{2}));
 }
 
-TEST(SubscriberTable, ServesThisMachineOnly) {
-  Endpoint loopback6;
-  loopback6.address[15] = 1;
+TEST(SubscriberTable, GivesAnAddressItsShareAndLeavesRoomForOthers) {
+  SubscriberTable table{SubscriptionConfig{}};
+  for (std::uint16_t port = 1; port <= 4; ++port)
+    ASSERT_TRUE(table.watch(client(port), {}, kStart));
 
-  EXPECT_TRUE(SubscriberTable::is_served(client(1)));
-  EXPECT_TRUE(SubscriberTable::is_served(loopback6));
-  EXPECT_FALSE(SubscriberTable::is_served(Endpoint::ipv4({192, 168, 1, 2}, 5)));
-  EXPECT_FALSE(SubscriberTable::is_served(Endpoint{}));
+  const auto refused = table.watch(client(5), {}, kStart);
+  const auto renewed = table.watch(client(4), {}, kStart);
+  const auto elsewhere = table.watch(Endpoint::ipv4({127, 0, 0, 2}, 1), {}, kStart);
+
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("at this address, at most 4"), std::string::npos);
+  EXPECT_TRUE(renewed);
+  EXPECT_TRUE(elsewhere);
+}
+
+TEST(SubscriberTable, HasRoomForThirtyTwo) {
+  SubscriberTable table{SubscriptionConfig{}};
+  for (std::uint8_t host = 1; host <= 8; ++host)
+    for (std::uint16_t port = 1; port <= 4; ++port)
+      ASSERT_TRUE(table.watch(Endpoint::ipv4({127, 0, 0, host}, port), {}, kStart));
+
+  EXPECT_FALSE(table.watch(Endpoint::ipv4({127, 0, 0, 9}, 1), {}, kStart));
+}
+
+TEST(SubscriberTable, AnswersOverTheSocketThatTheClientAsked) {
+  SubscriberTable table{SubscriptionConfig{}};
+  ASSERT_TRUE(table.watch(client(1), {}, kStart, 3));
+
+  EXPECT_EQ(table.deliveries(RobotId{2}, kStart).at(0).via, 3U);
+}
+
+TEST(SubscriberTable, CountsTheRequestsOfASubscriberByThemselves) {
+  SubscriberTable table{SubscriptionConfig{}};
+  ASSERT_TRUE(table.watch(client(1), {}, kStart));
+
+  int admitted = 0;
+  for (int i = 0; i < 1000; ++i) admitted += table.admits(client(1), kStart).value() ? 1 : 0;
+
+  EXPECT_EQ(admitted, 100);
+  EXPECT_TRUE(table.admits(client(1), kStart + milliseconds{20}).value());
+  EXPECT_FALSE(table.admits(client(2), kStart).has_value());
 }
 
 }  // namespace

@@ -60,22 +60,35 @@ TEST(SubscriptionJson, ReadsAWatchAndIgnoresKeysItDoesNotKnow) {
       R"({"class":"WATCH","enable":true,"rate_hz":50,"peers":[2,3],"colour":{"a":[1]}})");
 
   ASSERT_TRUE(request.has_value());
-  const auto& watch = std::get<WatchRequest>(*request);
+  const auto& watch = std::get<WatchRequest>(request->what);
   EXPECT_TRUE(watch.enable);
   EXPECT_EQ(watch.rate_hz, 50.0);
   EXPECT_EQ(watch.peers, (std::vector{RobotId{2}, RobotId{3}}));
 }
 
 TEST(SubscriptionJson, WatchesEveryoneUnlessToldOtherwise) {
-  const auto watch = std::get<WatchRequest>(*parse_request(R"({"class":"WATCH"})"));
+  const auto watch = std::get<WatchRequest>(parse_request(R"({"class":"WATCH"})")->what);
 
   EXPECT_TRUE(watch.enable);
   EXPECT_FALSE(watch.peers.has_value());
   EXPECT_FALSE(watch.rate_hz.has_value());
 }
 
-TEST(SubscriptionJson, ReadsAPoll) {
-  EXPECT_TRUE(std::holds_alternative<PollRequest>(*parse_request(R"({"class":"POLL"})")));
+TEST(SubscriptionJson, ReadsAPollOfEverythingOfOneNeighborOrOfAPart) {
+  const auto poll_of = [](std::string_view request) {
+    return std::get<PollRequest>(parse_request(request)->what);
+  };
+
+  EXPECT_FALSE(poll_of(R"({"class":"POLL"})").peer.has_value());
+  EXPECT_EQ(poll_of(R"({"class":"POLL","peer":3})").peer, RobotId{3});
+  EXPECT_EQ(poll_of(R"({"class":"POLL","about":"sensors"})").about, StatusPart::kSensors);
+  EXPECT_EQ(poll_of(R"({"class":"POLL","about":"network"})").about, StatusPart::kNetwork);
+}
+
+TEST(SubscriptionJson, ReadsTheCookieOfAnyRequest) {
+  EXPECT_EQ(parse_request(R"({"class":"WATCH","cookie":"0af3"})")->cookie, "0af3");
+  EXPECT_EQ(parse_request(R"({"cookie":"0af3","class":"POLL"})")->cookie, "0af3");
+  EXPECT_EQ(parse_request(R"({"class":"POLL","pad":"xxxx"})")->cookie, "");
 }
 
 TEST(SubscriptionJson, SaysWhatIsWrongWithARequest) {
@@ -92,6 +105,9 @@ TEST(SubscriptionJson, SaysWhatIsWrongWithARequest) {
   EXPECT_NE(message_of(R"({"class":"WATCH","peers":[-1]})").find("peers"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"WATCH","peers":[70000]})").find("peers"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"WATCH","peers":2})").find("peers"), std::string::npos);
+  EXPECT_NE(message_of(R"({"class":"WATCH","cookie":7})").find("cookie"), std::string::npos);
+  EXPECT_NE(message_of(R"({"class":"POLL","peer":"r2"})").find("peer"), std::string::npos);
+  EXPECT_NE(message_of(R"({"class":"POLL","about":"love"})").find("about"), std::string::npos);
 }
 
 TEST(SubscriptionJson, RefusesHugeAndDeepRequestsUnparsed) {
@@ -171,16 +187,70 @@ TEST(SubscriptionJson, TellsAllOfASmallStatus) {
   EXPECT_EQ(json["network"]["refused_1"], 1001);
 }
 
+TEST(SubscriptionJson, TellsAboutEightNeighborsAndTheirClocksInOneStatus) {
+  SystemStatus status = big_status(8);
+  for (auto& sensor : status.sensors) {
+    sensor.ok = true;
+    sensor.message.clear();
+  }
+
+  const std::string text = status_json(status);
+  const Json json = Json::parse(text);
+
+  EXPECT_LE(text.size(), kMaxSubscriptionDatagram);
+  ASSERT_EQ(json["neighbors"].size(), 8U);
+  ASSERT_EQ(json["clocks"].size(), 8U);
+  EXPECT_EQ(json["sensors"].size(), 4U);
+  EXPECT_FALSE(json.contains("more"));
+  EXPECT_EQ(json["neighbors"][6]["state"], "direct");
+  EXPECT_EQ(json["neighbors"][7]["reason"], "never heard");
+  EXPECT_NEAR(json["clocks"][7]["offset_s"].get<double>(), 993.638158694, 1e-6);
+}
+
 TEST(SubscriptionJson, ShortensALargeStatusAndSaysSo) {
-  for (const int neighbors : {3, 20, 300}) {
+  for (const int neighbors : {3, 8, 20, 64, 300}) {
     const std::string text = status_json(big_status(neighbors));
     const Json json = Json::parse(text);
 
     EXPECT_LE(text.size(), kMaxSubscriptionDatagram);
+    EXPECT_EQ(text.find("null"), std::string::npos);
     EXPECT_EQ(json["truncated"], true);
-    EXPECT_GE(json["neighbors"].size(), 3U);
+    EXPECT_EQ(json["sensors"].size(), 4U);
+    EXPECT_GE(json["neighbors"].size(), neighbors <= 8 ? static_cast<std::size_t>(neighbors) : 3U);
     EXPECT_EQ(json["neighbors"][1]["reason"], "never heard");
+    if (neighbors <= 64) {  // every robot is at least named
+      EXPECT_EQ(json["neighbors"].size() + json.value("more", Json::array()).size(),
+                static_cast<std::size_t>(neighbors));
+    }
   }
+}
+
+TEST(SubscriptionJson, TellsAllAboutOneNeighbor) {
+  SystemStatus status = big_status(20);
+  status.traffic = {{.peer = RobotId{5}, .received = 70, .lost = 3, .restarts = 1, .age_s = 0.02}};
+
+  const std::string text = peer_status_json(status, RobotId{5}).value();
+  const Json json = Json::parse(text);
+
+  EXPECT_LE(text.size(), kMaxSubscriptionDatagram);
+  EXPECT_FALSE(json.contains("truncated"));
+  ASSERT_EQ(json["neighbors"].size(), 1U);
+  EXPECT_EQ(json["neighbors"][0]["name"], "robot-3");
+  EXPECT_EQ(json["neighbors"][0]["measurements"]["peer_range"]["gated"], 123456);
+  EXPECT_EQ(json["neighbors"][0]["reports"]["lost"], 3);
+  EXPECT_EQ(json["clocks"][0]["sigma_s"], 1.5e-5);
+  EXPECT_FALSE(peer_status_json(status, RobotId{1}).has_value());
+}
+
+TEST(SubscriptionJson, TellsOnePartAlone) {
+  const Json sensors = Json::parse(status_json(big_status(20), StatusPart::kSensors));
+  const Json network = Json::parse(status_json(big_status(20), StatusPart::kNetwork));
+
+  EXPECT_EQ(sensors["sensors"][3]["faults"]["bad_checksum"], 12345);
+  EXPECT_FALSE(sensors.contains("neighbors"));
+  EXPECT_EQ(network["network"]["refused_14"], 1014);
+  EXPECT_EQ(network["queues"]["events"], 42);
+  EXPECT_FALSE(network.contains("sensors"));
 }
 
 TEST(SubscriptionJson, AnswersWithItsVersionAndLease) {

@@ -1,0 +1,51 @@
+/// How many requests are read at all: tokens for each client and for all together. Pure.
+#pragma once
+
+#include <vector>
+
+#include "estimator/core/time.hpp"
+#include "net/endpoint.hpp"
+#include "net/keyed_hash.hpp"
+
+namespace crepes {
+
+/// Tokens that come back at a steady rate, up to a burst. Full at first.
+class TokenBucket {
+ public:
+  struct Rate {
+    double per_s;
+    double burst;
+  };
+
+  explicit TokenBucket(Rate rate) : rate_(rate), tokens_(rate.burst) {}
+
+  /// Whether there was a token left.
+  [[nodiscard]] bool take(Timestamp now);
+
+ private:
+  Rate rate_;
+  double tokens_;
+  Timestamp last_{};
+};
+
+/// What one client may ask.
+inline constexpr TokenBucket::Rate kClientRate{.per_s = 50, .burst = 100};
+/// What all may that have no subscription: on this machine, and elsewhere.
+inline constexpr TokenBucket::Rate kStrangersRate{.per_s = 500, .burst = 100};
+
+/// Clients without a subscription share a fixed number of buckets, dealt by a hash that they cannot
+/// foresee; machines elsewhere do not use up what programs on this one may ask.
+class RequestLimiter {
+ public:
+  explicit RequestLimiter(const HashKey& key);
+
+  [[nodiscard]] bool admits(const Endpoint& stranger, Timestamp now);
+
+ private:
+  HashKey key_;
+  std::vector<TokenBucket> clients_;
+  TokenBucket local_{kStrangersRate};
+  TokenBucket remote_{kStrangersRate};
+};
+
+}  // namespace crepes

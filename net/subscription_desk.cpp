@@ -1,0 +1,76 @@
+#include "net/subscription_desk.hpp"
+
+namespace crepes {
+
+SubscriptionDesk::SubscriptionDesk(const SubscriptionConfig& config, std::string release,
+                                   StatusSource status, const HashKey& key)
+    : port_(config.port),
+      lease_s_(config.lease_s),
+      release_(std::move(release)),
+      status_(std::move(status)),
+      table_(config),
+      cookies_(key),
+      limiter_(key) {}
+
+std::optional<std::string> SubscriptionDesk::answer(const Endpoint& client,
+                                                    std::string_view request, Timestamp now,
+                                                    std::size_t via) {
+  // Our own port, here or on another robot: two daemons must not answer each other for ever.
+  if (!client.is_unicast() || client.port == port_) {
+    ++unanswerable_;
+    return std::nullopt;
+  }
+  if (!admits(client, now)) {
+    ++excess_;
+    return std::nullopt;
+  }
+  ++requests_;
+  const Result<SubscriptionRequest> parsed = parse_request(request);
+  if (client.is_loopback() || (parsed && cookies_.accepts(parsed->cookie, client, now)))
+    return parsed ? serve(client, *parsed, now, via) : refuse(client, parsed.error(), now);
+
+  ++unverified_;
+  std::optional<std::string> answer =
+      parsed ? cookie_json(cookies_.cookie_for(client, now)) : refuse(client, parsed.error(), now);
+  return answer && answer->size() <= request.size() ? std::move(answer) : std::nullopt;
+}
+
+bool SubscriptionDesk::admits(const Endpoint& client, Timestamp now) {
+  table_.expire(now);
+  const std::optional<bool> subscriber = table_.admits(client, now);
+  return subscriber ? *subscriber : limiter_.admits(client, now);
+}
+
+std::optional<std::string> SubscriptionDesk::serve(const Endpoint& client,
+                                                   const SubscriptionRequest& request,
+                                                   Timestamp now, std::size_t via) {
+  if (const auto* poll = std::get_if<PollRequest>(&request.what)) {
+    if (!poll->peer) return status_json(status_(), poll->about);
+    if (auto told = peer_status_json(status_(), *poll->peer)) return told;
+    return refuse(client, {ErrorCode::kNotFound, "\"peer\" is no other robot of this swarm"}, now);
+  }
+  const auto watched = table_.watch(client, std::get<WatchRequest>(request.what), now, via);
+  if (!watched) return refuse(client, watched.error(), now);
+  return version_json(release_, lease_s_);
+}
+
+std::optional<std::string> SubscriptionDesk::refuse(const Endpoint& client, const Error& error,
+                                                    Timestamp now) {
+  ++refused_;
+  if (!table_.admits_error(client, now)) return std::nullopt;
+  return error_json(error.message);
+}
+
+std::vector<PoseDelivery> SubscriptionDesk::deliveries(RobotId neighbor, Timestamp stamp,
+                                                       Timestamp now) {
+  table_.expire(now);
+  return table_.deliveries(neighbor, stamp);
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> SubscriptionDesk::counters() const {
+  return {{"subscribers", table_.size()},       {"requests", requests_},
+          {"requests_refused", refused_},       {"requests_in_excess", excess_},
+          {"requests_unverified", unverified_}, {"requests_unanswerable", unanswerable_}};
+}
+
+}  // namespace crepes

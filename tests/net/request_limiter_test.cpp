@@ -1,0 +1,77 @@
+#include "net/request_limiter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+namespace crepes {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr Timestamp kStart{seconds{1000}};
+
+Endpoint local(int port) {
+  return Endpoint::ipv4({127, 0, 0, 1}, static_cast<std::uint16_t>(port));
+}
+Endpoint remote(int host) {
+  return Endpoint::ipv4(
+      {10, 0, static_cast<std::uint8_t>(host / 256), static_cast<std::uint8_t>(host % 256)}, 4000);
+}
+
+TEST(TokenBucket, GivesItsBurstAndThenItsRate) {
+  TokenBucket bucket({.per_s = 10, .burst = 3});
+
+  EXPECT_TRUE(bucket.take(kStart));
+  EXPECT_TRUE(bucket.take(kStart));
+  EXPECT_TRUE(bucket.take(kStart));
+  EXPECT_FALSE(bucket.take(kStart));
+  EXPECT_FALSE(bucket.take(kStart + milliseconds{99}));
+  EXPECT_TRUE(bucket.take(kStart + milliseconds{101}));
+  EXPECT_FALSE(bucket.take(kStart + milliseconds{102}));
+}
+
+TEST(TokenBucket, SavesNoMoreThanItsBurst) {
+  TokenBucket bucket({.per_s = 10, .burst = 2});
+  ASSERT_TRUE(bucket.take(kStart));
+
+  EXPECT_TRUE(bucket.take(kStart + seconds{100}));
+  EXPECT_TRUE(bucket.take(kStart + seconds{100}));
+  EXPECT_FALSE(bucket.take(kStart + seconds{100}));
+}
+
+TEST(TokenBucket, DoesNotMindATimeThatGoesBack) {
+  TokenBucket bucket({.per_s = 10, .burst = 1});
+  ASSERT_TRUE(bucket.take(kStart));
+
+  EXPECT_FALSE(bucket.take(kStart - seconds{5}));
+}
+
+TEST(RequestLimiter, LimitsOneClientWithoutLimitingAnother) {
+  RequestLimiter limiter(HashKey{});
+  int admitted = 0;
+  for (int i = 0; i < 10'000; ++i)
+    admitted += limiter.admits(local(1), kStart + milliseconds{i}) ? 1 : 0;
+
+  EXPECT_NEAR(admitted, 600, 5);  // a burst of 100 and 50 a second for ten seconds
+  EXPECT_TRUE(limiter.admits(local(2), kStart + seconds{10}));
+}
+
+TEST(RequestLimiter, LimitsAllTogetherHoweverManyTheyAre) {
+  RequestLimiter limiter(HashKey{});
+  int admitted = 0;
+  for (int i = 0; i < 60'000; ++i) admitted += limiter.admits(remote(i), kStart) ? 1 : 0;
+
+  EXPECT_EQ(admitted, 100);
+}
+
+TEST(RequestLimiter, KeepsRoomForThisMachineWhateverComesFromElsewhere) {
+  RequestLimiter limiter(HashKey{});
+  for (int i = 0; i < 60'000; ++i) (void)limiter.admits(remote(i), kStart);
+
+  EXPECT_TRUE(limiter.admits(local(1), kStart));
+}
+
+}  // namespace
+}  // namespace crepes

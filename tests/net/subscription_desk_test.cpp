@@ -1,0 +1,187 @@
+#include "net/subscription_desk.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <map>
+#include <nlohmann/json.hpp>
+
+namespace crepes {
+namespace {
+
+using Json = nlohmann::json;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr Timestamp kStart{seconds{1000}};
+constexpr RobotId kNeighbor{2};
+const Endpoint kLocal = Endpoint::ipv4({127, 0, 0, 1}, 40000);
+const Endpoint kRemote = Endpoint::ipv4({10, 0, 0, 7}, 40000);
+
+SystemStatus some_status() {
+  SystemStatus status;
+  status.self = RobotId{1};
+  status.estimator.neighbors.resize(1);
+  status.estimator.neighbors[0].neighbor = kNeighbor;
+  return status;
+}
+
+class Desk : public ::testing::Test {
+ protected:
+  std::optional<std::string> answer(const Endpoint& client, const std::string& request,
+                                    Timestamp now = kStart) {
+    return desk_.answer(client, request, now);
+  }
+  Json json_answer(const Endpoint& client, const std::string& request, Timestamp now = kStart) {
+    const auto text = answer(client, request, now);
+    return text ? Json::parse(*text) : Json{{"class", "nothing"}};
+  }
+  /// What a client elsewhere gets by asking for it.
+  std::string cookie_of(const Endpoint& client, Timestamp now = kStart) {
+    return json_answer(client, padded("WATCH"), now).value("cookie", "");
+  }
+  static std::string padded(const std::string& name, const std::string& cookie = "") {
+    return Json{{"class", name},
+                {"cookie", cookie.empty() ? "none" : cookie},
+                {"pad", std::string(60, ' ')}}
+        .dump();
+  }
+  std::uint64_t count(const std::string& name) const {
+    const auto totals = desk_.counters();
+    return std::map<std::string, std::uint64_t>(totals.begin(), totals.end()).at(name);
+  }
+  std::size_t subscribers(Timestamp now = kStart) {
+    return desk_.deliveries(kNeighbor, now, now).size();
+  }
+
+  SubscriptionDesk desk_{SubscriptionConfig{}, "0.1.0", some_status,
+                         HashKey{7, 1, 8, 2, 8, 1, 8, 2, 8, 4, 5, 9, 0, 4, 5, 2}};
+};
+
+TEST_F(Desk, AnswersThisMachineAtOnce) {
+  EXPECT_EQ(json_answer(kLocal, R"({"class":"WATCH"})")["class"], "VERSION");
+  EXPECT_EQ(json_answer(kLocal, R"({"class":"POLL"})")["class"], "STATUS");
+  EXPECT_EQ(subscribers(), 1U);
+}
+
+TEST_F(Desk, SendsNothingElsewhereUntilTheCookieCameBack) {
+  EXPECT_EQ(json_answer(kRemote, padded("WATCH"))["class"], "COOKIE");
+  EXPECT_EQ(json_answer(kRemote, padded("POLL"))["class"], "COOKIE");
+  EXPECT_EQ(subscribers(), 0U);
+
+  const std::string cookie = cookie_of(kRemote);
+
+  EXPECT_EQ(json_answer(kRemote, R"({"class":"WATCH","cookie":")" + cookie + "\"}")["class"],
+            "VERSION");
+  EXPECT_EQ(json_answer(kRemote, R"({"class":"POLL","cookie":")" + cookie + "\"}")["class"],
+            "STATUS");
+  EXPECT_EQ(subscribers(), 1U);
+}
+
+TEST_F(Desk, AnswersNobodyUnverifiedWithMoreThanHeSent) {
+  const std::string long_watch = padded("WATCH");
+  for (std::size_t size = 0; size <= long_watch.size(); ++size) {
+    // Cut or whole, garbage or request: each from an address that nothing is known of.
+    const auto host = static_cast<std::uint8_t>(size + 1);
+    for (const std::string& request :
+         {long_watch.substr(0, size), std::string(size, '['),
+          R"({"class":"POLL","pad":")" + std::string(size, ' ') + "\"}"}) {
+      const auto text =
+          answer(Endpoint::ipv4({10, 0, 1, host}, 4000), request, kStart + seconds{size});
+      EXPECT_LE(text ? text->size() : 0, request.size());
+    }
+  }
+}
+
+TEST_F(Desk, LeavesAShortRequestFromElsewhereUnanswered) {
+  EXPECT_FALSE(answer(kRemote, R"({"class":"WATCH"})").has_value());
+  EXPECT_FALSE(answer(kRemote, "?").has_value());
+}
+
+TEST_F(Desk, TakesACookieFromNobodyButWhoGotIt) {
+  const std::string cookie = cookie_of(kRemote);
+  const Endpoint thief = Endpoint::ipv4({10, 0, 0, 8}, kRemote.port);
+
+  EXPECT_EQ(json_answer(thief, padded("WATCH", cookie))["class"], "COOKIE");
+  EXPECT_EQ(subscribers(), 0U);
+}
+
+TEST_F(Desk, GivesANewCookieWhenTheOldOneIsTooOld) {
+  const std::string old = cookie_of(kRemote);
+  const Timestamp later = kStart + seconds{150};
+
+  const Json answer = json_answer(kRemote, padded("WATCH", old), later);
+  ASSERT_EQ(answer["class"], "COOKIE");
+  EXPECT_EQ(json_answer(kRemote, padded("WATCH", answer["cookie"]), later)["class"], "VERSION");
+}
+
+TEST_F(Desk, LetsNobodyUnverifiedEndASubscription) {
+  const std::string cookie = cookie_of(kRemote);
+  ASSERT_EQ(json_answer(kRemote, padded("WATCH", cookie))["class"], "VERSION");
+
+  (void)answer(kRemote, R"({"class":"WATCH","enable":false,"pad":"                        "})");
+
+  EXPECT_EQ(subscribers(), 1U);
+}
+
+TEST_F(Desk, NeverAnswersPortsAndAddressesThatAreNobody) {
+  const std::string watch = padded("WATCH");
+  Endpoint multicast6 = kLocal;
+  multicast6.address.fill(0);
+  multicast6.address[0] = 0xFF;
+  multicast6.address[15] = 1;
+
+  for (const Endpoint& forged :
+       {Endpoint::ipv4({127, 0, 0, 1}, 0), Endpoint::ipv4({10, 0, 0, 7}, 0),
+        Endpoint::ipv4({255, 255, 255, 255}, 4000), Endpoint::ipv4({127, 255, 255, 255}, 4000),
+        Endpoint::ipv4({224, 0, 0, 1}, 4000), Endpoint::ipv4({239, 255, 255, 250}, 1900),
+        Endpoint::ipv4({0, 0, 0, 0}, 4000), multicast6, Endpoint{.port = 4000}})
+    EXPECT_FALSE(answer(forged, watch).has_value()) << forged.to_string();
+  EXPECT_EQ(count("requests_unanswerable"), 9U);
+}
+
+TEST_F(Desk, NeverAnswersItselfNorAnotherDaemon) {
+  EXPECT_FALSE(answer(Endpoint::ipv4({127, 0, 0, 1}, 47475), "garbage").has_value());
+  EXPECT_FALSE(answer(Endpoint::ipv4({10, 0, 0, 2}, 47475), padded("WATCH")).has_value());
+}
+
+TEST_F(Desk, DropsRequestsInExcessUnreadAndCountsThem) {
+  std::size_t bytes = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    const auto text = answer(kLocal, R"({"class":"POLL"})", kStart + Duration{10'000LL * i});
+    bytes += text ? text->size() : 0;
+  }
+
+  EXPECT_NEAR(count("requests"), 150.0, 1.0);  // a burst of 100, and a second at 50
+  EXPECT_EQ(count("requests_in_excess"), 100'000 - count("requests"));
+  EXPECT_LE(bytes, 150 * kMaxSubscriptionDatagram);
+}
+
+TEST_F(Desk, RenewsASubscriptionInTheMiddleOfAFlood) {
+  ASSERT_EQ(json_answer(kLocal, R"({"class":"WATCH"})")["class"], "VERSION");
+  const auto flood = [&](Timestamp now) {
+    for (int port = 1024; port < 40'000; ++port)
+      (void)answer(Endpoint::ipv4({127, 0, 0, 1}, static_cast<std::uint16_t>(port)), "{}", now);
+  };
+
+  for (int second = 1; second <= 30; ++second) {
+    const Timestamp now = kStart + seconds{second};
+    flood(now);
+    EXPECT_EQ(json_answer(kLocal, R"({"class":"WATCH"})", now)["class"], "VERSION");
+  }
+  EXPECT_EQ(subscribers(kStart + seconds{30}), 1U);
+}
+
+TEST_F(Desk, TellsAllAboutOneNeighborAndNamesTheUnknown) {
+  EXPECT_EQ(json_answer(kLocal, R"({"class":"POLL","peer":2})")["neighbors"][0]["peer"], 2);
+  EXPECT_EQ(json_answer(kLocal, R"({"class":"POLL","peer":9})")["class"], "ERROR");
+}
+
+TEST_F(Desk, ScoldsOnceASecondAtMost) {
+  EXPECT_EQ(json_answer(kLocal, "garbage")["class"], "ERROR");
+  EXPECT_FALSE(answer(kLocal, "garbage", kStart + milliseconds{900}).has_value());
+  EXPECT_EQ(json_answer(kLocal, "garbage", kStart + milliseconds{1000})["class"], "ERROR");
+}
+
+}  // namespace
+}  // namespace crepes
