@@ -4,6 +4,8 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/sinks/systemd_sink.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstddef>
@@ -21,11 +23,17 @@ spdlog::level::level_enum level_of(LogLevel level) {
   return kLevels.at(static_cast<std::size_t>(level));
 }
 
+/// systemd writes into JOURNAL_STREAM which file it made our stderr, "device:inode": only if stderr
+/// still is that file, and not somebody's terminal, the journal is where messages are expected.
+bool stderr_is_the_journal() {
+  const char* stream = std::getenv("JOURNAL_STREAM");  // NOLINT(concurrency-mt-unsafe): no threads
+  struct stat file {};
+  return stream != nullptr && ::fstat(STDERR_FILENO, &file) == 0 &&
+         std::to_string(file.st_dev) + ":" + std::to_string(file.st_ino) == stream;
+}
+
 spdlog::sink_ptr make_sink() {
-  // systemd sets JOURNAL_STREAM for what it starts; read before there are threads.
-  const bool under_systemd =
-      std::getenv("JOURNAL_STREAM") != nullptr;  // NOLINT(concurrency-mt-unsafe)
-  if (under_systemd) return std::make_shared<spdlog::sinks::systemd_sink_mt>("crepesd");
+  if (stderr_is_the_journal()) return std::make_shared<spdlog::sinks::systemd_sink_mt>("crepesd");
   return std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
 }
 

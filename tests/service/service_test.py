@@ -1,0 +1,172 @@
+"""What a real systemd and the package's service do to each other. Run by run.sh as a unit in a container."""
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+
+from subscriber import Subscriber
+
+CONFIG = pathlib.Path("/etc/crepes/crepesd.yaml")
+FIRST = pathlib.Path("/crepes/r1.yaml").read_text()
+NEIGHBOR = 2
+
+failures = []
+
+
+def check(claim, holds, measured=""):
+    print(f"{'ok    ' if holds else 'FAILED'} {claim}{f': {measured}' if measured != '' else ''}")
+    if not holds:
+        failures.append(claim)
+
+
+def run(*command):
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+def shown(name):
+    return run("systemctl", "show", "-P", name, "crepesd").stdout.strip()
+
+
+def pid():
+    return int(shown("MainPID"))
+
+
+def awaited(holds, seconds=30.0):
+    """Whether and after how many seconds it holds."""
+    begin = time.monotonic()
+    while time.monotonic() - begin < seconds:
+        if holds():
+            return True, time.monotonic() - begin
+        time.sleep(0.01)
+    return False, seconds
+
+
+def comes_back(subscriber, what, harm, limit_s):
+    """Does harm to the daemon and measures until another one tells where the neighbor is."""
+    before = pid()
+    subscriber.drain()
+    begin = time.monotonic()
+    harm(before)
+    replaced, _ = awaited(lambda: pid() not in (0, before) and shown("ActiveState") == "active")
+    subscriber.drain()  # what the old one sent
+    _, came = subscriber.pose(NEIGHBOR)
+    seconds = came - begin if came else float("inf")
+    check(f"{what}, it is back with a pose within {limit_s} s", replaced and seconds < limit_s, f"{seconds:.2f} s")
+
+
+def install():
+    installed = run("dpkg", "-i", "/crepes/crepes.deb")
+    check("the package installs", installed.returncode == 0, installed.stderr.strip())
+    check("the user is there, and cannot log in", "nologin" in run("getent", "passwd", "crepes").stdout)
+    check("systemd finds no fault with the unit", run("systemd-analyze", "verify", "--man=no", "crepesd.service").stderr == "")
+    check("the service is enabled", run("systemctl", "is-enabled", "crepesd").stdout.strip() == "enabled")
+    check("it waits for a configuration", shown("ActiveState") == "inactive" and shown("ConditionResult") == "no")
+
+
+def udev_says(device):
+    """What udev does with one of devices.umockdev when it is plugged in."""
+    path = f"/sys/devices/pci0000:00/0000:00:14.0/usb1/{device}"
+    return run("umockdev-run", "--device=/crepes/devices.umockdev", "--", "udevadm", "test", "--action=add", path)
+
+
+def device_rules():
+    module = udev_says("1-3/1-3:1.0/tty/ttyACM0")
+    told = module.stdout + module.stderr
+    check("udev finds no fault with the rules", not re.search(r"70-crepes\.rules:\d+ (?!GROUP|MODE|ATTR|LINK)", told))
+    check("the UWB module has a name, and is the seat's", "DEVLINKS=/dev/crepes/uwb" in told and ":uaccess:" in told)
+    for device, kind in (("1-1", "MindVision"), ("1-2", "USB3 Vision")):
+        camera = udev_says(device)
+        check(f"a camera ({kind}) has a name, belongs to the group, and stays awake",
+              "DEVLINKS=/dev/crepes/camera" in camera.stdout and re.search(r"70-crepes.rules:\d+ GROUP", camera.stderr)
+              and "power/control' writing 'on'" in camera.stderr)
+    check("an FTDI bridge does not hold bytes back", "latency_timer' writing '1'" in udev_says("1-4/1-4:1.0/ttyUSB0").stderr)
+
+
+def faulty_configuration():
+    CONFIG.write_text(FIRST.replace("rate_hz:", "rate_herz:"))
+    started = run("systemctl", "start", "crepesd")
+    told = run("systemctl", "status", "--full", "crepesd").stdout
+    check("a faulty configuration fails the start", started.returncode != 0)
+    check("`systemctl status` names file, line and key", re.search(r"crepesd\.yaml:\d+.*rate_herz", told) is not None)
+    time.sleep(1.0)  # ten times RestartSec
+    check("and it is not tried again", shown("ActiveState") == "failed" and shown("NRestarts") == "0", shown("NRestarts"))
+
+
+def start(subscriber):
+    CONFIG.write_text(FIRST)
+    begin = time.monotonic()
+    started = run("systemctl", "start", "crepesd")
+    check("it starts and says that it is ready within 2 s", started.returncode == 0 and time.monotonic() - begin < 2.0,
+          f"{time.monotonic() - begin:.2f} s")
+    check("it says in a few words how it is", shown("StatusText") != "", shown("StatusText"))
+    _, came = subscriber.pose(NEIGHBOR)
+    check("it finds its neighbor within 10 s", came is not None and came - begin < 10.0, f"{came - begin:.2f} s" if came else "")
+    status = pathlib.Path(f"/proc/{pid()}/status").read_text()
+    owner = run("id", "-u", "crepes").stdout.strip()
+    check("it runs as user crepes without capabilities",
+          f"Uid:\t{owner}\t{owner}" in status and re.search(r"CapEff:\s+0+\n", status) is not None)
+    policies = {os.sched_getscheduler(int(thread)) for thread in os.listdir(f"/proc/{pid()}/task")}
+    check("all its threads are real-time", policies == {os.SCHED_FIFO}, policies)
+    journal = run("journalctl", "-o", "short", "-t", "crepesd").stdout
+    check("its messages are in the journal", "running with" in journal)
+    score = run("systemd-analyze", "security", "--no-pager", "crepesd").stdout.strip().splitlines()
+    check("systemd calls it well confined", run("systemd-analyze", "security", "--threshold=20", "crepesd").returncode == 0,
+          score[-1].lstrip("→ ") if score else "")
+
+
+def reloading(subscriber):
+    before = pid()
+    CONFIG.write_text(FIRST + "log: {level: debug}\n")
+    done = run("systemctl", "reload", "crepesd")
+    check("a reload is accepted", done.returncode == 0, done.stderr.strip())
+    check("by the same process, which is ready again", awaited(lambda: shown("ActiveState") == "active")[0] and pid() == before)
+    subscriber.drain()
+    check("and it goes on with poses", subscriber.pose(NEIGHBOR, 2.0)[0] is not None)
+    CONFIG.write_text(FIRST.replace("noise_m: 0.05", "noise_m: -1"))
+    check("a faulty file fails the reload", run("systemctl", "reload", "crepesd").returncode != 0)
+    run("systemctl", "kill", "--signal=HUP", "crepesd")  # past the check of the unit
+    subscriber.drain()
+    check("and changes nothing", subscriber.pose(NEIGHBOR, 2.0)[0] is not None and pid() == before)
+    CONFIG.write_text(FIRST)
+    run("systemctl", "reload", "crepesd")
+
+
+def stop():
+    begin = time.monotonic()
+    run("systemctl", "stop", "crepesd")
+    seconds = time.monotonic() - begin
+    check("it stops within 1 s, by itself", seconds < 1.0 and shown("Result") == "success", f"{seconds:.2f} s")
+
+
+def remove():
+    run("systemctl", "start", "crepesd")
+    check("the package is removed from under the running service", run("dpkg", "--purge", "crepes").returncode == 0)
+    check("which stops", not awaited(lambda: shown("ActiveState") == "active", 0.1)[0])
+    left = [path for path in ("/lib/systemd/system/crepesd.service", "/etc/systemd/system/crepesd.service",
+                              "/etc/systemd/system/multi-user.target.wants/crepesd.service", "/usr/bin/crepesd")
+            if os.path.lexists(path)]
+    check("and leaves nothing but the robot's own file", not left and CONFIG.exists(), left)
+
+
+def main():
+    install()
+    device_rules()
+    neighbor = subprocess.Popen(["/usr/bin/crepesd", "--config", "/crepes/r2.yaml"], stderr=subprocess.DEVNULL)
+    subscriber = Subscriber()
+    faulty_configuration()
+    start(subscriber)
+    comes_back(subscriber, "killed", lambda process: os.kill(process, signal.SIGKILL), 3.0)
+    comes_back(subscriber, "hung", lambda process: os.kill(process, signal.SIGSTOP), 3.0 + 3.0)  # WatchdogSec and as above
+    reloading(subscriber)
+    stop()
+    neighbor.terminate()
+    neighbor.wait()
+    remove()
+    print(f"{len(failures)} failed" if failures else "the service does what it should")
+    sys.exit(bool(failures))
+
+
+main()

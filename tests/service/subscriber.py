@@ -1,0 +1,47 @@
+"""Poses and statuses of a crepesd on this machine, as any program on a robot would get them."""
+import json
+import socket
+import time
+
+
+class Subscriber:
+    def __init__(self, port=47475):
+        self.daemon = ("127.0.0.1", port)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.settimeout(0.02)
+
+    def _next(self, request, wanted, seconds):
+        """The first object that is as wanted, and the moment it came; asked for every 50 ms."""
+        end = time.monotonic() + seconds
+        asked = 0.0
+        while time.monotonic() < end:
+            if time.monotonic() - asked > 0.05:
+                asked = time.monotonic()
+                try:
+                    self.socket.sendto(json.dumps(request).encode(), self.daemon)
+                except OSError:
+                    pass  # nobody there yet
+            try:
+                message = json.loads(self.socket.recv(2000))
+            except OSError:
+                continue
+            if wanted(message):
+                return message, time.monotonic()
+        return None, None
+
+    def drain(self):
+        """Forgets what came before now."""
+        self.socket.setblocking(False)
+        try:
+            while True:
+                self.socket.recv(2000)
+        except OSError:
+            pass
+        self.socket.settimeout(0.02)
+
+    def pose(self, peer, seconds=30.0, modes=("direct", "graph")):
+        wanted = lambda m: m["class"] == "POSE" and m["peer"] == peer and m["mode"] in modes
+        return self._next({"class": "WATCH", "enable": True}, wanted, seconds)
+
+    def status(self, wanted=lambda status: True, seconds=30.0):
+        return self._next({"class": "POLL"}, lambda m: m["class"] == "STATUS" and wanted(m), seconds)[0]
