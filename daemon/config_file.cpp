@@ -1,35 +1,20 @@
 #include "daemon/config_file.hpp"
 
-#include <yaml-cpp/eventhandler.h>
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
-#include <fstream>
-#include <sstream>
-#include <system_error>
+#include <iterator>
+#include <tuple>
 
 #include "daemon/config_reader.hpp"
 #include "daemon/config_rules.hpp"
+#include "daemon/config_sources.hpp"
 #include "daemon/config_writer.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr std::uintmax_t kMaxFileBytes = 1 << 20;
-
 bool is_inside(std::string_view path, std::string_view parent) {
   return path.starts_with(parent) &&
          (path.size() == parent.size() || path[parent.size()] == '.' || path[parent.size()] == '[');
-}
-
-/// Line of a key, or of the nearest thing around it that the file has.
-int line_of_key(const ReadLog& log, std::string key) {
-  for (;;) {
-    if (const auto it = log.lines.find(key); it != log.lines.end()) return it->second;
-    const std::size_t end = key.find_last_of(".[");
-    if (end == std::string::npos) return 1;
-    key.resize(end);
-  }
 }
 
 /// Adds the broken rules, except where the reader has found fault with the same thing already.
@@ -39,54 +24,28 @@ void add_rule_faults(const Config& config, ReadLog& log) {
     const bool told = std::ranges::any_of(unread, [&](const std::string& path) {
       return is_inside(path, rule.key) || is_inside(rule.key, path);
     });
-    if (told) continue;
-    log.lines.emplace(rule.key, line_of_key(log, rule.key));
-    log.fault(rule.key, std::move(rule.reason));
+    if (!told) log.fault(rule.key, std::move(rule.reason));
   }
 }
 
-class NothingHeard final : public YAML::EventHandler {
- public:
-  using Mark = YAML::Mark;
-  using Style = YAML::EmitterStyle::value;
-  void OnDocumentStart(const Mark& /*mark*/) override {}
-  void OnDocumentEnd() override {}
-  void OnNull(const Mark& /*mark*/, YAML::anchor_t /*anchor*/) override {}
-  void OnAlias(const Mark& /*mark*/, YAML::anchor_t /*anchor*/) override {}
-  void OnScalar(const Mark& /*mark*/, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
-                const std::string& /*value*/) override {}
-  void OnSequenceStart(const Mark& /*mark*/, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
-                       Style /*style*/) override {}
-  void OnSequenceEnd() override {}
-  void OnMapStart(const Mark& /*mark*/, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
-                  Style /*style*/) override {}
-  void OnMapEnd() override {}
-};
-
-/// 0, 1, or 2 for more. YAML::LoadAll never ends on some texts that are not YAML.
-int documents_in(const std::string& text) {
-  std::istringstream in(text);
-  YAML::Parser parser(in);
-  NothingHeard nothing;
-  int count = 0;
-  while (count < 2 && parser.HandleNextDocument(nothing)) ++count;
-  return count;
-}
-
-Result<std::string> read_text(const std::filesystem::path& path) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) return fail(ErrorCode::kIo, "is a directory");
-  std::ifstream in(path, std::ios::binary);
-  if (!in) {
-    return fail(ErrorCode::kNotFound,
-                "cannot be opened: " + std::generic_category().message(errno));
+/// `faults` are those found while `root` was gathered.
+CheckedConfig read_config(const ConfigNode& root, std::vector<ConfigFault> faults) {
+  CheckedConfig checked;
+  ReadLog log(root);
+  for (const ConfigFault& fault : faults) log.unread.insert(fault.key);
+  const bool is_document = root.kind != ConfigNode::Kind::kNothing;
+  if (!is_document && faults.empty()) log.fault("", "is empty");
+  if (is_document) {
+    ConfigReader reader(root, "", log);
+    checked.config.visit(reader);
+    reader.finish();
+    if (root.is_mapping()) add_rule_faults(checked.config, log);
   }
-  std::string text(kMaxFileBytes + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad()) return fail(ErrorCode::kIo, "cannot be read");
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  if (text.size() > kMaxFileBytes) return fail(ErrorCode::kFormat, "is larger than 1 MiB");
-  return text;
+  std::ranges::move(log.faults, std::back_inserter(faults));
+  std::ranges::stable_sort(
+      faults, {}, [](const ConfigFault& fault) { return std::tie(fault.file, fault.line); });
+  checked.faults = std::move(faults);
+  return checked;
 }
 
 }  // namespace
@@ -97,32 +56,15 @@ std::string to_string(const ConfigFault& fault) {
 }
 
 CheckedConfig check_config_text(const std::string& text, const std::string& file) {
-  CheckedConfig checked;
-  ReadLog log;
-  log.file = file;
-  try {
-    const int documents = documents_in(text);
-    if (documents == 1) {
-      const YAML::Node root = YAML::Load(text);
-      ConfigReader reader(root, "", log);
-      checked.config.visit(reader);
-      reader.finish();
-      if (root.IsMap()) add_rule_faults(checked.config, log);
-    } else {
-      log.fault("", documents == 0 ? "is empty" : "holds more than one YAML document");
-    }
-  } catch (const YAML::Exception& e) {
-    log.faults.push_back({file, e.mark.is_null() ? 1 : e.mark.line + 1, "", "not YAML: " + e.msg});
-  }
-  checked.faults = std::move(log.faults);
-  std::ranges::stable_sort(checked.faults, {}, &ConfigFault::line);
-  return checked;
+  std::vector<ConfigFault> faults;
+  const ConfigNode root = gather_config_text(text, file, faults);
+  return read_config(root, std::move(faults));
 }
 
 CheckedConfig check_config(const std::filesystem::path& path) {
-  const Result<std::string> text = read_text(path);
-  if (!text) return {{}, {{path.string(), 0, "", text.error().message}}};
-  return check_config_text(*text, path.string());
+  std::vector<ConfigFault> faults;
+  const ConfigNode root = gather_config(path, faults);
+  return read_config(root, std::move(faults));
 }
 
 Result<Config> load_config(const std::filesystem::path& path) {
@@ -162,7 +104,10 @@ std::string reference_config() {
   config.cameras = {camera};
   return "# Every key of crepesd.yaml with its default and bounds. Unknown keys are errors; keys "
          "without\n"
-         "# \"required\" may be left out. Written by `crepesd --write-reference`.\n" +
+         "# \"required\" may be left out. Changes of a section that is called live are applied on "
+         "SIGHUP, those\n"
+         "# of one that is called restart when crepesd starts again. Written by `crepesd "
+         "--write-reference`.\n" +
          write_config(config);
 }
 

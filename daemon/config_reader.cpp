@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kOrthonormalWithin = 1e-3;
 
-std::string expected(std::string_view what, const YAML::Node& node) {
+std::string expected(std::string_view what, const ConfigNode& node) {
   return "expected " + std::string(what) + ", found " + describe(node);
 }
 
@@ -25,11 +25,11 @@ bool parse_number(std::string_view text, Number& value) {
   return error == std::errc{} && end == text.data() + text.size();
 }
 
-std::string read_numbers(const YAML::Node& node, std::string_view what, std::size_t count,
+std::string read_numbers(const ConfigNode& node, std::string_view what, std::size_t count,
                          const auto& set) {
-  if (!node.IsSequence() || node.size() != count) return expected(what, node);
+  if (!node.is_list() || node.items.size() != count) return expected(what, node);
   for (std::size_t i = 0; i < count; ++i) {
-    if (std::string reason = set(i, node[i]); !reason.empty()) return reason;
+    if (std::string reason = set(i, node.items[i]); !reason.empty()) return reason;
   }
   return "";
 }
@@ -51,11 +51,11 @@ std::size_t edits_between(std::string_view a, std::string_view b) {
 
 /// Row by row.
 template <int kSize>
-std::string read_matrix(const YAML::Node& node, std::string_view what,
+std::string read_matrix(const ConfigNode& node, std::string_view what,
                         Eigen::Matrix<double, kSize, kSize>& value) {
   constexpr auto kCount = static_cast<std::size_t>(kSize);
-  return read_numbers(node, what, kCount, [&](std::size_t row, const YAML::Node& numbers) {
-    return read_numbers(numbers, what, kCount, [&](std::size_t column, const YAML::Node& element) {
+  return read_numbers(node, what, kCount, [&](std::size_t row, const ConfigNode& numbers) {
+    return read_numbers(numbers, what, kCount, [&](std::size_t column, const ConfigNode& element) {
       return read_value(element,
                         value(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)));
     });
@@ -63,16 +63,6 @@ std::string read_matrix(const YAML::Node& node, std::string_view what,
 }
 
 }  // namespace
-
-std::string describe(const YAML::Node& node) {
-  constexpr std::size_t kShown = 40;
-  if (node.IsScalar()) {
-    const std::string& text = node.Scalar();
-    return '"' + text.substr(0, kShown) + (text.size() > kShown ? "..." : "") + '"';
-  }
-  if (node.IsSequence()) return "a list of " + std::to_string(node.size());
-  return node.IsMap() ? "a mapping" : "nothing";
-}
 
 std::string check_bounds(double value, const Bounds& bounds) {
   if (value >= bounds.min && value <= bounds.max) return "";
@@ -84,29 +74,28 @@ std::string check_bounds(double value, const Bounds& bounds) {
   return text(value) + " is outside [" + text(bounds.min) + ", " + text(bounds.max) + "]";
 }
 
-std::string read_value(const YAML::Node& node, bool& value) {
-  if (!node.IsScalar()) return expected("true or false", node);
-  value = node.Scalar() == "true";
-  return value || node.Scalar() == "false" ? "" : expected("true or false", node);
+std::string read_value(const ConfigNode& node, bool& value) {
+  if (!node.is_text()) return expected("true or false", node);
+  value = node.text == "true";
+  return value || node.text == "false" ? "" : expected("true or false", node);
 }
 
-std::string read_value(const YAML::Node& node, int& value) {
-  return node.IsScalar() && parse_number(node.Scalar(), value) ? ""
-                                                               : expected("a whole number", node);
+std::string read_value(const ConfigNode& node, int& value) {
+  return node.is_text() && parse_number(node.text, value) ? "" : expected("a whole number", node);
 }
 
-std::string read_value(const YAML::Node& node, double& value) {
-  const bool good = node.IsScalar() && parse_number(node.Scalar(), value) && std::isfinite(value);
+std::string read_value(const ConfigNode& node, double& value) {
+  const bool good = node.is_text() && parse_number(node.text, value) && std::isfinite(value);
   return good ? "" : expected("a number", node);
 }
 
-std::string read_value(const YAML::Node& node, std::string& value) {
-  if (!node.IsScalar()) return expected("text", node);
-  value = node.Scalar();
+std::string read_value(const ConfigNode& node, std::string& value) {
+  if (!node.is_text()) return expected("text", node);
+  value = node.text;
   return "";
 }
 
-std::string read_value(const YAML::Node& node, RobotId& value) {
+std::string read_value(const ConfigNode& node, RobotId& value) {
   int number = 0;
   if (std::string reason = read_value(node, number); !reason.empty()) return reason;
   constexpr Bounds kHeld{0, std::numeric_limits<std::uint16_t>::max()};
@@ -115,47 +104,47 @@ std::string read_value(const YAML::Node& node, RobotId& value) {
   return "";
 }
 
-std::string read_value(const YAML::Node& node, Eigen::Vector3d& value) {
-  return read_numbers(node, "3 numbers", 3, [&](std::size_t i, const YAML::Node& element) {
+std::string read_value(const ConfigNode& node, Eigen::Vector3d& value) {
+  return read_numbers(node, "3 numbers", 3, [&](std::size_t i, const ConfigNode& element) {
     return read_value(element, value[static_cast<Eigen::Index>(i)]);
   });
 }
 
-std::string read_value(const YAML::Node& node, Eigen::Matrix3d& value) {
+std::string read_value(const ConfigNode& node, Eigen::Matrix3d& value) {
   return read_matrix(node, "a 3x3 matrix as 3 rows of 3 numbers", value);
 }
 
-std::string read_value(const YAML::Node& node, std::array<int, 2>& value) {
-  return read_numbers(node, "2 whole numbers", 2, [&](std::size_t i, const YAML::Node& element) {
+std::string read_value(const ConfigNode& node, std::array<int, 2>& value) {
+  return read_numbers(node, "2 whole numbers", 2, [&](std::size_t i, const ConfigNode& element) {
     return read_value(element, value.at(i));
   });
 }
 
-std::string read_value(const YAML::Node& node, std::vector<double>& value) {
-  if (!node.IsSequence()) return expected("a list of numbers", node);
-  value.resize(node.size());
-  return read_numbers(node, "numbers", node.size(), [&](std::size_t i, const YAML::Node& element) {
-    return read_value(element, value[i]);
-  });
+std::string read_value(const ConfigNode& node, std::vector<double>& value) {
+  if (!node.is_list()) return expected("a list of numbers", node);
+  value.resize(node.items.size());
+  return read_numbers(
+      node, "numbers", node.items.size(),
+      [&](std::size_t i, const ConfigNode& element) { return read_value(element, value[i]); });
 }
 
-std::string read_value(const YAML::Node& node, std::vector<std::array<int, 2>>& value) {
-  if (!node.IsSequence()) return expected("a list of pairs", node);
-  value.resize(node.size());
-  return read_numbers(node, "pairs", node.size(), [&](std::size_t i, const YAML::Node& element) {
-    return read_value(element, value[i]);
-  });
+std::string read_value(const ConfigNode& node, std::vector<std::array<int, 2>>& value) {
+  if (!node.is_list()) return expected("a list of pairs", node);
+  value.resize(node.items.size());
+  return read_numbers(
+      node, "pairs", node.items.size(),
+      [&](std::size_t i, const ConfigNode& element) { return read_value(element, value[i]); });
 }
 
-std::string read_value(const YAML::Node& node, std::vector<std::string>& value) {
-  if (!node.IsSequence()) return expected("a list of texts", node);
-  value.resize(node.size());
-  return read_numbers(node, "texts", node.size(), [&](std::size_t i, const YAML::Node& element) {
-    return read_value(element, value[i]);
-  });
+std::string read_value(const ConfigNode& node, std::vector<std::string>& value) {
+  if (!node.is_list()) return expected("a list of texts", node);
+  value.resize(node.items.size());
+  return read_numbers(
+      node, "texts", node.items.size(),
+      [&](std::size_t i, const ConfigNode& element) { return read_value(element, value[i]); });
 }
 
-std::string read_value(const YAML::Node& node, Pose& value) {
+std::string read_value(const ConfigNode& node, Pose& value) {
   Eigen::Matrix4d T;
   std::string reason = read_matrix(node, "a 4x4 matrix as 4 rows of 4 numbers", T);
   if (!reason.empty()) return reason;
@@ -173,54 +162,49 @@ std::string read_value(const YAML::Node& node, Pose& value) {
   return "";
 }
 
-ConfigReader::ConfigReader(const YAML::Node& node, std::string path, ReadLog& log)
-    : path_(std::move(path)), is_mapping_(node.IsMap()), log_(log) {
-  if (!is_mapping_) {
-    log_.fault(path_, expected("a mapping of keys to values", node));
-    return;
-  }
-  for (const auto& entry : node) {
-    if (!entry.first.IsScalar()) {
-      log_.fault(path_, expected("a key", entry.first));
-      continue;
-    }
-    const std::string& key = entry.first.Scalar();
-    const auto [it, inserted] = log_.lines.emplace(path_of(key), line_of(entry.first));
-    if (inserted) {
-      entries_.emplace(key, entry.second);
-    } else {
-      log_.fault(path_of(key), "is given again in line " + std::to_string(line_of(entry.first)));
-    }
-  }
+ConfigReader::ConfigReader(const ConfigNode& node, std::string path, ReadLog& log)
+    : node_(node), path_(std::move(path)), log_(log) {
+  if (!node.is_mapping())
+    log_.fault(node.place, path_, expected("a mapping of keys to values", node));
+  if (node.is_incomplete) log_.unread.insert(path_);
 }
 
 void ConfigReader::finish() {
-  for (const auto& entry : entries_) {
-    const std::string& key = entry.first;
-    const auto nearest =
-        std::ranges::min_element(known_, {}, [&](const auto& k) { return edits_between(k, key); });
+  for (std::size_t i = 0; i < node_.keys.size() && !ignores_unknown_keys_; ++i) {
+    const std::string& key = node_.keys[i];
+    if (std::ranges::count(known_, key) > 0) continue;
     std::string reason = "unknown key";
-    if (nearest != known_.end() && edits_between(*nearest, key) <= 1 + key.size() / 3) {
+    const auto nearest = nearest_key(key);
+    if (nearest) {
       reason += "; did you mean " + *nearest + "?";
       std::erase_if(missing_, [&](const Missing& missing) { return missing.key == *nearest; });
       log_.unread.insert(path_of(*nearest));
     }
-    log_.fault(path_of(key), reason);
+    log_.fault(node_.items[i].place, path_of(key), reason);
   }
-  for (const Missing& missing : missing_) {
-    const std::string path = path_of(missing.key);
-    log_.lines.emplace(path, log_.lines.contains(path_) ? log_.lines[path_] : 1);
-    log_.fault(path, "is missing: " + missing.help);
-  }
+  if (node_.is_incomplete) return;
+  for (const Missing& missing : missing_)
+    log_.fault(node_.place, path_of(missing.key), "is missing: " + missing.help);
 }
 
-std::optional<YAML::Node> ConfigReader::take(std::string_view key) {
-  const auto it = entries_.find(key);
-  if (it == entries_.end()) {
-    known_.emplace_back(key);
-    return std::nullopt;
+/// The key that was asked for in vain and is spelt most alike, if any is spelt alike at all.
+std::optional<std::string> ConfigReader::nearest_key(std::string_view key) const {
+  constexpr std::size_t kLongest = 64;
+  if (key.size() > kLongest) return std::nullopt;
+  std::optional<std::string> nearest;
+  std::size_t fewest = 1 + key.size() / 3;
+  for (const std::string& known : known_) {
+    const std::size_t edits = edits_between(known, key);
+    if (edits > fewest || (nearest && edits == fewest) || node_.find(known) != nullptr) continue;
+    nearest = known;
+    fewest = edits;
   }
-  return entries_.extract(it).mapped();
+  return nearest;
+}
+
+const ConfigNode* ConfigReader::take(std::string_view key) {
+  known_.emplace_back(key);
+  return node_.find(key);
 }
 
 std::string ConfigReader::path_of(std::string_view key) const {
@@ -228,7 +212,7 @@ std::string ConfigReader::path_of(std::string_view key) const {
 }
 
 void ConfigReader::missing(std::string_view key, std::string_view help) {
-  if (is_mapping_) missing_.push_back({std::string(key), std::string(help)});
+  if (node_.is_mapping()) missing_.push_back({std::string(key), std::string(help)});
 }
 
 }  // namespace crepes

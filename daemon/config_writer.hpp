@@ -62,6 +62,10 @@ class ConfigWriter {
   }
 
   template <class Section>
+  void section(std::string_view key, Section& nested, Change when, std::string_view help) {
+    section(key, nested, std::string(help) + name_of(when));
+  }
+  template <class Section>
   void section(std::string_view key, Section& section, std::string_view help) {
     text_ += '\n';
     comment(std::string(help));
@@ -69,6 +73,10 @@ class ConfigWriter {
     nest(section, indent_ + "  ");
   }
 
+  template <class Item>
+  void list(std::string_view key, std::vector<Item>& items, Change when, std::string_view help) {
+    list(key, items, std::string(help) + name_of(when));
+  }
   template <class Item>
   void list(std::string_view key, std::vector<Item>& items, std::string_view help) {
     text_ += '\n';
@@ -78,6 +86,12 @@ class ConfigWriter {
       line("  -");
       nest(item, indent_ + "    ");
     }
+  }
+
+  /// Is not written: what it names is.
+  void reference(std::string_view key, std::string_view help) {
+    comment(std::string(help));
+    comment(std::string(key) + ":");
   }
 
  private:
@@ -100,6 +114,9 @@ class ConfigWriter {
     text_ += writer.text();
   }
 
+  [[nodiscard]] static std::string name_of(Change when) {
+    return when == Change::kLive ? " (live)" : " (restart)";
+  }
   [[nodiscard]] static std::string range_of(const Bounds& bounds) {
     return " [" + yaml_of(bounds.min) + " .. " + yaml_of(bounds.max) + "]";
   }

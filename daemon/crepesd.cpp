@@ -19,20 +19,14 @@ constexpr int kDone = 0;
 constexpr int kBadInput = 1;
 constexpr int kBadUsage = 2;
 
-int check(const std::string& file) {
-  const auto faults = check_config(file).faults;
-  for (const ConfigFault& fault : faults) std::cerr << to_string(fault) << '\n';
-  if (!faults.empty()) return kBadInput;
-  std::cout << file << ": good\n";
-  return kDone;
+int print(const Result<std::string>& text) {
+  (text ? std::cout << *text : std::cerr << text.error().message << '\n') << std::flush;
+  return text ? kDone : kBadInput;
 }
 
 int run(const std::string& file) {
   Result<Config> config = load_config(file);
-  if (!config) {
-    std::cerr << config.error().message << '\n';
-    return kBadInput;
-  }
+  if (!config) return print(tl::unexpected(config.error()));
   const StopSignals signals;
   const LogSession log(config->log.level);
   const MonotonicClock machine;
@@ -55,22 +49,25 @@ int run(const std::string& file) {
 
 int main(int argc, char** argv) {
   CLI::App app{"Relative localization of a robot swarm", "crepesd"};
-  std::string config;
-  std::string checked;
-  app.set_version_flag("--version", std::string(crepes::kVersion));
-  app.add_option("--config", config, "run with this configuration");
-  app.add_option("--check-config", checked, "print every fault of a configuration and exit");
+  std::string file = "/etc/crepes/crepesd.yaml";
+  const auto add_file_option = [&](const std::string& name, const std::string& help) {
+    return app.add_option(name, file, help)->expected(0, 1)->capture_default_str();
+  };
+  add_file_option("--config", "run with this configuration, as without any option");
+  const auto* check = add_file_option("--check-config", "print every fault of it and exit");
+  const auto* dump = add_file_option("--dump-config", "print what its files make together, exit");
   bool reference = false;
   app.add_flag("--write-reference", reference, "print a configuration with all keys and exit");
-  app.require_option(1);
+  app.set_version_flag("--version", std::string(crepes::kVersion));
+  app.require_option(0, 1);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? crepes::kDone : crepes::kBadUsage;
   }
-  if (reference) {
-    std::cout << crepes::reference_config();
-    return crepes::kDone;
-  }
-  return checked.empty() ? crepes::run(config) : crepes::check(checked);
+  if (reference) return crepes::print(crepes::reference_config());
+  if (*dump) return crepes::print(crepes::load_config(file).map(crepes::write_config));
+  if (!*check) return crepes::run(file);
+  const auto praise = [&](const crepes::Config& /*config*/) { return file + ": good\n"; };
+  return crepes::print(crepes::load_config(file).map(praise));
 }

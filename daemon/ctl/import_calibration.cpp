@@ -1,41 +1,21 @@
 #include "daemon/ctl/import_calibration.hpp"
 
 #include <algorithm>
-#include <iterator>
-#include <string_view>
 
 #include "daemon/config_file.hpp"
-#include "daemon/config_writer.hpp"
 #include "daemon/ctl/csv_file.hpp"
-#include "daemon/ctl/imported_calibration.hpp"
+#include "daemon/imported_calibration.hpp"
 
 namespace crepes {
 namespace {
 
 constexpr std::size_t kMaxFileBytes = 1 << 20;
 
-ImportedCalibration read_root(const YAML::Node& root, ReadLog& log) {
-  if (is_basalt(root)) return read_basalt(root, log);
-  if (is_kalibr(root)) return read_kalibr(root, log);
-  log.fault("",
-            "neither a camchain nor an imu.yaml of Kalibr (cam0, imu0, update_rate), nor a "
-            "calibration of Basalt (value0)");
-  return {};
-}
-
 ImportedCalibration read_text(const std::string& text, const std::string& file,
                               std::vector<ConfigFault>& faults) {
-  ReadLog log;
-  log.file = file;
-  ImportedCalibration calibration;
-  try {
-    calibration = read_root(YAML::Load(text), log);  // JSON is YAML, too
-  } catch (const YAML::Exception& e) {
-    log.faults.push_back(
-        {log.file, e.mark.is_null() ? 1 : e.mark.line + 1, "", "not YAML or JSON: " + e.msg});
-  }
-  std::ranges::move(log.faults, std::back_inserter(faults));
-  return calibration;
+  const std::size_t faults_before = faults.size();
+  const ConfigNode root = parse_yaml(text, file, faults);  // JSON is YAML, too
+  return faults.size() > faults_before ? ImportedCalibration{} : read_calibration(root, faults);
 }
 
 /// Adds what `more` has; a fault where both have the same thing.
@@ -48,43 +28,6 @@ void join(ImportedCalibration& all, ImportedCalibration more, const std::string&
   }
   if (all.imu && more.imu) faults.push_back({file, 1, "imu", "is in another file, too"});
   if (more.imu) all.imu = more.imu;
-}
-
-template <class T>
-std::string line_of(std::string_view indent, std::string_view key, const T& value) {
-  return std::string(indent) + std::string(key) + ": " + yaml_of(value) + '\n';
-}
-
-std::string camera_text(const CameraConfig& camera) {
-  constexpr std::string_view kIndent = "    ";
-  const bool is_double_sphere = camera.camera_model == CameraModelKind::kDoubleSphere;
-  std::string text = "  - name: " + camera.name + "\n    camera_model: ";
-  text += is_double_sphere ? "ds\n" : "pinhole\n";
-  text += line_of(kIndent, "intrinsics", camera.intrinsics);
-  if (!is_double_sphere) {
-    text += "    distortion_model: equidistant\n";
-    text += line_of(kIndent, "distortion_coeffs", camera.distortion_coeffs);
-  }
-  text += line_of(kIndent, "resolution", camera.resolution);
-  text += line_of(kIndent, "T_cam_imu", camera.T_cam_imu);
-  return text + line_of(kIndent, "timeshift_cam_imu", camera.timeshift_cam_imu);
-}
-
-std::string imu_text(const ImuConfig& imu) {
-  constexpr std::string_view kIndent = "  ";
-  return "imu:\n" + line_of(kIndent, "update_rate", imu.update_rate) +
-         line_of(kIndent, "accelerometer_noise_density", imu.accelerometer_noise_density) +
-         line_of(kIndent, "gyroscope_noise_density", imu.gyroscope_noise_density) +
-         line_of(kIndent, "accelerometer_random_walk", imu.accelerometer_random_walk) +
-         line_of(kIndent, "gyroscope_random_walk", imu.gyroscope_random_walk);
-}
-
-std::string sections_text(const ImportedCalibration& calibration) {
-  std::string text;
-  if (!calibration.cameras.empty()) text += "cameras:\n";
-  for (const CameraConfig& camera : calibration.cameras) text += camera_text(camera);
-  if (calibration.imu) text += imu_text(*calibration.imu);
-  return text;
 }
 
 /// What our own configuration says against these sections; the rest of it is not there.
@@ -110,7 +53,7 @@ Result<std::string> import_calibration(const std::vector<std::filesystem::path>&
     join(all, read_text(*text, file.string(), faults), file.string(), faults);
     names += (names.empty() ? "" : ", ") + file.filename().string();
   }
-  const std::string sections = sections_text(all);
+  const std::string sections = calibration_text(all);
   if (faults.empty()) faults = faults_here(sections);
   if (!faults.empty()) {
     std::string message;

@@ -146,7 +146,7 @@ TEST(ImportCalibration, ReachesACameraByWayOfTheOneBefore) {
 
 TEST(ImportCalibration, SaysThatACamchainWithoutImuIsNotEnough) {
   EXPECT_EQ(refusal("camchain.yaml", "cam_overlaps: [1]", "cam_overlaps: []"),
-            "camchain.yaml:2: cam0: no T_cam_imu: a camchain of kalibr_calibrate_cameras does not "
+            "camchain.yaml:1: cam0: no T_cam_imu: a camchain of kalibr_calibrate_cameras does not "
             "know the IMU; give that of kalibr_calibrate_imu_camera");
 }
 
@@ -171,12 +171,12 @@ TEST(ImportCalibration, RefusesOtherModelsByFileAndLine) {
 
 TEST(ImportCalibration, RefusesWhatIsMissingOrOfTheWrongLength) {
   EXPECT_EQ(refusal("camchain-imucam.yaml", "  camera_model: ds\n", ""),
-            "camchain-imucam.yaml:2: cam0: camera_model is missing");
+            "camchain-imucam.yaml:1: cam0: camera_model is missing");
   EXPECT_EQ(refusal("camchain-imucam.yaml", "316.7621859215437, ", ""),
             "camchain-imucam.yaml:11: cam0.intrinsics: ds has 6 intrinsics (xi, alpha, fx, fy, cx, "
             "cy), not 5");
   EXPECT_EQ(refusal("imu.yaml", "update_rate:                 200.0", ""),
-            "imu.yaml:2: update_rate: is missing: samples a second");
+            "imu.yaml:1: update_rate: is missing: samples a second");
   EXPECT_EQ(refusal("basalt.json", "\"qw\": -0.5", "\"w\": -0.5"),
             "basalt.json:4: value0.T_imu_cam[0].qw: is missing: quaternion");
   EXPECT_EQ(refusal("basalt.json", "\"alpha\": 0.5930926144379498", "\"beta\": 0.59"),

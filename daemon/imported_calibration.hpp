@@ -1,7 +1,6 @@
 /// What calibration files of other programs say, in our words.
 #pragma once
 
-#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,20 +16,26 @@ struct ImportedCalibration {
 };
 
 /// Kalibr's camchain.yaml, camchain-imucam.yaml and imu.yaml. Faults go to the log.
-[[nodiscard]] bool is_kalibr(const YAML::Node& root);
-[[nodiscard]] ImportedCalibration read_kalibr(const YAML::Node& root, ReadLog& log);
+[[nodiscard]] bool is_kalibr(const ConfigNode& root);
+[[nodiscard]] ImportedCalibration read_kalibr(const ConfigNode& root, ReadLog& log);
 
 /// Basalt's calibration.json. Faults go to the log.
-[[nodiscard]] bool is_basalt(const YAML::Node& root);
-[[nodiscard]] ImportedCalibration read_basalt(const YAML::Node& root, ReadLog& log);
+[[nodiscard]] bool is_basalt(const ConfigNode& root);
+[[nodiscard]] ImportedCalibration read_basalt(const ConfigNode& root, ReadLog& log);
+
+/// Either of them.
+[[nodiscard]] ImportedCalibration read_calibration(const ConfigNode& root,
+                                                   std::vector<ConfigFault>& faults);
+
+/// The sections `cameras` and `imu` of crepesd.yaml, as far as there is something to write.
+[[nodiscard]] std::string calibration_text(const ImportedCalibration& calibration);
 
 /// Reads a struct with a `visit()` from the mapping at `path`; keys that it does not list are
 /// ignored. Whether it is free of faults.
 template <class Item>
-[[nodiscard]] bool read_item(const YAML::Node& node, const std::string& path, Item& item,
+[[nodiscard]] bool read_item(const ConfigNode& node, const std::string& path, Item& item,
                              ReadLog& log) {
   const std::size_t faults_before = log.faults.size();
-  log.lines.emplace(path, std::max(line_of(node), 1));
   ConfigReader reader(node, path, log);
   item.visit(reader);
   reader.ignore_unknown_keys();

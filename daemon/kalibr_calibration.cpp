@@ -1,6 +1,9 @@
+#include <algorithm>
+#include <array>
 #include <string>
+#include <string_view>
 
-#include "daemon/ctl/imported_calibration.hpp"
+#include "daemon/imported_calibration.hpp"
 #include "estimator/vision/camera_model.hpp"
 
 namespace crepes {
@@ -49,12 +52,14 @@ std::optional<Pose> pose_of(const KalibrCamera& camera, const std::vector<Camera
   return *camera.T_cam_before * before.back().T_cam_imu;
 }
 
-void read_cameras(const YAML::Node& root, std::vector<CameraConfig>& cameras, ReadLog& log) {
-  for (std::size_t i = 0; i < kMaxCameras && root[camera_name(i)]; ++i) {
+void read_cameras(const ConfigNode& root, std::vector<CameraConfig>& cameras, ReadLog& log) {
+  for (std::size_t i = 0; i < kMaxCameras; ++i) {
     const std::string name = camera_name(i);
+    const ConfigNode* const node = root.find(name);
+    if (node == nullptr) return;
     KalibrCamera camera;
-    if (!read_item(root[name], name, camera, log)) return;
-    if (!log.lines.contains(name + ".camera_model")) {
+    if (!read_item(*node, name, camera, log)) return;
+    if (node->find("camera_model") == nullptr) {
       log.fault(name, "camera_model is missing");
       return;
     }
@@ -75,19 +80,22 @@ void read_cameras(const YAML::Node& root, std::vector<CameraConfig>& cameras, Re
 
 }  // namespace
 
-bool is_kalibr(const YAML::Node& root) {
-  return root.IsMap() && (root["cam0"] || root["imu0"] || root["update_rate"] ||
-                          root["accelerometer_noise_density"]);
+bool is_kalibr(const ConfigNode& root) {
+  constexpr std::array<std::string_view, 4> kKeys{"cam0", "imu0", "update_rate",
+                                                  "accelerometer_noise_density"};
+  return std::ranges::any_of(kKeys,
+                             [&](std::string_view key) { return root.find(key) != nullptr; });
 }
 
-ImportedCalibration read_kalibr(const YAML::Node& root, ReadLog& log) {
+ImportedCalibration read_kalibr(const ConfigNode& root, ReadLog& log) {
   ImportedCalibration calibration;
-  if (root["cam0"]) read_cameras(root, calibration.cameras, log);
+  const bool has_cameras = root.find("cam0") != nullptr;
+  if (has_cameras) read_cameras(root, calibration.cameras, log);
   // What Kalibr takes is flat; what it writes has the same below imu0.
   KalibrImu imu;
-  const bool is_flat = !root["imu0"];
-  if (is_flat && root["cam0"]) return calibration;
-  if (is_flat ? read_item(root, "", imu, log) : read_item(root["imu0"], "imu0", imu, log))
+  const ConfigNode* const nested = root.find("imu0");
+  if (nested == nullptr && has_cameras) return calibration;
+  if (nested == nullptr ? read_item(root, "", imu, log) : read_item(*nested, "imu0", imu, log))
     calibration.imu = imu.config;
   return calibration;
 }

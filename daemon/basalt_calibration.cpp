@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "daemon/ctl/imported_calibration.hpp"
+#include "daemon/imported_calibration.hpp"
 #include "estimator/vision/camera_model.hpp"
 
 // Meanings as in basalt-headers, include/basalt/calibration/calibration.hpp (struct Calibration):
@@ -116,7 +116,7 @@ ImuConfig imu_of(const BasaltRig& rig) {
 }
 
 /// Fills in the pose; whether it is good.
-bool read_pose(const YAML::Node& node, const std::string& path, CameraConfig& camera,
+bool read_pose(const ConfigNode& node, const std::string& path, CameraConfig& camera,
                ReadLog& log) {
   BasaltPose pose;
   if (!read_item(node, path, pose, log)) return false;
@@ -129,16 +129,16 @@ bool read_pose(const YAML::Node& node, const std::string& path, CameraConfig& ca
 }
 
 /// Fills in the lens; whether it is good.
-bool read_lens(const YAML::Node& node, const std::string& path, CameraConfig& camera,
+bool read_lens(const ConfigNode& node, const std::string& path, CameraConfig& camera,
                ReadLog& log) {
   BasaltCamera lens;
   if (!read_item(node, path, lens, log)) return false;
-  for (const char* key : {".camera_type", ".intrinsics"}) {
-    if (log.lines.contains(path + key)) continue;
-    log.fault(path, std::string(key + 1) + " is missing");
+  for (const char* key : {"camera_type", "intrinsics"}) {
+    if (node.find(key) != nullptr) continue;
+    log.fault(path, std::string(key) + " is missing");
     return false;
   }
-  const YAML::Node parameters = node["intrinsics"];
+  const ConfigNode& parameters = *node.find("intrinsics");
   const std::string parameters_path = path + ".intrinsics";
   if (lens.model == BasaltModel::kDoubleSphere) {
     DoubleSphereParameters ds;
@@ -160,17 +160,18 @@ bool read_lens(const YAML::Node& node, const std::string& path, CameraConfig& ca
 
 }  // namespace
 
-bool is_basalt(const YAML::Node& root) { return root.IsMap() && root["value0"]; }
+bool is_basalt(const ConfigNode& root) { return root.find("value0") != nullptr; }
 
-ImportedCalibration read_basalt(const YAML::Node& root, ReadLog& log) {
+ImportedCalibration read_basalt(const ConfigNode& root, ReadLog& log) {
   ImportedCalibration calibration;
   BasaltRig rig;
-  if (!read_item(root["value0"], "value0", rig, log)) return calibration;
+  const ConfigNode& value0 = *root.find("value0");
+  if (!read_item(value0, "value0", rig, log)) return calibration;
   calibration.imu = imu_of(rig);
 
   for (const char* list : {"T_imu_cam", "intrinsics"}) {
-    const YAML::Node node = root["value0"][list];
-    if (node && node.IsSequence() && node.size() == rig.resolution.size()) continue;
+    const ConfigNode* const node = value0.find(list);
+    if (node != nullptr && node->is_list() && node->items.size() == rig.resolution.size()) continue;
     log.fault(std::string("value0.") + list, "must be a list of " +
                                                  std::to_string(rig.resolution.size()) +
                                                  ", one for each camera, as resolution is");
@@ -183,9 +184,9 @@ ImportedCalibration read_basalt(const YAML::Node& root, ReadLog& log) {
     camera.resolution = rig.resolution[i];
     camera.timeshift_cam_imu = rig.cam_time_offset_ns / 1e9;
     const bool has_pose =
-        read_pose(root["value0"]["T_imu_cam"][i], "value0.T_imu_cam" + index, camera, log);
+        read_pose(value0.find("T_imu_cam")->items[i], "value0.T_imu_cam" + index, camera, log);
     const bool has_lens =
-        read_lens(root["value0"]["intrinsics"][i], "value0.intrinsics" + index, camera, log);
+        read_lens(value0.find("intrinsics")->items[i], "value0.intrinsics" + index, camera, log);
     if (has_pose && has_lens) calibration.cameras.push_back(std::move(camera));
   }
   return calibration;
