@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kDegree = kPi / 180.0;
+constexpr double kLineStep = 4.0;  // m, along the corridor
+constexpr double kLineSide = 1.5;  // m, from its middle
 
 /// Draws the sines of one robot: amplitudes as asked, frequencies within +-20 %, any phase.
 class WaveSource {
@@ -41,15 +43,21 @@ class WaveSource {
   std::uint64_t next_ = 0;
 };
 
-/// Around a place at distance `radius` from the center in direction `bearing`, looking inwards.
-Motion multirotor(WaveSource waves, double radius, double bearing, double height) {
+/// A multirotor around a place.
+Motion hovering(WaveSource waves, double x, double y, double height, double yaw) {
   return {.rule = AttitudeRule::kThrust,
-          .x = waves.wander(radius * std::cos(bearing), 0.6, 0.17),
-          .y = waves.wander(radius * std::sin(bearing), 0.6, 0.17),
+          .x = waves.wander(x, 0.6, 0.17),
+          .y = waves.wander(y, 0.6, 0.17),
           .z = waves.wander(height, 0.35, 0.13),
-          .yaw = waves.wander(bearing + kPi, 20.0 * kDegree, 0.12),
+          .yaw = waves.wander(yaw, 20.0 * kDegree, 0.12),
           .pitch = {},
           .roll = {}};
+}
+
+/// Around a place at distance `radius` from the center in direction `bearing`, looking inwards.
+Motion multirotor(WaveSource waves, double radius, double bearing, double height) {
+  return hovering(waves, radius * std::cos(bearing), radius * std::sin(bearing), height,
+                  bearing + kPi);
 }
 
 /// On level ground, otherwise as a multirotor.
@@ -125,6 +133,16 @@ std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
       }
       return motions;
     }
+    case SimScenario::kLine: {
+      // From side to side of a corridor, each looking across it, at those before and behind.
+      std::map<RobotId, Motion> motions;
+      for (std::uint16_t id = 1; id <= 4; ++id) {
+        const double side = id % 2 == 1 ? -1.0 : 1.0;
+        motions.emplace(RobotId{id}, hovering(waves(id), kLineStep * (id - 1), kLineSide * side,
+                                              1.4, -side * kPi / 2.0));
+      }
+      return motions;
+    }
     case SimScenario::kStatic:
       return {{RobotId{1}, resting(waves(1), 0.0, 0.0, 1.2, 0.0)},
               {RobotId{2}, resting(waves(2), 5.0, 0.4, 1.0, kPi)}};
@@ -132,13 +150,22 @@ std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
   CREPES_EXPECT(false, "every scenario has its motions");
 }
 
+std::vector<Pillar> pillars_of(SimScenario scenario) {
+  // Neighbors next to each other on the circle always see past it, the others now and then.
+  if (scenario == SimScenario::kOccluded) return {{.radius_m = 1.0}};
+  // Opposite the second and the third: each sees the next one in the line, and nobody else, ever.
+  if (scenario == SimScenario::kLine)
+    return {{.center_W = {kLineStep, -kLineSide}, .radius_m = 1.3},
+            {.center_W = {2.0 * kLineStep, kLineSide}, .radius_m = 1.3}};
+  return {};
+}
+
 }  // namespace
 
 SimWorld::SimWorld(const SimConfig& config)
-    : seed_(config.seed), motions_(motions_of(config.scenario, config.seed)) {
-  // Neighbors next to each other on the circle always see past it, the others now and then.
-  if (config.scenario == SimScenario::kOccluded) pillar_ = Pillar{.radius_m = 1.0};
-}
+    : seed_(config.seed),
+      motions_(motions_of(config.scenario, config.seed)),
+      pillars_(pillars_of(config.scenario)) {}
 
 std::vector<RobotId> SimWorld::robots() const {
   std::vector<RobotId> ids;
@@ -163,13 +190,14 @@ Pose SimWorld::T_B_N(RobotId observer, RobotId neighbor, double t_s) const {
 }
 
 bool SimWorld::is_occluded(const Eigen::Vector3d& p_W_from, const Eigen::Vector3d& p_W_to) const {
-  if (!pillar_) return false;
-  const Eigen::Vector2d start = p_W_from.head<2>() - pillar_->center_W;
   const Eigen::Vector2d along = (p_W_to - p_W_from).head<2>();
   const double length_sq = along.squaredNorm();
-  const double nearest =
-      length_sq > 0.0 ? std::clamp(-start.dot(along) / length_sq, 0.0, 1.0) : 0.0;
-  return (start + nearest * along).norm() < pillar_->radius_m;
+  return std::any_of(pillars_.begin(), pillars_.end(), [&](const Pillar& pillar) {
+    const Eigen::Vector2d start = p_W_from.head<2>() - pillar.center_W;
+    const double nearest =
+        length_sq > 0.0 ? std::clamp(-start.dot(along) / length_sq, 0.0, 1.0) : 0.0;
+    return (start + nearest * along).norm() < pillar.radius_m;
+  });
 }
 
 }  // namespace crepes

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <map>
-#include <optional>
 #include <vector>
 
 #include "drivers/sim/motion.hpp"
@@ -43,7 +42,7 @@ class SimWorld {
  private:
   int seed_;
   std::map<RobotId, Motion> motions_;
-  std::optional<Pillar> pillar_;
+  std::vector<Pillar> pillars_;
 };
 
 }  // namespace crepes

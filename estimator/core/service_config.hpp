@@ -60,6 +60,7 @@ enum class SimScenario : std::uint8_t {
   kLongRange,
   kAggressive,
   kOccluded,
+  kLine,
   kStatic,
 };
 inline constexpr std::array kSimScenarios{Choice{"two", SimScenario::kTwo},
@@ -67,6 +68,7 @@ inline constexpr std::array kSimScenarios{Choice{"two", SimScenario::kTwo},
                                           Choice{"long-range", SimScenario::kLongRange},
                                           Choice{"aggressive", SimScenario::kAggressive},
                                           Choice{"occluded", SimScenario::kOccluded},
+                                          Choice{"line", SimScenario::kLine},
                                           Choice{"static", SimScenario::kStatic}};
 
 /// A simulated world instead of devices.

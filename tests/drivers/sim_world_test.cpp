@@ -49,6 +49,7 @@ TEST_P(EveryScenario, KeepsRobotsApartAndFacingOneAnother) {
         if (a == b) continue;
         const Pose T_B_N = world_.T_B_N(a, b, t);
         EXPECT_GT(T_B_N.p.norm(), 1.5) << t;
+        if (world_.is_occluded(world_.T_W_B(a, t).p, world_.T_W_B(b, t).p)) continue;
         // Within a 185 degree camera that looks forward, also when swung about.
         EXPECT_GT(T_B_N.p.normalized().x(), std::cos(92.0 * M_PI / 180.0)) << t;
       }
@@ -106,6 +107,21 @@ TEST(SimWorld, PillarHidesSomePairsNowAndThenAndNeighborsOnTheCircleNever) {
   }
   EXPECT_GT(hidden, samples / 20);
   EXPECT_LT(hidden, samples * 19 / 20);
+}
+
+TEST(SimWorld, InALineEachSeesTheNextOneAndNobodyElse) {
+  for (const int seed : {1, 2, 3}) {
+    const SimWorld world = world_of(SimScenario::kLine, seed);
+    for (double t = 0.0; t < 120.0; t += 0.1) {
+      const auto p = [&](std::uint16_t id) { return world.T_W_B(RobotId{id}, t).p; };
+      EXPECT_FALSE(world.is_occluded(p(1), p(2)));
+      EXPECT_FALSE(world.is_occluded(p(2), p(3)));
+      EXPECT_FALSE(world.is_occluded(p(3), p(4)));
+      EXPECT_TRUE(world.is_occluded(p(1), p(3)));
+      EXPECT_TRUE(world.is_occluded(p(2), p(4)));
+      EXPECT_TRUE(world.is_occluded(p(1), p(4)));
+    }
+  }
 }
 
 TEST(SimWorld, OccludesOnlyBetweenTheEnds) {
