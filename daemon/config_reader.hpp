@@ -130,15 +130,11 @@ class ConfigReader {
   void list(std::string_view key, std::vector<Item>& items, std::string_view help) {
     const ConfigNode* const node = take(key);
     if (node == nullptr) return missing(key, help);
-    if (!node->is_list()) {
-      return log_.fault(node->place, path_of(key), "expected a list, found " + describe(*node));
-    }
-    for (const ConfigNode& element : node->items) {
-      const std::string path = path_of(key) + "[" + std::to_string(items.size()) + "]";
-      ConfigReader reader(element, path, log_);
-      items.emplace_back().visit(reader);
-      reader.finish();
-    }
+    read_items(*node, key, items);
+  }
+  template <class Item>
+  void optional_list(std::string_view key, std::vector<Item>& items, std::string_view /*help*/) {
+    if (const ConfigNode* const node = take(key)) read_items(*node, key, items);
   }
   template <class Item>
   void list(std::string_view key, std::vector<Item>& items, Change /*when*/,
@@ -157,6 +153,18 @@ class ConfigReader {
     std::string key;
     std::string help;
   };
+
+  template <class Item>
+  void read_items(const ConfigNode& node, std::string_view key, std::vector<Item>& items) {
+    if (!node.is_list())
+      return log_.fault(node.place, path_of(key), "expected a list, found " + describe(node));
+    for (const ConfigNode& element : node.items) {
+      const std::string path = path_of(key) + "[" + std::to_string(items.size()) + "]";
+      ConfigReader reader(element, path, log_);
+      items.emplace_back().visit(reader);
+      reader.finish();
+    }
+  }
 
   template <class T, class Check>
   void read(std::string_view key, T& value, std::optional<std::string_view> required_help,

@@ -1,7 +1,5 @@
 #include "daemon/config_rules.hpp"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "estimator/vision/camera_model.hpp"
+#include "net/endpoint.hpp"
 
 namespace crepes {
 namespace {
@@ -20,6 +19,7 @@ constexpr std::size_t kMinSlots = 8;
 constexpr std::size_t kMaxSlots = 32;
 constexpr double kMinDutyStep = 0.02;
 constexpr std::size_t kMaxCameras = 16;
+constexpr std::size_t kMaxPush = 8;
 
 std::string item(const std::string& list, std::size_t i) {
   return list + "[" + std::to_string(i) + "]";
@@ -181,21 +181,32 @@ void check_imu(const ImuConfig& imu, Faults& faults) {
   check_triad("imu.gyroscope", imu.gyroscope);
 }
 
-bool is_numeric(const std::string& address) {
-  in6_addr binary{};
-  return ::inet_pton(AF_INET, address.c_str(), &binary) == 1 ||
-         ::inet_pton(AF_INET6, address.c_str(), &binary) == 1;
+void check_push(const std::string& key, const PushConfig& push, const Config& config,
+                Faults& faults) {
+  const auto target = Endpoint::parse(push.address, static_cast<std::uint16_t>(push.port));
+  if (!target || !target->is_unicast()) {
+    return faults.push_back({key + ".address", '"' + push.address +
+                                                   "\" is not one host's numeric IPv4 or IPv6 "
+                                                   "address"});
+  }
+  if (target->is_loopback() &&
+      (push.port == config.subscription.port || push.port == config.net.port))
+    faults.push_back({key + ".port", "is the daemon's own"});
 }
 
 void check_network(const Config& config, Faults& faults) {
   if (config.net.port == config.subscription.port)
     faults.push_back({"subscription.port", "is taken by net.port"});
   for (const std::string& address : config.subscription.listen) {
-    if (!is_numeric(address)) {
+    if (!Endpoint::parse(address, 0)) {
       faults.push_back(
           {"subscription.listen", '"' + address + "\" is not a numeric IPv4 or IPv6 address"});
     }
   }
+  const std::vector<PushConfig>& push = config.subscription.push;
+  if (push.size() > kMaxPush) faults.push_back({"subscription.push", "more than 8"});
+  for (std::size_t i = 0; i < push.size(); ++i)
+    check_push(item("subscription.push", i), push[i], config, faults);
 }
 
 }  // namespace

@@ -82,10 +82,22 @@ class ConfigWriter {
     text_ += '\n';
     comment(std::string(help) + "; required");
     line(std::string(key) + ":");
-    for (Item& item : items) {
-      line("  -");
-      nest(item, indent_ + "    ");
+    write_items(items);
+  }
+  /// Of an empty one, what an item would be stays a comment.
+  template <class Item>
+  void optional_list(std::string_view key, std::vector<Item>& items, std::string_view help) {
+    comment(std::string(help));
+    if (!items.empty()) {
+      line(std::string(key) + ":");
+      return write_items(items);
     }
+    Item example;
+    ConfigWriter writer(indent_ + "#     ");
+    example.visit(writer);
+    line("# " + std::string(key) + ":");
+    line("#   -");
+    text_ += writer.text();
   }
 
   /// Is not written: what it names is.
@@ -95,6 +107,14 @@ class ConfigWriter {
   }
 
  private:
+  template <class Item>
+  void write_items(std::vector<Item>& items) {
+    for (Item& item : items) {
+      line("  -");
+      nest(item, indent_ + "    ");
+    }
+  }
+
   template <class T>
   void write(std::string_view key, const T& value, const std::string& help) {
     comment(help);

@@ -119,7 +119,7 @@ class NetLoop {
   void on(const Outputs& outputs) {
     const Timestamp now = clock_.now();
     if (outputs.report) broadcast(*outputs.report, now);
-    for (const NeighborPose& pose : outputs.poses) server_.publish(pose, now);
+    if (!outputs.poses.empty()) server_.publish(outputs.poses, now);
   }
   void on(EstimatorStatus& status) { estimator_ = std::move(status); }
   void on(SensorStatus& status) { sensors_[status.name] = std::move(status); }
@@ -137,14 +137,15 @@ class NetLoop {
     for (const MemberConfig& member : stage_.config.swarm.members) {
       if (member.id == status.self) status.name = member.name;
     }
-    status.uptime_s = to_seconds(clock_.now() - start_);
+    status.stamp = clock_.now();
+    status.uptime_s = to_seconds(status.stamp - start_);
     status.cpu_s = process_cpu_s();
     status.rss_mb = process_rss_mb();
     for (const auto& [name, sensor] : sensors_) status.sensors.push_back(sensor);
     status.sensors.push_back({"mesh", 0.0, mesh_.fault().empty(), mesh_.fault(), {}});
     status.estimator = estimator_;
     status.clocks = link_.clocks();
-    status.traffic = link_.traffic(clock_.now());
+    status.traffic = link_.traffic(status.stamp);
     status.queues = stage_.queues();
     status.network = link_.counters();
     for (auto& counter : server_.counters()) status.network.push_back(std::move(counter));

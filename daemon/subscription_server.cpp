@@ -2,6 +2,7 @@
 
 #include <sodium.h>
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -41,6 +42,24 @@ SubscriptionServer::SubscriptionServer(const Config& config, SubscriptionDesk::S
       faults_.push_back("subscription: " + socket.error().message);
     }
   }
+  open_push(config);
+}
+
+void SubscriptionServer::open_push(const Config& config) {
+  for (const PushConfig& push : config.subscription.push) pushes_.emplace_back(push, self_, names_);
+  const auto open = [&](bool ipv4, std::optional<UdpSocket>& socket) {
+    const bool is_needed = std::ranges::any_of(
+        pushes_, [&](const PosePush& push) { return push.target().is_ipv4() == ipv4; });
+    if (!is_needed) return;
+    Result<UdpSocket> opened = UdpSocket::bind(ipv4 ? "0.0.0.0" : "::", 0);
+    if (opened) {
+      socket = std::move(*opened);
+    } else {
+      faults_.push_back("subscription.push: " + opened.error().message);
+    }
+  };
+  open(true, push_ipv4_);
+  open(false, push_ipv6_);
 }
 
 void SubscriptionServer::serve(Timestamp now) {
@@ -52,17 +71,26 @@ void SubscriptionServer::serve(Timestamp now) {
       if (!request || !*request) break;
       const Datagram& datagram = **request;
       if (const auto answer = desk_.answer(datagram.from, text_of(datagram), now, via))
-        send(via, *answer, datagram.from);
+        send(sockets_[via], *answer, datagram.from);
     }
   }
 }
 
-void SubscriptionServer::publish(const NeighborPose& pose, Timestamp now) {
-  const auto name = names_.find(pose.neighbor);
-  if (name == names_.end()) return;
-  for (const PoseDelivery& delivery : desk_.deliveries(pose.neighbor, pose.stamp, now)) {
-    send(delivery.via, pose_json(delivery.sequence, self_, name->second, pose), delivery.client);
-    ++poses_;
+void SubscriptionServer::publish(const std::vector<NeighborPose>& poses, Timestamp now) {
+  for (const NeighborPose& pose : poses) {
+    for (const PoseDelivery& delivery : desk_.deliveries(pose.neighbor, pose.stamp, now)) {
+      send(sockets_[delivery.via], pose_json(delivery.sequence, self_, names_[pose.neighbor], pose),
+           delivery.client);
+      ++poses_;
+    }
+  }
+  for (PosePush& push : pushes_) {
+    auto& socket = push.target().is_ipv4() ? push_ipv4_ : push_ipv6_;
+    if (!socket) continue;
+    for (const std::string& json : push.datagrams(poses)) {
+      send(*socket, json, push.target());
+      ++pushed_;
+    }
   }
 }
 
@@ -74,12 +102,14 @@ std::vector<int> SubscriptionServer::descriptors() const {
 
 std::vector<std::pair<std::string, std::uint64_t>> SubscriptionServer::counters() const {
   auto totals = desk_.counters();
-  totals.insert(totals.end(), {{"poses_sent", poses_}, {"answers_unsent", unsent_}});
+  totals.insert(
+      totals.end(),
+      {{"poses_sent", poses_}, {"datagrams_pushed", pushed_}, {"answers_unsent", unsent_}});
   return totals;
 }
 
-void SubscriptionServer::send(std::size_t via, const std::string& json, const Endpoint& to) {
-  if (!sockets_[via].send_to(bytes_of(json), to)) ++unsent_;
+void SubscriptionServer::send(UdpSocket& socket, const std::string& json, const Endpoint& to) {
+  if (!socket.send_to(bytes_of(json), to)) ++unsent_;
 }
 
 }  // namespace crepes

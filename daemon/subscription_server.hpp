@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "estimator/core/config.hpp"
 #include "estimator/core/outputs.hpp"
+#include "net/pose_push.hpp"
 #include "net/subscription_desk.hpp"
 #include "net/udp_socket.hpp"
 
@@ -20,8 +22,8 @@ class SubscriptionServer {
 
   /// Answers the requests that wait on all sockets, a bounded number of them.
   void serve(Timestamp now);
-  /// Sends a pose to those who want it now.
-  void publish(const NeighborPose& pose, Timestamp now);
+  /// Sends the poses of one instant to those who want them now.
+  void publish(const std::vector<NeighborPose>& poses, Timestamp now);
 
   /// For poll(2).
   [[nodiscard]] std::vector<int> descriptors() const;
@@ -30,14 +32,19 @@ class SubscriptionServer {
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
 
  private:
-  void send(std::size_t via, const std::string& json, const Endpoint& to);
+  void open_push(const Config& config);
+  void send(UdpSocket& socket, const std::string& json, const Endpoint& to);
 
   RobotId self_;
   std::map<RobotId, std::string> names_;
   SubscriptionDesk desk_;
   std::vector<UdpSocket> sockets_;
+  std::vector<PosePush> pushes_;
+  std::optional<UdpSocket> push_ipv4_;
+  std::optional<UdpSocket> push_ipv6_;
   std::vector<std::string> faults_;
   std::uint64_t poses_ = 0;
+  std::uint64_t pushed_ = 0;
   std::uint64_t unsent_ = 0;
 };
 

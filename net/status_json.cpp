@@ -54,6 +54,18 @@ Json neighbor_json(const NeighborStatus& neighbor) {
   return json;
 }
 
+/// Of everything that a pose of the neighbor rests on.
+Json ages_json(const NeighborStatus& neighbor, Timestamp now) {
+  Json json = Json::object();
+  for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind) {
+    if (const auto& newest = neighbor.newest.at(kind))
+      put(json, std::string(name_of(static_cast<MeasurementKind>(kind))).c_str(),
+          to_seconds(now - *newest), 3);
+  }
+  if (neighbor.newest_imu) put(json, "imu", to_seconds(now - *neighbor.newest_imu), 3);
+  return json;
+}
+
 Json traffic_json(const PeerTraffic& traffic) {
   Json json{{"received", traffic.received}, {"lost", traffic.lost}, {"restarts", traffic.restarts}};
   put(json, "age_s", traffic.age_s, 3);
@@ -188,6 +200,7 @@ std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId 
   if (neighbor == neighbors.end()) return std::nullopt;
   Json json = head_json(status);
   json["neighbors"] = {neighbor_json(*neighbor)};
+  json["neighbors"][0]["ages_s"] = ages_json(*neighbor, status.stamp);
   const auto traffic = std::ranges::find(status.traffic, peer, &PeerTraffic::peer);
   if (traffic != status.traffic.end()) json["neighbors"][0]["reports"] = traffic_json(*traffic);
   json["clocks"] = Json::array();

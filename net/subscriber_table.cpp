@@ -8,22 +8,12 @@ namespace {
 
 constexpr Duration kErrorInterval = std::chrono::seconds{1};
 constexpr std::size_t kMaxErring = 256;  // clients that are remembered at a time
-constexpr double kSlack = 0.1;           // of a period: stamps of even poses are not quite even
 
 bool wants(const WatchRequest& wish, RobotId neighbor) {
   return !wish.peers || std::count(wish.peers->begin(), wish.peers->end(), neighbor) > 0;
 }
 
 }  // namespace
-
-bool PoseRate::is_due(RobotId neighbor, Timestamp stamp) {
-  if (!rate_hz_) return true;
-  Timestamp& next = next_.try_emplace(neighbor, stamp).first->second;
-  if (stamp < next - from_seconds(kSlack / *rate_hz_)) return false;
-  next =
-      std::max(next + from_seconds(1 / *rate_hz_), stamp);  // after a pause, no burst to catch up
-  return true;
-}
 
 Result<void> SubscriberTable::watch(const Endpoint& client, const WatchRequest& request,
                                     Timestamp now, std::size_t via) {

@@ -9,6 +9,7 @@
 #include "estimator/core/config.hpp"
 #include "estimator/core/result.hpp"
 #include "net/endpoint.hpp"
+#include "net/pose_rate.hpp"
 #include "net/request_limiter.hpp"
 #include "net/subscription_json.hpp"
 
@@ -19,21 +20,6 @@ struct PoseDelivery {
   Endpoint client;
   std::uint64_t sequence = 0;  ///< counts this client's poses, from 0
   std::size_t via = 0;         ///< the socket over which it asked
-};
-
-/// Thins out the poses of each neighbor to a rate.
-class PoseRate {
- public:
-  /// `rate_hz` empty: every pose.
-  explicit PoseRate(std::optional<double> rate_hz = {}) : rate_hz_(rate_hz) {}
-
-  [[nodiscard]] std::optional<double> rate_hz() const { return rate_hz_; }
-  /// Whether a pose at `stamp` is due; stamps of one neighbor must not go back. Counts as sent.
-  [[nodiscard]] bool is_due(RobotId neighbor, Timestamp stamp);
-
- private:
-  std::optional<double> rate_hz_;
-  std::map<RobotId, Timestamp> next_;
 };
 
 class SubscriberTable {

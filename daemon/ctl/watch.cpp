@@ -57,13 +57,6 @@ std::string triple(const Eigen::Vector3d& v, int decimals) {
   return text;
 }
 
-/// Roll, pitch and yaw: angles about x, y and z of R = Rz Ry Rx.
-Eigen::Vector3d roll_pitch_yaw(const Eigen::Quaterniond& q) {
-  const Eigen::Matrix3d R = q.toRotationMatrix();
-  return {std::atan2(R(2, 1), R(2, 2)), std::asin(std::clamp(-R(2, 0), -1.0, 1.0)),
-          std::atan2(R(1, 0), R(0, 0))};
-}
-
 Row neighbor_row(const std::string& name, const NeighborView& view, Timestamp now) {
   const NeighborPose* pose = view.pose(now);
   if (pose == nullptr) return {name, "-", "", "", "", "", "", "", view.reason()};
@@ -71,7 +64,7 @@ Row neighbor_row(const std::string& name, const NeighborView& view, Timestamp no
   return {name,
           std::string(name_of(pose->mode)),
           triple(pose->T_B_N.pose.p, 3),
-          triple(kDegPerRad * roll_pitch_yaw(pose->T_B_N.pose.q), 1),
+          triple(kDegPerRad * roll_pitch_yaw_of(pose->T_B_N.pose.q), 1),
           fixed(sigma.position_m, 3),
           fixed(kDegPerRad * sigma.rotation_rad, 2),
           fixed(1e3 * pose->age_s, 0),

@@ -7,6 +7,7 @@
 ///   v.choice(key, member, choices, help)        an enumeration by name
 ///   v.section(key, member, [when,] help)        a nested struct
 ///   v.list(key, member, [when,] help)           a sequence of structs
+///   v.optional_list(key, member, help)          one that may be left out
 ///   v.reference(key, help)                      names a file whose content takes its place before
 ///                                               anything is read, so no struct has a member for it
 #pragma once

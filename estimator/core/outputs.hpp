@@ -161,7 +161,10 @@ struct NeighborStatus {
   NoPoseReason reason = NoPoseReason::kNeverHeard;
   std::optional<NeighborPose> pose;
   std::array<VerdictCounts, kMeasurementKindCount> measurements{};  ///< [kind][verdict]
-  std::uint64_t id_decodes = 0;  ///< tracks that were given this robot's ID
+  /// When the newest of a kind was taken, whatever became of it.
+  std::array<std::optional<Timestamp>, kMeasurementKindCount> newest{};
+  std::optional<Timestamp> newest_imu;  ///< of its IMU's samples
+  std::uint64_t id_decodes = 0;         ///< tracks that were given this robot's ID
 };
 
 struct EstimatorStatus {
@@ -205,6 +208,7 @@ struct QueueStatus {
 struct SystemStatus {
   RobotId self{};
   std::string name;
+  Timestamp stamp{};  ///< when this was so
   double uptime_s = 0.0;
   double cpu_s = 0.0;   ///< of all threads since start
   double rss_mb = 0.0;  ///< resident memory [10^6 bytes]

@@ -24,13 +24,35 @@ struct NetConfig {
   }
 };
 
-/// Poses for programs on the robot.
+enum class PushFormat : std::uint8_t { kJson, kPlotJuggler };
+inline constexpr std::array kPushFormats{Choice{"json", PushFormat::kJson},
+                                         Choice{"plotjuggler", PushFormat::kPlotJuggler}};
+
+/// A program that gets poses without asking.
+struct PushConfig {
+  std::string address = "127.0.0.1";
+  int port = 9870;
+  double rate_hz = 50.0;
+  PushFormat format = PushFormat::kPlotJuggler;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("address", address, "numeric address of one host");
+    v.field("port", port, Bounds{1, 65535}, "its UDP port; PlotJuggler's is 9870");
+    v.field("rate_hz", rate_hz, Bounds{0.01, 1000}, "poses of each neighbor a second, at most");
+    v.choice("format", format, kPushFormats,
+             "json: POSE as for subscribers; plotjuggler: numbers alone, all neighbors together");
+  }
+};
+
+/// Poses for other programs.
 struct SubscriptionConfig {
   std::vector<std::string> listen{"127.0.0.1", "::1"};
   int port = 47475;
   double lease_s = 10.0;
   int max_subscribers = 32;
   int max_per_address = 4;
+  std::vector<PushConfig> push;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -39,6 +61,7 @@ struct SubscriptionConfig {
     v.field("lease_s", lease_s, Bounds{1, 3600}, "a WATCH not renewed for longer ends");
     v.field("max_subscribers", max_subscribers, Bounds{1, 1024}, "further ones get an ERROR");
     v.field("max_per_address", max_per_address, Bounds{1, 1024}, "of them, at one address");
+    v.optional_list("push", push, "who gets poses without asking");
   }
 };
 

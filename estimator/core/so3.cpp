@@ -1,5 +1,6 @@
 #include "estimator/core/so3.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace crepes {
@@ -65,6 +66,12 @@ Eigen::Matrix3d so3_right_jacobian_inverse(const Eigen::Vector3d& theta) {
 double yaw_of(const Eigen::Quaterniond& q) {
   return std::atan2(2.0 * (q.w() * q.z() + q.x() * q.y()),
                     1.0 - 2.0 * (q.y() * q.y() + q.z() * q.z()));
+}
+
+Eigen::Vector3d roll_pitch_yaw_of(const Eigen::Quaterniond& q) {
+  const Eigen::Matrix3d R = q.toRotationMatrix();
+  return {std::atan2(R(2, 1), R(2, 2)), std::asin(std::clamp(-R(2, 0), -1.0, 1.0)),
+          std::atan2(R(1, 0), R(0, 0))};
 }
 
 Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& u) {

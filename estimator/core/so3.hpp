@@ -25,6 +25,9 @@ namespace crepes {
 /// Heading of `q` about z, the first angle of Z-Y-X Euler angles [rad].
 [[nodiscard]] double yaw_of(const Eigen::Quaterniond& q);
 
+/// Roll, pitch and yaw of `q` [rad]: the angles about x, y and z of R = Rz Ry Rx.
+[[nodiscard]] Eigen::Vector3d roll_pitch_yaw_of(const Eigen::Quaterniond& q);
+
 /// Two unit vectors that complete the unit vector `u` to a right-handed orthonormal basis
 /// (columns), a smooth function of u almost everywhere (Duff et al. 2017).
 [[nodiscard]] Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& u);

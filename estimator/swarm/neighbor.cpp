@@ -127,6 +127,8 @@ void Neighbor::enqueue(Measurement measurement) {
 
 void Neighbor::note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion) {
   ++status_.measurements[static_cast<std::size_t>(kind)][static_cast<std::size_t>(fusion.verdict)];
+  std::optional<Timestamp>& newest = status_.newest[static_cast<std::size_t>(kind)];
+  newest = std::max(newest.value_or(stamp), stamp);
   if (keeps_records_) records_.measurements.push_back({member_.id, stamp, kind, fusion});
 }
 
@@ -286,6 +288,7 @@ NeighborStatus Neighbor::status() const {
   NeighborStatus status = status_;
   status.reason = reason_;
   status.pose = improved_pose();
+  if (!body_.imu.empty()) status.newest_imu = body_.imu.newest().stamp;
   return status;
 }
 

@@ -286,10 +286,30 @@ TEST(ConfigFile, RefusesASecondCameraOfTheSameName) {
   EXPECT_EQ(faults_of(text), "f:11: cameras[1].name: cam0 is taken by cameras[0]");
 }
 
-TEST(ConfigFile, ServesPosesOnLoopbackOnly) {
-  EXPECT_EQ(
-      faults_of(replaced("uwb: {noise_m: 0.05}", "subscription: {listen: [\"::1\", 0.0.0.0, localhost]}")),
-      "f:11: subscription.listen: \"localhost\" is not a numeric IPv4 or IPv6 address");
+TEST(ConfigFile, PushesPosesToOneHostEach) {
+  const auto with = [](const std::string& push) {
+    return replaced("uwb: {noise_m: 0.05}", "subscription: {push: [" + push + "]}");
+  };
+
+  EXPECT_EQ(faults_of(with("{address: 10.0.0.9, port: 9870, rate_hz: 20, format: json}, {}")), "");
+  EXPECT_EQ(faults_of(with("{address: laptop}")),
+            "f:11: subscription.push[0].address: \"laptop\" is not one host's numeric IPv4 or IPv6 "
+            "address");
+  for (const char* nobody : {"255.255.255.255", "239.1.2.3", "0.0.0.0", "\"ff02::1\""})
+    EXPECT_NE(faults_of(with(std::string("{address: ") + nobody + "}")).find("is not one host's"),
+              std::string::npos);
+  EXPECT_EQ(faults_of(with("{}, {port: 47475}")),
+            "f:11: subscription.push[1].port: is the daemon's own");
+  EXPECT_NE(faults_of(with("{format: xml}")).find("expected one of json, plotjuggler"),
+            std::string::npos);
+  EXPECT_EQ(faults_of(with("{}, {}, {}, {}, {}, {}, {}, {}, {}")),
+            "f:11: subscription.push: more than 8");
+}
+
+TEST(ConfigFile, ServesPosesAtNumericAddresses) {
+  EXPECT_EQ(faults_of(replaced("uwb: {noise_m: 0.05}",
+                               "subscription: {listen: [\"::1\", 0.0.0.0, localhost]}")),
+            "f:11: subscription.listen: \"localhost\" is not a numeric IPv4 or IPv6 address");
 }
 
 TEST(ConfigFile, TellsAllFaultsAtOnceInOrderOfLines) {

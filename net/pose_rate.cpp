@@ -1,0 +1,21 @@
+#include "net/pose_rate.hpp"
+
+#include <algorithm>
+
+namespace crepes {
+namespace {
+
+constexpr double kSlack = 0.1;  // of a period: stamps of even poses are not quite even
+
+}  // namespace
+
+bool PoseRate::is_due(RobotId neighbor, Timestamp stamp) {
+  if (!rate_hz_) return true;
+  Timestamp& next = next_.try_emplace(neighbor, stamp).first->second;
+  if (stamp < next - from_seconds(kSlack / *rate_hz_)) return false;
+  next =
+      std::max(next + from_seconds(1 / *rate_hz_), stamp);  // after a pause, no burst to catch up
+  return true;
+}
+
+}  // namespace crepes
