@@ -38,7 +38,7 @@ TEST(PlotJson, PutsNeighborsUnderTheirIdsBesideOneTimestamp) {
 
   ASSERT_EQ(datagrams.size(), 1U);
   const Json json = Json::parse(datagrams[0]);
-  EXPECT_EQ(json["timestamp"], 1000.0);
+  EXPECT_NEAR(json["timestamp"].get<double>(), 1000.0, 1e-9);
   EXPECT_EQ(json["3"]["x"], 3.0);
   EXPECT_NEAR(json["2"]["yaw"].get<double>(), 0.3, 1e-6);
   EXPECT_NEAR(json["2"]["roll"].get<double>(), 0.0, 1e-6);
@@ -63,7 +63,7 @@ TEST(PlotJson, SharesOutManyNeighborsOverWholeDatagrams) {
   for (const std::string& text : plot_json(poses_of(30))) {
     EXPECT_LE(text.size(), kMaxSubscriptionDatagram);
     const Json json = Json::parse(text);
-    EXPECT_EQ(json["timestamp"], 1000.0);
+    EXPECT_NEAR(json["timestamp"].get<double>(), 1000.0, 1e-9);
     neighbors += json.size() - 1;
   }
   EXPECT_EQ(neighbors, 30U);
