@@ -6,17 +6,17 @@ import time
 
 class Subscriber:
     def __init__(self, port=47475):
+        self.asked = 0.0
         self.daemon = ("127.0.0.1", port)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.settimeout(0.02)
 
     def _next(self, request, wanted, seconds):
-        """The first object that is as wanted, and the moment it came; asked for every 50 ms."""
+        """The first object that is as wanted, and the moment it came; asked for ten times a second."""
         end = time.monotonic() + seconds
-        asked = 0.0
         while time.monotonic() < end:
-            if time.monotonic() - asked > 0.05:
-                asked = time.monotonic()
+            if time.monotonic() - self.asked > 0.1:
+                self.asked = time.monotonic()
                 try:
                     self.socket.sendto(json.dumps(request).encode(), self.daemon)
                 except OSError:
@@ -42,6 +42,14 @@ class Subscriber:
     def pose(self, peer, seconds=30.0, modes=("direct", "graph")):
         wanted = lambda m: m["class"] == "POSE" and m["peer"] == peer and m["mode"] in modes
         return self._next({"class": "WATCH", "enable": True}, wanted, seconds)
+
+    def poses(self, end):
+        """All poses with the moments at which they came, until the clock shows `end`."""
+        while time.monotonic() < end:
+            pose, came = self._next({"class": "WATCH", "enable": True}, lambda m: m["class"] == "POSE",
+                                    end - time.monotonic())
+            if pose:
+                yield pose, came
 
     def status(self, wanted=lambda status: True, seconds=30.0):
         return self._next({"class": "POLL"}, lambda m: m["class"] == "STATUS" and wanted(m), seconds)[0]

@@ -1,0 +1,101 @@
+"""Starts the robots of run.sh, waits for what each found out, and judges it."""
+import json
+import pathlib
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+
+ROBOTS = 4
+SECONDS = 20  # each robot watches its neighbors
+RANGES_M = {1: 5.0, 2: 8.0, 3: 12.4}  # in the simulated line, which wanders 0.6 m about its places
+source, build = map(pathlib.Path, sys.argv[1:])
+
+
+def links_of(robot, wires):
+    """The ends of wires at a robot, first towards the robots before it."""
+    ends = []
+    if robot > 1:
+        ends.append(wires[robot - 2][1])
+    if robot < ROBOTS:
+        ends.append(wires[robot - 1][0])
+    return ends
+
+
+def start(robot, wires, place):
+    """One user-mode Linux; its root is ours, read-only, and `place` is where it can write."""
+    ends = links_of(robot, wires)
+    command = ["linux.uml", "mem=384M", "root=/dev/root", "rootfstype=hostfs", "rootflags=/", "ro", f"uml_dir={place}/",
+               f"umid=robot{robot}", f"init={source}/tests/mesh/robot.sh", "con=null", "con0=fd:0,fd:1"]
+    command += [f"vec{i}:transport=fd,fd={end.fileno()},depth=128,mtu=1600,mac=02:00:00:00:{robot:02x}:{i:02x}"
+                for i, end in enumerate(ends)]
+    command += [f"SOURCE={source}", f"BUILD={build}", f"PLACE={place}", f"ROBOT={robot}", f"LINKS={len(ends)}",
+                f"SECONDS_TO_WATCH={SECONDS}"]
+    log = open(place / f"robot{robot}.log", "w")
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                            pass_fds=[end.fileno() for end in ends])
+
+
+def write_configurations(place):
+    """The examples' robots in one line, on the mesh, in a world that is to begin when all are up."""
+    for robot in range(1, ROBOTS + 1):
+        text = (source / f"config/examples/four-simulated/r{robot}.yaml").read_text()
+        assert "interface: lo" in text and "scenario: four" in text
+        text = text.replace("interface: lo", "interface: bat0").replace("scenario: four", "scenario: line, epoch_s: EPOCH")
+        (place / f"r{robot}.yaml").write_text(text)
+
+
+def begin_together(robots, place):
+    """Tells the robots when their world began, once all of them have their mesh."""
+    end = time.monotonic() + 120
+    while len(list(place.glob("*.up"))) < ROBOTS:
+        if time.monotonic() > end or any(robot.poll() is not None for robot in robots):
+            raise SystemExit("not all robots came up")
+        time.sleep(0.1)
+    (place / "begin.part").write_text(repr(time.time()))
+    (place / "begin.part").rename(place / "begin")
+
+
+def judge(robot, peer, pair):
+    """Whether a robot knew another as it should: most of the time, the right way, about where it is."""
+    hops = abs(robot - peer)
+    way = "direct" if hops == 1 else "graph"
+    share = pair["modes"].get(way, 0) / (50 * (SECONDS - pair["first_s"]))
+    good = pair["first_s"] < 15 and share > 0.8 and abs(pair["median_range_m"] - RANGES_M[hops]) < 1.5
+    print(f"{'ok    ' if good else 'FAILED'} robot {robot} knows robot {peer}, {hops} hop{'s' * (hops > 1)} away: first pose "
+          f"after {pair['first_s']} s, from then on {100 * share:.0f} % {way}, {pair['median_range_m']} m away")
+    return good
+
+
+def main():
+    place = pathlib.Path(tempfile.mkdtemp(prefix="crepes-mesh."))
+    robots, failures = [], 0
+    try:
+        write_configurations(place)
+        for member in source.glob("systemd/mesh/50-*"):
+            shutil.copy(member, place)
+        wires = [socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM) for _ in range(ROBOTS - 1)]
+        robots = [start(robot, wires, place) for robot in range(1, ROBOTS + 1)]
+        begin_together(robots, place)
+        for robot in robots:
+            robot.wait(SECONDS + 60)
+        for robot in range(1, ROBOTS + 1):
+            found = json.loads((place / f"r{robot}.json").read_text())
+            print(f"robot {robot}: {found['originators']} others in the mesh, lost of what it sent {found['loss']}")
+            for peer, pair in sorted(found["peers"].items()):
+                failures += not judge(robot, int(peer), pair)
+            failures += ROBOTS - 1 - len(found["peers"])
+    finally:
+        for robot in robots:
+            robot.kill()
+        if failures or sys.exc_info()[0]:
+            for log in sorted(place.glob("*.log")):
+                print(f"--- {log.name}\n{log.read_text()[-3000:]}")
+        shutil.rmtree(place)
+    print(f"{failures} failed" if failures else "robots two and three hops apart know each other")
+    sys.exit(bool(failures))
+
+
+main()
