@@ -29,6 +29,8 @@ step "what the package depends on"
 inside apt-get update -qq
 inside apt-get satisfy -y -qq --no-install-recommends "$(dpkg-deb -f "$package" Depends), man-db, bash-completion" >"$scratch/apt.log" 2>&1 ||
   { tail "$scratch/apt.log"; exit 1; }
+inside dpkg --purge crepes >/dev/null 2>&1 || true
+rm -rf "$tree/etc/crepes"
 listing >"$scratch/before"
 
 step "install"
@@ -42,7 +44,7 @@ for page in crepesd.8 crepesctl.1 crepesd.yaml.5; do
   [ "$(inside man --warnings "${page##*.}" "${page%.*}" 2>&1 | tee "$scratch/$page" | wc -l)" -gt 20 ] ||
     { cat "$scratch/$page"; echo "$page: no manual"; exit 1; }
 done
-inside bash -c '. /usr/share/bash-completion/bash_completion; _completion_loader crepesctl; complete -p crepesctl'
+inside bash -c '. /usr/share/bash-completion/bash_completion; _completion_loader crepesctl; complete -p crepesctl
 inside id crepes
 
 step "upgrade, remove, install again, purge"
@@ -56,6 +58,9 @@ listing >"$scratch/after"
 
 step "what stays"
 # The robot's own file, and the user as Debian's policy has it; nothing else.
-diff "$scratch/before" "$scratch/after" | sed -n 's/^[<>]/&/p' | grep -v -e '^> /etc/crepes root root 755$' \
-  -e '^> /etc/crepes/crepesd.yaml root root 644$' && { echo "leaves the above behind"; exit 1; }
-echo "nothing but /etc/crepes/crepesd.yaml"
+changed=$(diff "$scratch/before" "$scratch/after" | grep '^[<>]' || true)
+expected='> /etc/crepes root root 755
+> /etc/crepes/crepesd.yaml root root 644'
+echo "$changed"
+[ "$changed" = "$expected" ] || { echo "not what should: $expected" >&2; exit 1; }
+echo "only the robot's own configuration stays"

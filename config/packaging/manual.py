@@ -1,0 +1,79 @@
+#!/usr/bin/python3
+"""Manuals that cannot go stale: crepesd.yaml(5) from the reference configuration, crepesctl(1) from the tool's own help.
+    manual.py configuration crepesd.yaml >crepesd.yaml.5
+    manual.py tool path/to/crepesctl >crepesctl.1"""
+import re
+import subprocess
+import sys
+
+
+def roff(text):
+    text = text.replace("\\", "\\e").replace("-", "\\-")
+    return re.sub(r"^([.'])", r"\\&\1", text, flags=re.MULTILINE)
+
+
+def heading(name, section, about):
+    return [f'.TH {name.upper()} {section} "" "CREPES" "{about}"', ".SH NAME"]
+
+
+class Key:
+    def __init__(self, path, default, about):
+        self.path, self.default, self.about = path, default, about
+
+
+def keys_of(reference):
+    """Every key of the reference once, with what the comment above it says. Lists stand for their first item."""
+    parents, about, seen = [], [], set()
+    for line in reference.splitlines():
+        # An optional list is a comment itself; its items' keys are as deep as anyone's.
+        line = re.sub(r"^( *)# {3,5}(\S)", r"\1    \2", line)
+        depth, text = len(line) - len(line.lstrip()), line.strip()
+        key = re.fullmatch(r"(?:# )?([A-Za-z_]\w*):(?: (.*))?", text) if not text.startswith("# ") or text.endswith(":") else None
+        if text.startswith("# ") and not key:
+            about.append(text[2:])
+        elif text == "":
+            about = []
+        elif key:
+            parents = [parent for parent in parents if parent[0] < depth] + [(depth, key[1])]
+            path = ".".join(name for _, name in parents)
+            if path not in seen:
+                seen.add(path)
+                yield Key(path, None if text.startswith("#") else key[2], " ".join(about))
+            about = []
+
+
+def configuration(file):
+    out = heading("crepesd.yaml", 5, "File formats")
+    out += ["crepesd.yaml \\- configuration of crepesd", ".SH DESCRIPTION",
+            "YAML. Unknown keys are errors. A key may be left out, unless it is required; then its default holds.",
+            "Numbers in brackets are bounds.", '"Live" sections change with', ".BR \"systemctl reload crepesd\" ;",
+            '"restart" ones when the daemon starts anew.', ".B crepesd \\-\\-check\\-config", "tells every fault of a file.", ".SH KEYS"]
+    for key in keys_of(open(file).read()):
+        if "." not in key.path:
+            out += [f".SS {roff(key.path)}", roff(key.about)]
+            continue
+        out += [".TP", f".B {roff(key.path)}", roff(key.about) or "\\&"]
+        # A member of the swarm is an example.
+        if key.default is not None and "required" not in key.about and not key.path.startswith("swarm.members."):
+            out += [".br", f"Default: {roff(key.default)}"]
+    return out + [".SH SEE ALSO", ".BR crepesd (8),", ".BR crepesctl (1)"]
+
+
+def tool(program):
+    def told(*arguments):
+        return subprocess.run([program, *arguments, "--help"], check=True, capture_output=True, text=True).stdout.strip().replace(program, "crepesctl")
+
+    out = heading("crepesctl", 1, "User commands")
+    out += ["crepesctl \\- watch, set up and replay robots that localize each other", ".SH SYNOPSIS", ".B crepesctl", ".I COMMAND",
+            "[options]", ".SH DESCRIPTION", "The tool around", ".BR crepesd (8).", ".SH COMMANDS"]
+    commands = re.findall(r"^  ([a-z][\w-]*)  ", told().split("Subcommands:")[1], re.MULTILINE)
+    assert commands
+    for command in commands:
+        out += [f".SS {roff(command)}", ".EX", roff(told(command)), ".EE"]
+    return out + [".SH EXIT STATUS", "0 done, 1 the input is wrong (what and where on stderr) or there was no answer, 2 wrong usage.",
+                  ".SH SEE ALSO", ".BR crepesd (8),", ".BR crepesd.yaml (5)"]
+
+
+if __name__ == "__main__":
+    kind, source = sys.argv[1:]
+    print("\n".join({"configuration": configuration, "tool": tool}[kind](source)))
