@@ -1,6 +1,7 @@
 """Starts the robots of run.sh, waits for what each found out, and judges it."""
 import json
 import pathlib
+import re
 import shutil
 import socket
 import subprocess
@@ -43,6 +44,8 @@ def write_configurations(place):
     for robot in range(1, ROBOTS + 1):
         text = (source / f"config/examples/four-simulated/r{robot}.yaml").read_text()
         assert "interface: lo" in text and "scenario: four" in text
+        # Robots are not switched on at the moment at which the world begins.
+        text = re.sub(r"clock_offset_s: ([-\d.]+)", lambda offset: f"clock_offset_s: {1000 + float(offset[1])}", text)
         text = text.replace("interface: lo", "interface: bat0").replace("scenario: four", "scenario: line, epoch_s: EPOCH")
         (place / f"r{robot}.yaml").write_text(text)
 
@@ -63,8 +66,8 @@ def judge(robot, peer, pair):
     hops = abs(robot - peer)
     way = "direct" if hops == 1 else "graph"
     share = pair["modes"].get(way, 0) / sum(pair["modes"].values())
-    rate_hz = sum(pair["modes"].values()) / (SECONDS - pair["first_s"])  # 50 where the machine keeps up with four kernels
-    good = (pair["first_s"] < 15 and share > 0.9 and rate_hz > 10
+    rate_hz = sum(pair["modes"].values()) / (SECONDS - pair["first_s"])  # 50, all the wanted way, where the machine keeps up
+    good = (pair["first_s"] < 15 and share > 0.7 and rate_hz > 10
             and abs(pair["median_range_m"] - RANGES_M[hops]) < 1.5)
     print(f"{'ok    ' if good else 'FAILED'} robot {robot} knows robot {peer}, {hops} hop{'s' * (hops > 1)} away: first pose after "
           f"{pair['first_s']} s, then {rate_hz:.0f} a second, {100 * share:.0f} % {way}, {pair['median_range_m']} m away")
