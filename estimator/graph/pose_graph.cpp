@@ -89,38 +89,15 @@ std::unique_ptr<ceres::Problem> build(const GraphProblem& input, const GraphConf
   return problem;
 }
 
-// The inverse of J^T J of the covariance-weighted residuals at the solution, self left out.
-Eigen::MatrixXd marginals(const GraphProblem& input, GraphConfig config, Nodes nodes) {
-  config.cost = GraphCost::kLie;
-  const auto problem = build(input, config, nodes);
-  ceres::Problem::EvaluateOptions options;
-  for (auto& [robot, x] : nodes) {
-    if (robot != input.self) options.parameter_blocks.push_back(x.data());
-  }
-  ceres::CRSMatrix jacobian;
-  problem->Evaluate(options, nullptr, nullptr, nullptr, &jacobian);
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(jacobian.num_rows, jacobian.num_cols);
-  for (std::size_t row = 0; row + 1 < jacobian.rows.size(); ++row) {
-    for (auto k = jacobian.rows[row]; k < jacobian.rows[row + 1]; ++k) {
-      const auto entry = static_cast<std::size_t>(k);
-      J(static_cast<Eigen::Index>(row), jacobian.cols[entry]) = jacobian.values[entry];
-    }
-  }
-  const Eigen::MatrixXd information = J.transpose() * J;
-  return information.ldlt().solve(
-      Eigen::MatrixXd::Identity(information.rows(), information.cols()));
-}
-
 }  // namespace
 
 GraphSolution solve_pose_graph(const GraphProblem& input, const GraphConfig& config) {
   GraphProblem problem = input;
   std::erase_if(problem.edges, [](const RelativePoseEdge& edge) { return !is_usable(edge); });
   GraphSolution solution{.stamp = problem.stamp, .poses = {}};
+  const auto chains = spanning_tree_poses(problem.self, problem.edges);
   Nodes nodes;
-  for (const auto& [robot, pose] : spanning_tree_poses(problem.self, problem.edges)) {
-    nodes.emplace(robot, to_parameters(pose));
-  }
+  for (const auto& [robot, chain] : chains) nodes.emplace(robot, to_parameters(chain.pose));
   if (nodes.size() < 2) return solution;
 
   ceres::Solver::Options options;
@@ -133,18 +110,14 @@ GraphSolution solve_pose_graph(const GraphProblem& input, const GraphConfig& con
   ceres::Solve(options, build(problem, config, nodes).get(), &summary);
   if (!summary.IsSolutionUsable()) return solution;
 
-  const Eigen::MatrixXd covariance = marginals(problem, config, nodes);
   std::map<RobotId, Pose> poses;
   for (const auto& [robot, x] : nodes) poses.emplace(robot, to_pose(x));
   const auto velocities = team_velocities(problem.self, poses, problem.edges);
 
-  Eigen::Index block = 0;
   for (const auto& [robot, pose] : poses) {
     if (robot == problem.self) continue;
-    const Matrix6d P = covariance.block<6, 6>(block, block);
-    block += 6;
-    if (!P.allFinite()) continue;
-    solution.poses.push_back({robot, {pose, 0.5 * (P + P.transpose())}, velocities.at(robot)});
+    const Matrix6d& covariance = chains.at(robot).covariance;
+    solution.poses.push_back({robot, {pose, covariance}, velocities.at(robot)});
   }
   solution.cost = summary.final_cost;
   solution.iterations = static_cast<int>(summary.iterations.size());

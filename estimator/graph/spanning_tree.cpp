@@ -1,39 +1,38 @@
 #include "estimator/graph/spanning_tree.hpp"
 
+#include <algorithm>
+
 namespace crepes {
 namespace {
 
-struct Reached {
-  Pose T_self_robot;
-  double variance = 0.0;
-};
+double variance_of(const GaussianPose& pose) {
+  return pose.covariance.topLeftCorner<3, 3>().trace();
+}
 
 }  // namespace
 
-std::map<RobotId, Pose> spanning_tree_poses(RobotId self,
-                                            const std::vector<RelativePoseEdge>& edges) {
-  std::map<RobotId, Reached> open{{self, {}}};
-  std::map<RobotId, Pose> settled;
+std::map<RobotId, GaussianPose> spanning_tree_poses(RobotId self,
+                                                    const std::vector<RelativePoseEdge>& edges) {
+  std::map<RobotId, GaussianPose> open{{self, {}}};
+  std::map<RobotId, GaussianPose> settled;
   while (!open.empty()) {
-    auto nearest = open.begin();
-    for (auto it = open.begin(); it != open.end(); ++it) {
-      if (it->second.variance < nearest->second.variance) nearest = it;
-    }
-    const auto [robot, reached] = *nearest;
+    const auto nearest = std::min_element(open.begin(), open.end(), [](auto& a, auto& b) {
+      return variance_of(a.second) < variance_of(b.second);
+    });
+    const auto [robot, T_self_robot] = *nearest;
     open.erase(nearest);
-    settled.emplace(robot, reached.T_self_robot);
+    settled.emplace(robot, T_self_robot);
 
     for (const RelativePoseEdge& edge : edges) {
       if (edge.from != robot && edge.to != robot) continue;
       const bool forward = edge.from == robot;
       const RobotId other = forward ? edge.to : edge.from;
       if (settled.contains(other)) continue;
-      const double variance =
-          reached.variance + edge.T_from_to.covariance.topLeftCorner<3, 3>().trace();
+      const GaussianPose T_self_other =
+          T_self_robot * (forward ? edge.T_from_to : inverse(edge.T_from_to));
       const auto known = open.find(other);
-      if (known != open.end() && known->second.variance <= variance) continue;
-      const Pose T_robot_other = forward ? edge.T_from_to.pose : edge.T_from_to.pose.inverse();
-      open.insert_or_assign(other, Reached{reached.T_self_robot * T_robot_other, variance});
+      if (known != open.end() && variance_of(known->second) <= variance_of(T_self_other)) continue;
+      open.insert_or_assign(other, T_self_other);
     }
   }
   return settled;

@@ -68,6 +68,25 @@ Matrix6d with_tilt_of_biases(const RawPose& raw, double accel_bias_mps2) {
          accel_bias_mps2 * accel_bias_mps2 * (B * B.transpose() + N * N.transpose());
 }
 
+// How much two estimates whose errors go together, nobody knows how much, should each count: the
+// weight of the first for which the intersection of both is smallest.
+double intersection_weight(const Matrix6d& first, const Matrix6d& second) {
+  constexpr int kSteps = 20;
+  const Matrix6d A = first.inverse();
+  const Matrix6d B = second.inverse();
+  double best = 1.0;
+  double most = A.determinant();
+  for (int i = 1; i < kSteps; ++i) {
+    const double weight = static_cast<double>(i) / kSteps;
+    const double information = (weight * A + (1.0 - weight) * B).determinant();
+    if (information > most) {
+      most = information;
+      best = weight;
+    }
+  }
+  return best;
+}
+
 // P of the error at the corrected state: theta_new = J_r(theta) (theta - theta_hat).
 void reset(const Eigen::Matrix3d& J_r, E::Covariance& P) {
   P.middleRows<3>(E::kTheta) = (J_r * P.middleRows<3>(E::kTheta)).eval();
@@ -108,13 +127,14 @@ void NeighborFilter::advance_to(Timestamp to, const ImuHistory& imu_B, const Imu
   stamp_ = to;
 }
 
-// An update that turns the state far is done again, linearized where it leads to (iterated Kalman
+// An update that moves the state far is done again, linearized where it leads to (iterated Kalman
 // filter, Bell and Cathey 1993). A first pose is off by degrees and a bearing is not: with the
 // first linearization alone, what the bearing does not see, the roll about the line of sight, would
 // come out as known from the next bearing on.
 template <class Linearize>
 Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
-  constexpr double kLinear = 0.01;  // rad; half its square is well below any bearing's noise
+  // rad, and of the distance; half its square is well below any bearing's noise.
+  constexpr double kLinear = 0.01;
   constexpr int kMaxIterations = 5;
 
   auto z = linearize(state_);
@@ -124,7 +144,8 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
   if (outcome.verdict != Verdict::kFused) return fusion;
 
   Eigen::Vector3d theta = outcome.correction.template segment<3>(E::kTheta);
-  const bool is_far = theta.norm() > kLinear;
+  const double shift = outcome.correction.template segment<3>(E::kP).norm();
+  const bool is_far = theta.norm() > kLinear || shift > kLinear * state_.motion.T_B_N.p.norm();
   for (int i = 0; is_far && i < kMaxIterations; ++i) {
     NominalState there = state_;
     inject(outcome.correction, there);
@@ -201,10 +222,27 @@ Fusion NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& 
       gate_nis);
 }
 
-Fusion NeighborFilter::fuse_pose(const GaussianPose& T_B_N, double gate_nis) {
-  return correct(
-      [&](const NominalState& state) { return std::optional(linearize_pose(state, T_B_N)); },
+Fusion NeighborFilter::fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis) {
+  const double own = intersection_weight(pose_covariance(), T_B_N.covariance);
+  if (own == 1.0) return {.verdict = Verdict::kFused};
+  const E::Covariance before = P_;
+  P_.topRows<E::kGyroB>() /= std::sqrt(own);
+  P_.leftCols<E::kGyroB>() /= std::sqrt(own);
+  const GaussianPose discounted{T_B_N.pose, T_B_N.covariance / (1.0 - own)};
+  const Fusion fusion = correct(
+      [&](const NominalState& state) { return std::optional(linearize_pose(state, discounted)); },
       gate_nis);
+  if (fusion.verdict != Verdict::kFused) P_ = before;
+  return fusion;
+}
+
+void NeighborFilter::forget_distance(double sigma_m, const Priors& priors) {
+  const Eigen::Vector3d v_B_N = state_.motion.v_B_N;
+  const Eigen::Vector3d u = state_.motion.T_B_N.p.normalized();
+  GaussianPose known{state_.motion.T_B_N, pose_covariance()};
+  known.covariance.topLeftCorner<3, 3>() += sigma_m * sigma_m * u * u.transpose();
+  *this = NeighborFilter(stamp_, known, noise_, priors);
+  state_.motion.v_B_N = v_B_N;
 }
 
 Matrix6d NeighborFilter::pose_covariance() const {

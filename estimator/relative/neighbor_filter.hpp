@@ -58,7 +58,13 @@ class NeighborFilter {
                            double gate_nis);
   Fusion fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
                     const Eigen::Vector3d& p_N_Q, double gate_nis);
-  Fusion fuse_pose(const GaussianPose& T_B_N, double gate_nis);
+  /// A pose whose errors may go together with this filter's, and with those of such poses before:
+  /// covariance intersection (Julier and Uhlmann 1997).
+  Fusion fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis);
+
+  /// The distance is known no better than `sigma_m` any more, and the speed and what was learned of
+  /// the sensors no better than at the start: wrong ranges have led them astray.
+  void forget_distance(double sigma_m, const Priors& priors);
 
   struct Part;
   /// As Gaussians that are narrow enough for one linearization each, the attitude cut across its

@@ -17,7 +17,7 @@ namespace crepes {
 class Hypotheses {
  public:
   Hypotheses(FilterSettings settings, PairMounting mounting)
-      : settings_(std::move(settings)), mounting_(std::move(mounting)) {}
+      : settings_(settings), mounting_(std::move(mounting)) {}
 
   [[nodiscard]] bool empty() const { return starts_.empty(); }
   void clear() { starts_.clear(); }

@@ -12,7 +12,10 @@ constexpr Duration kMaxBehind = std::chrono::seconds{1};
 constexpr Duration kSilence = std::chrono::seconds{2};
 // The tight filter takes the bearings of its raw pose once more, by themselves: what the raw pose
 // says of them must not count.
-constexpr double kLooseBearing = 0.05;  // rad
+constexpr double kLooseBearing = 0.05;      // rad
+constexpr double kLateMemory = 1.0 / 16.0;  // of ranges
+constexpr double kHiddenShare = 0.25;       // in line of sight reflections are rarer
+constexpr Duration kHiddenAfter = std::chrono::milliseconds{150};
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
 
 }  // namespace
@@ -45,7 +48,11 @@ void Neighbor::add_range(const UwbRange& range) { take_range(range, MeasurementK
 void Neighbor::take_range(const UwbRange& range, MeasurementKind kind) {
   const bool plausible = range.range_m > 0.0 && range.range_m <= settings_.max_range_m;
   const bool late_path = range.received_dbm - range.first_path_dbm > settings_.late_path_db;
-  if (!plausible || late_path) {
+  late_share_ += kLateMemory * ((late_path ? 1.0 : 0.0) - late_share_);
+  // Behind something, the range whose first path looks strong enough is long all the same.
+  const Timestamp seen = std::max(last_seen_, last_seen_by_);
+  const bool hidden = late_share_ > kHiddenShare && range.stamp - seen > kHiddenAfter;
+  if (!plausible || late_path || hidden) {
     note(range.stamp, kind, {.verdict = Verdict::kGated});
     return;
   }

@@ -89,6 +89,7 @@ class Neighbor {
   Timestamp last_range_ = kNever;
   Timestamp one_way_since_ = kNever;
   bool one_way_lasts_ = false;
+  double late_share_ = 0.0;  ///< of the latest ranges, those whose first path is weak
   NoPoseReason raw_reason_ = NoPoseReason::kNotSeen;
   NeighborStatus status_;
 

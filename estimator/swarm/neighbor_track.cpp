@@ -13,6 +13,9 @@ namespace {
 constexpr double kMaxSigma = 1.0;                                      // m
 constexpr double kMaxAttitudeSigma = 20.0 * std::numbers::pi / 180.0;  // rad
 
+constexpr int kEnough = 10;            // refusals in a row, to mean something
+constexpr double kLostDistance = 1.0;  // m
+
 double largest_sigma(const Eigen::Matrix3d& covariance) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
   solver.computeDirect(covariance, Eigen::EigenvaluesOnly);
@@ -40,7 +43,7 @@ Fusion fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounti
       return filter.fuse_range(std::get<RangeReading>(m.reading), mounting.p_B_U, mounting.p_N_Q,
                                gates.range);
     case MeasurementKind::kGraphPose:
-      return filter.fuse_pose(std::get<GraphPose>(m.reading).T_B_N, gates.pose);
+      return filter.fuse_correlated_pose(std::get<GraphPose>(m.reading).T_B_N, gates.pose);
     case MeasurementKind::kRawPose:
       break;
   }
@@ -63,19 +66,20 @@ bool is_certain(const Matrix6d& covariance) {
 }
 
 NeighborTrack::NeighborTrack(Timestamp stamp, const RawPose& first, const FilterSettings& settings)
-    : filter_(make_filter(stamp, first, settings)) {
+    : filter_(make_filter(stamp, first, settings)), priors_(settings.priors) {
   last_[static_cast<std::size_t>(MeasurementKind::kRawPose)] = stamp;
 }
 
 NeighborTrack::NeighborTrack(Timestamp stamp, const GraphPose& first,
                              const FilterSettings& settings)
-    : filter_(make_filter(stamp, first, settings)) {
+    : filter_(make_filter(stamp, first, settings)), priors_(settings.priors) {
   last_[static_cast<std::size_t>(MeasurementKind::kGraphPose)] = stamp;
 }
 
 NeighborTrack::NeighborTrack(Timestamp stamp, const GaussianPose& T_B_N,
                              const FilterSettings& settings)
-    : filter_(NeighborFilter(stamp, T_B_N, settings.noise, settings.priors)) {}
+    : filter_(NeighborFilter(stamp, T_B_N, settings.noise, settings.priors)),
+      priors_(settings.priors) {}
 
 Timestamp NeighborTrack::stamp() const {
   return std::visit([](const auto& filter) { return filter.stamp(); }, filter_);
@@ -88,6 +92,10 @@ void NeighborTrack::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuH
 Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& mounting,
                            const Gates& gates) {
   auto* tight = std::get_if<NeighborFilter>(&filter_);
+  // Out of view, ranges that took a detour may have led the distance astray. Nothing else would
+  // bring it back: bearings of a robot at twice the distance are the same.
+  if (tight != nullptr && has_lost_its_distance(measurement.kind))
+    tight->forget_distance(kLostDistance, priors_);
   const Fusion fusion = tight != nullptr
                             ? fuse_tight(*tight, measurement, mounting, gates)
                             : fuse_paper(std::get<PaperFilter>(filter_), measurement, gates);
@@ -166,8 +174,16 @@ Timestamp NeighborTrack::last_sighting() const {
                    last(MeasurementKind::kRawPose)});
 }
 
+bool NeighborTrack::has_lost_its_distance(MeasurementKind kind) const {
+  if (kind != MeasurementKind::kRange && kind != MeasurementKind::kPeerRange) return false;
+  const Refusals& refused = refused_[static_cast<std::size_t>(kind)];
+  const auto fits = [this](MeasurementKind other) { return last(other) > stamp() - kPatience; };
+  return refused.count >= kEnough && refused.latest - refused.since >= 2 * kPatience &&
+         fits(MeasurementKind::kBearing) && fits(MeasurementKind::kPeerBearing) &&
+         !fits(MeasurementKind::kRange) && !fits(MeasurementKind::kPeerRange);
+}
+
 bool NeighborTrack::has_lost_its_way() const {
-  static constexpr int kEnough = 10;
   const auto is_astray = [this](MeasurementKind kind) {
     const Refusals& refused = refused_[static_cast<std::size_t>(kind)];
     return refused.count >= kEnough && refused.latest - refused.since >= kPatience;

@@ -70,6 +70,9 @@ class NeighborTrack {
   [[nodiscard]] bool has_lost_its_way() const;
 
  private:
+  /// Both directions fit, and for half a second no range did.
+  [[nodiscard]] bool has_lost_its_distance(MeasurementKind kind) const;
+
   /// Readings of one kind, gated one after the other.
   struct Refusals {
     Timestamp since = kNever;
@@ -78,6 +81,7 @@ class NeighborTrack {
   };
 
   std::variant<NeighborFilter, PaperFilter> filter_;
+  Priors priors_;
   std::array<Timestamp, kMeasurementKindCount> last_ = [] {
     std::array<Timestamp, kMeasurementKindCount> never{};
     never.fill(kNever);

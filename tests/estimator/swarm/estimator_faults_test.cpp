@@ -201,6 +201,34 @@ TEST(EstimatorFaults, RangesThroughWallsAreRefusedAndDoNoHarm) {
   EXPECT_LT(trials.during.worst_m, 0.25);
 }
 
+TEST(EstimatorFaults, BehindAPillarMostRangesTellAndTheOthersDoNoHarm) {
+  const Trials trials([](EstimatorPair& pair, std::uint64_t seed) {
+    RandomGeometry random(seed);
+    Conditions pillar{.in_view = false};
+    pillar.range = [&random](UwbRange& range) {
+      range.range_m += 0.2 - 0.2 * std::log(random.uniform(1e-6, 1.0));
+      range.first_path_dbm -= 10.0 + random.normal(3.0);  // one in five is below 8 dB
+    };
+    pair.run_for(4s, pillar);
+  });
+
+  EXPECT_LE(trials.during.dishonest_share(), 0.01);
+  EXPECT_LE(trials.after.dishonest_share(), 0.01);
+  EXPECT_LT(trials.settled.worst_m, 0.25);
+}
+
+TEST(EstimatorFaults, ADistanceThatRangesContradictOnceTheNeighborIsBackInViewIsFoundAgain) {
+  const Trials trials([](EstimatorPair& pair, std::uint64_t) {
+    Conditions detour{.in_view = false};
+    detour.range = [](UwbRange& range) { range.range_m += 0.6; };  // and nothing tells
+    pair.run_for(5s, detour);
+    pair.run_for(1s);
+  });
+
+  EXPECT_LE(trials.after.dishonest_share(), 0.01);
+  EXPECT_LT(trials.settled.worst_m, 0.25);
+}
+
 TEST(EstimatorFaults, ANeighborThatTakesAnotherForUsForHalfASecondIsNotBelieved) {
   const Trials trials([](EstimatorPair& pair, std::uint64_t seed) {
     const auto before = pair.count(MeasurementKind::kPeerBearing, Verdict::kGated);
