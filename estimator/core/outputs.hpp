@@ -62,11 +62,12 @@ enum class NoPoseReason : std::uint8_t {
   kNoRange,        ///< no UWB distance
   kNearVertical,   ///< almost above or below: yaw cannot be told
   kTooClose,       ///< antennas or rings nearly coincide
+  kContested,      ///< more than one place fits: mirror images, false sightings
   kUncertain,      ///< known worse than 1 m or 20 deg
 };
 
 [[nodiscard]] constexpr std::string_view name_of(NoPoseReason reason) {
-  constexpr std::array<std::string_view, 13> kNames{"none",
+  constexpr std::array<std::string_view, 14> kNames{"none",
                                                     "never heard",
                                                     "silent",
                                                     "clock offset unknown",
@@ -78,6 +79,7 @@ enum class NoPoseReason : std::uint8_t {
                                                     "no range",
                                                     "near the vertical",
                                                     "too close",
+                                                    "contested",
                                                     "uncertain"};
   return kNames[static_cast<std::size_t>(reason)];
 }

@@ -288,7 +288,8 @@ NoPoseReason Neighbor::reason(Timestamp now, const RobotState& self) const {
   if (now - last_seen_by_ > kSilence) return NoPoseReason::kDoesNotSeeUs;
   if (now - last_range_ > kSilence) return NoPoseReason::kNoRange;
   if (raw_reason_ != NoPoseReason::kNone) return raw_reason_;
-  return NoPoseReason::kUncertain;
+  const bool contested = !hypotheses_.empty() && !hypotheses_.is_settled();
+  return contested ? NoPoseReason::kContested : NoPoseReason::kUncertain;
 }
 
 NeighborStatus Neighbor::status() const {
