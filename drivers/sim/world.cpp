@@ -154,9 +154,10 @@ std::vector<Pillar> pillars_of(SimScenario scenario) {
   // Neighbors next to each other on the circle always see past it, the others now and then.
   if (scenario == SimScenario::kOccluded) return {{.radius_m = 1.0}};
   // Opposite the second and the third: each sees the next one in the line, and nobody else, ever.
-  if (scenario == SimScenario::kLine)
+  if (scenario == SimScenario::kLine) {
     return {{.center_W = {kLineStep, -kLineSide}, .radius_m = 1.3},
             {.center_W = {2.0 * kLineStep, kLineSide}, .radius_m = 1.3}};
+  }
   return {};
 }
 
