@@ -104,7 +104,7 @@ void Runtime::start_camera(std::size_t index) {
         });
   const OpenCamera open = world_ ? sim_camera(*world_, config_, index, sim_clock_)
                                  : real_camera(config_, index, clock_);
-  start_sensor(camera_sensor(camera.name, open, queues.frames, queues.used));
+  start_sensor(camera_sensor(camera.name, open, clock_, queues.frames, queues.used));
 }
 
 std::vector<QueueStatus> Runtime::queue_status() const {

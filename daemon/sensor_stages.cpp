@@ -111,14 +111,16 @@ auto do_aside(const StageContext& context, const std::string& name, const Work& 
 
 class CameraDevice final : public Device {
  public:
-  CameraDevice(std::unique_ptr<Camera> camera, FrameQueue& frames, FrameQueue& used)
-      : camera_(std::move(camera)), frames_(frames), used_(used) {}
+  CameraDevice(std::unique_ptr<Camera> camera, const Clock& clock, FrameQueue& frames,
+               FrameQueue& used)
+      : camera_(std::move(camera)), clock_(clock), frames_(frames), used_(used) {}
 
   [[nodiscard]] Result<std::size_t> read_once(milliseconds timeout) override {
     while (auto frame = used_.try_pop()) camera_->recycle(std::move(*frame));
     Result<std::optional<Frame>> frame = camera_->read_once(timeout);
     if (!frame) return tl::unexpected(frame.error());
     if (!*frame) return 0;
+    (*frame)->arrival = clock_.now();
     frames_.push(std::move(**frame));
     return 1;
   }
@@ -130,6 +132,7 @@ class CameraDevice final : public Device {
 
  private:
   std::unique_ptr<Camera> camera_;
+  const Clock& clock_;
   FrameQueue& frames_;
   FrameQueue& used_;
 };
@@ -141,8 +144,33 @@ std::string_view diagnosis_of(const Detection& found) {
              : "";
 }
 
-Totals counters_of(const Detection& found, const Rejected& rejected, std::uint64_t failures) {
-  return {{"threshold", static_cast<std::uint64_t>(found.threshold)},
+/// How long frames took from their arrival to their spots, since it was last asked.
+class Delays {
+ public:
+  void add(Duration delay) { delays_.push_back(delay); }
+
+  /// Median and 99th percentile [us].
+  [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> take() {
+    std::vector<Duration> sorted = std::exchange(delays_, {});
+    if (sorted.empty()) return {};
+    std::ranges::sort(sorted);
+    const auto at = [&](std::size_t percent) {
+      const Duration delay = sorted[(sorted.size() - 1) * percent / 100];
+      return static_cast<std::uint64_t>(delay / std::chrono::microseconds{1});
+    };
+    return {at(50), at(99)};
+  }
+
+ private:
+  std::vector<Duration> delays_;
+};
+
+Totals counters_of(const Detection& found, const Rejected& rejected, std::uint64_t failures,
+                   Delays& delays) {
+  const auto [median_us, p99_us] = delays.take();
+  return {{"delay_p50_us", median_us},
+          {"delay_p99_us", p99_us},
+          {"threshold", static_cast<std::uint64_t>(found.threshold)},
           {"hot", rejected.hot},
           {"huge", rejected.huge},
           {"faint", rejected.faint},
@@ -152,16 +180,16 @@ Totals counters_of(const Detection& found, const Rejected& rejected, std::uint64
 
 }  // namespace
 
-Sensor camera_sensor(const std::string& name, const OpenCamera& open, FrameQueue& frames,
-                     FrameQueue& used) {
+Sensor camera_sensor(const std::string& name, const OpenCamera& open, const Clock& clock,
+                     FrameQueue& frames, FrameQueue& used) {
   Sensor sensor;
   sensor.name = name;
   sensor.when_silent = "no frame: is the camera plugged in and running?";
-  sensor.open = [=, &frames, &used]() -> Result<std::unique_ptr<Device>> {
+  sensor.open = [=, &clock, &frames, &used]() -> Result<std::unique_ptr<Device>> {
     while (used.try_pop()) continue;  // frames that keep the camera of before open
     Result<std::unique_ptr<Camera>> camera = open();
     if (!camera) return tl::unexpected(camera.error());
-    return std::make_unique<CameraDevice>(std::move(*camera), frames, used);
+    return std::make_unique<CameraDevice>(std::move(*camera), clock, frames, used);
   };
   return sensor;
 }
@@ -195,6 +223,7 @@ void run_vision(const VisionStage& stage, const StageContext& context,
   SpotDetector detector(stage.config);
   HealthReport health(stage.camera_name + " spots", context);
   Rejected rejected;
+  Delays delays;
   std::uint64_t failures = 0;
   while (!stop.stop_requested()) {
     context.turns.add();
@@ -203,11 +232,12 @@ void run_vision(const VisionStage& stage, const StageContext& context,
     const Detection found =
         detector.detect({frame->data(), frame->width, frame->height, frame->stride()});
     stage.sink(SpotFrame{frame->stamp, frame->camera, {found.spots.begin(), found.spots.end()}});
+    delays.add(context.clock.now() - frame->arrival);
     health.count(1);
     rejected += found.rejected;
     failures += found.failure.empty() ? 0 : 1;
     if (health.is_due())
-      health.tell(std::string(diagnosis_of(found)), counters_of(found, rejected, failures));
+      health.tell(std::string(diagnosis_of(found)), counters_of(found, rejected, failures, delays));
     stage.used.push(std::move(*frame));
   }
 }

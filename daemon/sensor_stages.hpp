@@ -77,7 +77,7 @@ using OpenCamera = std::function<Result<std::unique_ptr<Camera>>()>;
 
 /// A camera whose frames go to `frames`; those in `used` are given back to it.
 [[nodiscard]] Sensor camera_sensor(const std::string& name, const OpenCamera& open,
-                                   FrameQueue& frames, FrameQueue& used);
+                                   const Clock& clock, FrameQueue& frames, FrameQueue& used);
 
 /// What the vision thread of one camera works on. All references must outlive it.
 struct VisionStage {

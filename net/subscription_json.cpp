@@ -48,6 +48,7 @@ std::string pose_json(std::uint64_t sequence, RobotId self, std::string_view nam
             {"seq", sequence},
             {"timestamp", to_seconds(pose.stamp.time_since_epoch())},
             {"t_ns", std::to_string(to_ns(pose.stamp))},
+            {"t_pub_ns", std::to_string(to_ns(pose.published))},
             {"self", self.value},
             {"peer", pose.neighbor.value},
             {"name", shortened(name, kMaxName)},

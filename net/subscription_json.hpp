@@ -43,7 +43,8 @@ struct SubscriptionRequest {
 /// All answers are valid UTF-8 of at most kMaxSubscriptionDatagram bytes, without null or NaN.
 [[nodiscard]] std::string version_json(std::string_view release, double lease_s);
 [[nodiscard]] std::string cookie_json(std::string_view cookie);
-/// `name` is the neighbor's; `sequence` counts this client's poses.
+/// `name` is the neighbor's; `sequence` counts this client's poses. `t_pub_ns` is when the
+/// estimator gave the pose away, on the clock of `t_ns`.
 [[nodiscard]] std::string pose_json(std::uint64_t sequence, RobotId self, std::string_view name,
                                     const NeighborPose& pose);
 /// Drops the least important parts, and says `"truncated":true`, where it would not fit; neighbors

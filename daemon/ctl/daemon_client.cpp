@@ -22,6 +22,11 @@ Result<DaemonClient> DaemonClient::open(const std::string& address, std::uint16_
   });
 }
 
+Error silent(const DaemonAddress& daemon) {
+  return {ErrorCode::kNotFound, "no answer from " + daemon.address + " port " +
+                                    std::to_string(daemon.port) + ": is crepesd running there?"};
+}
+
 Result<void> DaemonClient::watch() { return ask(R"({"class":"WATCH","enable":true)"); }
 Result<void> DaemonClient::unwatch() { return ask(R"({"class":"WATCH","enable":false)"); }
 Result<void> DaemonClient::poll() { return ask(R"({"class":"POLL")"); }

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -27,19 +28,30 @@ struct PoseMessage {
   NeighborPose pose;
 };
 
-/// STATUS, as far as a table shows it.
+/// STATUS. What the daemon left out has its default; totals are by name.
 struct StatusMessage {
+  using Totals = std::map<std::string, std::uint64_t>;
+  struct Reports {
+    std::uint64_t received = 0;
+    std::uint64_t lost = 0;
+    std::uint64_t restarts = 0;
+    double age_s = 0.0;
+  };
   struct Neighbor {
     RobotId neighbor{};
     std::string name;
-    std::string state;   ///< a mode, or "none"
-    std::string reason;  ///< why there is no pose
+    std::string state;                           ///< a mode, or "none"
+    std::string reason;                          ///< why there is no pose
+    std::map<std::string, Totals> measurements;  ///< by kind and verdict
+    std::map<std::string, double> ages_s;        ///< of each kind's newest, and of its IMU
+    std::optional<Reports> reports;
   };
   struct Sensor {
     std::string name;
     double rate_hz = 0.0;
     bool ok = false;
     std::string message;
+    Totals faults;
   };
   struct Clock {
     RobotId peer{};
@@ -50,9 +62,13 @@ struct StatusMessage {
   RobotId self{};
   std::string name;
   double uptime_s = 0.0;
+  double cpu_s = 0.0;
+  double rss_mb = 0.0;
   std::vector<Neighbor> neighbors;
   std::vector<Sensor> sensors;
   std::vector<Clock> clocks;
+  Totals queues;
+  Totals network;
 };
 
 /// What a daemon elsewhere wants to see again before it says more.
@@ -70,6 +86,15 @@ using DaemonMessage =
 /// Classes that are not known, and what does not parse, are errors.
 [[nodiscard]] Result<DaemonMessage> parse_message(std::string_view datagram);
 
+/// Where a daemon serves poses.
+struct DaemonAddress {
+  std::string address = "127.0.0.1";  ///< numeric, IPv4 or IPv6
+  std::uint16_t port = 47475;
+};
+
+/// Nobody answered there.
+[[nodiscard]] Error silent(const DaemonAddress& daemon);
+
 /// One datagram as it came, and what it says.
 struct DaemonAnswer {
   std::string text;
@@ -80,6 +105,9 @@ class DaemonClient {
  public:
   /// `address` is numeric, IPv4 or IPv6.
   [[nodiscard]] static Result<DaemonClient> open(const std::string& address, std::uint16_t port);
+  [[nodiscard]] static Result<DaemonClient> open(const DaemonAddress& daemon) {
+    return open(daemon.address, daemon.port);
+  }
 
   /// Asks for poses, or renews the lease; a daemon that is not there goes unnoticed.
   [[nodiscard]] Result<void> watch();

@@ -51,22 +51,48 @@ PoseMessage pose_from(const Json& json) {
   return message;
 }
 
+StatusMessage::Totals totals_from(const Json& json, const char* key) {
+  return json.value(key, StatusMessage::Totals());
+}
+
+StatusMessage::Neighbor neighbor_from(const Json& json) {
+  StatusMessage::Neighbor neighbor{.neighbor = id_from(json.at("peer")),
+                                   .name = json.value("name", ""),
+                                   .state = json.value("state", "none"),
+                                   .reason = json.value("reason", ""),
+                                   .measurements = {},
+                                   .ages_s = {},
+                                   .reports = {}};
+  const Json measurements = json.value("measurements", Json::object());
+  for (const auto& [kind, verdicts] : measurements.items())
+    neighbor.measurements[kind] = verdicts.get<StatusMessage::Totals>();
+  neighbor.ages_s = json.value("ages_s", neighbor.ages_s);
+  if (const auto reports = json.find("reports"); reports != json.end()) {
+    neighbor.reports = {.received = reports->value("received", std::uint64_t{0}),
+                        .lost = reports->value("lost", std::uint64_t{0}),
+                        .restarts = reports->value("restarts", std::uint64_t{0}),
+                        .age_s = reports->value("age_s", 0.0)};
+  }
+  return neighbor;
+}
+
 StatusMessage status_from(const Json& json) {
   StatusMessage status;
   status.self = id_from(json.at("self"));
   status.name = json.value("name", "");
   status.uptime_s = json.value("uptime_s", 0.0);
-  for (const Json& neighbor : json.value("neighbors", Json::array())) {
-    status.neighbors.push_back({.neighbor = id_from(neighbor.at("peer")),
-                                .name = neighbor.value("name", ""),
-                                .state = neighbor.value("state", "none"),
-                                .reason = neighbor.value("reason", "")});
-  }
+  status.cpu_s = json.value("cpu_s", 0.0);
+  status.rss_mb = json.value("rss_mb", 0.0);
+  for (const Json& neighbor : json.value("neighbors", Json::array()))
+    status.neighbors.push_back(neighbor_from(neighbor));
+  for (const Json& id : json.value("more", Json::array()))
+    status.neighbors.push_back(neighbor_from({{"peer", id}}));
   for (const Json& sensor : json.value("sensors", Json::array())) {
     status.sensors.push_back({.name = sensor.at("name").get<std::string>(),
                               .rate_hz = sensor.value("rate_hz", 0.0),
                               .ok = sensor.value("ok", false),
-                              .message = sensor.value("message", "")});
+                              .message = sensor.value("message", ""),
+                              .faults = totals_from(sensor, "faults")});
   }
   for (const Json& clock : json.value("clocks", Json::array())) {
     status.clocks.push_back({.peer = id_from(clock.at("peer")),
@@ -74,6 +100,8 @@ StatusMessage status_from(const Json& json) {
                              .skew_ppm = clock.value("skew_ppm", 0.0),
                              .sigma_s = clock.value("sigma_s", 0.0)});
   }
+  status.queues = totals_from(json, "queues");
+  status.network = totals_from(json, "network");
   return status;
 }
 

@@ -196,12 +196,14 @@ Result<std::string> evaluate(const EvaluateOptions& options) {
   if (!manifest) return tl::unexpected(manifest.error());
   const Result<SwarmTruth> truth = SwarmTruth::load(options.swarm, *manifest);
   if (!truth) return tl::unexpected(truth.error());
-  Result<SwarmScore> score = score_swarm(options.results, *manifest, *truth, options.after_s);
+  Result<SwarmScore> score =
+      score_swarm(options.results, *manifest, *truth, options.after_s, options.on_progress);
   if (!score) return tl::unexpected(score.error());
   if (options.against.empty())
     return options.json ? swarm_json(*score).dump(2) + "\n" : table_of(*score, options.after_s);
 
-  Result<SwarmScore> against = score_swarm(options.against, *manifest, *truth, options.after_s);
+  Result<SwarmScore> against =
+      score_swarm(options.against, *manifest, *truth, options.after_s, options.on_progress);
   if (!against) return tl::unexpected(against.error());
   score_common_rows(*score, *against, *manifest, *truth, options.after_s);
   if (!options.json) return comparison_table(*score, *against);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "estimator/core/result.hpp"
@@ -15,6 +16,7 @@ struct EvaluateOptions {
       against;           ///< other results of the same data set to compare with; may be empty
   double after_s = 5.0;  ///< the first seconds are not scored
   bool json = false;
+  std::function<void(double)> on_progress;  ///< is told the share that is done; may be empty
 };
 
 /// A table, or a JSON document.

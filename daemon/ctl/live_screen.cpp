@@ -1,5 +1,6 @@
 #include "daemon/ctl/live_screen.hpp"
 
+#include <poll.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -26,6 +27,27 @@ bool StopSignals::requested() {
 bool print(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
   return std::fflush(stdout) == 0;
+}
+
+KeyReader::KeyReader() {
+  termios settings{};
+  // In the background the terminal is another's.
+  if (::tcgetattr(STDIN_FILENO, &settings) != 0 || ::tcgetpgrp(STDIN_FILENO) != ::getpgrp()) return;
+  before_ = settings;
+  settings.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+  ::tcsetattr(STDIN_FILENO, TCSANOW, &settings);
+}
+
+KeyReader::~KeyReader() {
+  if (before_) ::tcsetattr(STDIN_FILENO, TCSANOW, &*before_);
+}
+
+std::optional<char> KeyReader::next() const {
+  pollfd typed{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
+  char key = 0;
+  if (!before_ || ::poll(&typed, 1, 0) <= 0 || ::read(STDIN_FILENO, &key, 1) != 1)
+    return std::nullopt;
+  return key;
 }
 
 LiveScreen::LiveScreen() : is_terminal_(::isatty(STDOUT_FILENO) == 1) {

@@ -1,7 +1,10 @@
 /// A table that renews itself in a terminal, and a polite way to be stopped.
 #pragma once
 
+#include <termios.h>
+
 #include <csignal>
+#include <optional>
 #include <string>
 
 namespace crepes {
@@ -43,6 +46,24 @@ class LiveScreen {
 
  private:
   bool is_terminal_;
+};
+
+/// Single keys from standard input while it lives, without echo; none if it is not a terminal.
+class KeyReader {
+ public:
+  KeyReader();
+  KeyReader(const KeyReader&) = delete;
+  KeyReader& operator=(const KeyReader&) = delete;
+  KeyReader(KeyReader&&) = delete;
+  KeyReader& operator=(KeyReader&&) = delete;
+  ~KeyReader();
+
+  [[nodiscard]] bool is_terminal() const { return before_.has_value(); }
+  /// The next byte that was typed, if there is one; never waits.
+  [[nodiscard]] std::optional<char> next() const;
+
+ private:
+  std::optional<termios> before_;
 };
 
 /// Writes to standard output at once; false if nobody reads it.

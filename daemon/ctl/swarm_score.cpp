@@ -59,7 +59,9 @@ std::vector<ClockScore> score_clocks(const std::vector<ClockSample>& samples,
 }  // namespace
 
 Result<SwarmScore> score_swarm(const fs::path& results, const SwarmManifest& manifest,
-                               const SwarmTruth& truth, double after_s) {
+                               const SwarmTruth& truth, double after_s,
+                               const std::function<void(double)>& on_progress) {
+  const std::size_t pairs = manifest.robots.size() * (manifest.robots.size() - 1);
   SwarmScore swarm;
   std::size_t files = 0;
   ReplayOutput::Names names;
@@ -73,6 +75,8 @@ Result<SwarmScore> score_swarm(const fs::path& results, const SwarmManifest& man
       pair.poses = std::move(*poses);
       score(pair, truth, manifest.duration_s, after_s);
       swarm.pairs.push_back(std::move(pair));
+      if (on_progress)
+        on_progress(static_cast<double>(swarm.pairs.size()) / static_cast<double>(pairs));
     }
   }
   if (files == 0) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,9 +36,11 @@ struct SwarmScore {
 
 /// Reads DIR/<observer>/<neighbor>.csv of every ordered pair and DIR/report.json, and scores what
 /// lies later than `after_s`. A pair without a file has no poses; no file at all is an error.
+/// `on_progress` is told the share of the pairs that is done.
 [[nodiscard]] Result<SwarmScore> score_swarm(const std::filesystem::path& results,
                                              const SwarmManifest& manifest, const SwarmTruth& truth,
-                                             double after_s);
+                                             double after_s,
+                                             const std::function<void(double)>& on_progress = {});
 
 /// Scores both again over the stamps that they have in common, pair by pair; availability remains
 /// that of all rows.

@@ -23,6 +23,7 @@ using LentPixels = std::unique_ptr<const std::uint8_t, std::function<void(const 
 /// One grey picture; moved from owner to owner.
 struct Frame {
   Timestamp stamp{};        ///< when the shutter was open
+  Timestamp arrival{};      ///< when the picture was here
   std::uint8_t camera = 0;  ///< index into the configured cameras
   int width = 0;
   int height = 0;

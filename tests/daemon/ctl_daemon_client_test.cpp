@@ -66,6 +66,24 @@ TEST(DaemonMessages, ReadTheReasonWhereThereIsNoPose) {
   EXPECT_EQ(read.clocks[0].offset_s, -17.5);
 }
 
+TEST(DaemonMessages, ReadAllAboutOneNeighbor) {
+  SystemStatus status;
+  status.stamp = Timestamp{100s};
+  NeighborStatus neighbor;
+  neighbor.neighbor = RobotId{2};
+  neighbor.measurements[0][0] = 17;
+  neighbor.newest[0] = Timestamp{99s};
+  status.estimator.neighbors = {neighbor};
+  status.traffic = {{.peer = RobotId{2}, .received = 70, .lost = 3, .restarts = 1, .age_s = 0.02}};
+
+  const auto read =
+      std::get<StatusMessage>(parse_message(peer_status_json(status, RobotId{2}).value()).value());
+
+  EXPECT_EQ(read.neighbors.at(0).measurements.at("bearing").at("fused"), 17U);
+  EXPECT_EQ(read.neighbors.at(0).ages_s.at("bearing"), 1.0);
+  EXPECT_EQ(read.neighbors.at(0).reports.value().lost, 3U);
+}
+
 TEST(DaemonMessages, RefuseWhatTheyCannotRead) {
   for (const char* text :
        {"", "{", "[]", "3", R"({"class":"HELLO"})", R"({"class":7})", R"({"class":"POSE"})",

@@ -147,8 +147,12 @@ class Evaluate : public testing::Test {
   [[nodiscard]] std::filesystem::path results() const { return swarm_.dir() / "out"; }
 
   [[nodiscard]] EvaluateOptions options() const {
-    return {
-        .results = results(), .swarm = swarm_.dir(), .against = {}, .after_s = 0.1, .json = true};
+    return {.results = results(),
+            .swarm = swarm_.dir(),
+            .against = {},
+            .after_s = 0.1,
+            .json = true,
+            .on_progress = {}};
   }
 
   TinySwarm swarm_;

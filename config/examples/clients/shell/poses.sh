@@ -1,0 +1,21 @@
+#!/bin/sh
+# Poses of a crepesd on this robot, one JSON object a line, for jq or grep; needs nc (netcat-openbsd).
+#   poses.sh [ADDRESS [PORT [RATE_HZ]]] | jq 'select(.class == "POSE") | .position'
+# Ends when its reader does.
+address=${1:-127.0.0.1}
+port=${2:-47475}
+rate=${3:-10}
+
+# The lease is ten seconds: a lost datagram does not matter.
+ask() {
+  while kill -0 $$ && printf '{"class":"WATCH","enable":true,"rate_hz":%s}' "$rate"; do sleep 1; done 2>/dev/null
+}
+
+# nc writes datagrams one after another without anything between them: an object is told when the next begins.
+# It does not mind when nobody reads what it writes, so the reader's end is told to this shell, and by its end to `ask`.
+trap 'exit 0' TERM
+ask | nc -u "$address" "$port" | {
+  perl -e '$/ = "}{"; $| = 1; while (<STDIN>) { chomp; print $. > 1 ? "{" : "", $_, "}\n" or exit }'
+  kill $$
+} &
+wait

@@ -1,0 +1,29 @@
+#include "daemon/ctl/demo.hpp"
+
+#include "daemon/ctl/commands/command_line.hpp"
+#include "daemon/ctl/commands/commands.hpp"
+
+namespace crepes {
+
+void add_demo(CommandLine& line) {
+  auto& options = line.keep<DemoOptions>();
+  CLI::App* sub = line.add(
+      "demo", "Start real daemons in a simulated world and compare their poses with its truth");
+  sub->add_option("--for", options.for_s, "seconds")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 600.0));
+  add_choice(
+      sub, "--scenario", kSimScenarios,
+      [&options](SimScenario scenario) { options.scenario = scenario; },
+      "what the robots do; four if left out");
+  sub->add_option("--seed", options.seed, "of the world")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  sub->add_option("--port", options.port, "the first robot's subscription; the others follow")
+      ->capture_default_str()
+      ->check(CLI::Range(1024, 65000));
+  sub->add_option("--keep", options.keep, "directory in which configurations and logs stay");
+  line.run(sub, [&options] { return demo(options); });
+}
+
+}  // namespace crepes

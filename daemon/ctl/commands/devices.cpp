@@ -1,0 +1,16 @@
+#include "daemon/ctl/devices.hpp"
+
+#include "daemon/ctl/commands/command_line.hpp"
+#include "daemon/ctl/commands/commands.hpp"
+
+namespace crepes {
+
+void add_devices(CommandLine& line) {
+  auto& options = line.keep<DevicesOptions>();
+  CLI::App* sub = line.add(
+      "devices", "List cameras and serial devices, and what to write into the configuration");
+  sub->add_flag("--json", options.json, "JSON instead of text");
+  line.run(sub, [&options] { return print_result(list_devices(options)); });
+}
+
+}  // namespace crepes

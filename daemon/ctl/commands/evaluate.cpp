@@ -1,0 +1,28 @@
+#include "daemon/ctl/evaluate.hpp"
+
+#include "daemon/ctl/commands/command_line.hpp"
+#include "daemon/ctl/commands/commands.hpp"
+
+namespace crepes {
+
+void add_evaluate(CommandLine& line) {
+  auto& options = line.keep<EvaluateOptions>();
+  CLI::App* sub =
+      line.add("evaluate",
+               "Compare the poses of a replay with ground truth: errors without alignment "
+               "(ATE), availability, consistency, clocks");
+  sub->add_option("DIR", options.results, "what replay wrote")->required();
+  sub->add_option("--truth", options.swarm, "the data set, with its truth/")->required();
+  sub->add_option("--after", options.after_s, "seconds at the start that are not scored")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  sub->add_option("--against", options.against,
+                  "other results of the same data set; both are scored over common rows");
+  sub->add_flag("--json", options.json, "JSON instead of a table");
+  line.run(sub, [&options] {
+    options.on_progress = progress_on_terminal();
+    return print_result(evaluate(options));
+  });
+}
+
+}  // namespace crepes

@@ -1,0 +1,44 @@
+#include "daemon/ctl/spots.hpp"
+
+#include <cstdio>
+
+#include "daemon/ctl/commands/command_line.hpp"
+#include "daemon/ctl/commands/commands.hpp"
+#include "daemon/ctl/live_screen.hpp"
+
+namespace crepes {
+namespace {
+
+Result<void> run_spots(SpotsOptions options) {
+  options.on_text = [](const std::string& text) { print(text); };
+  options.on_fault = [](const std::string& fault) {
+    std::fprintf(stderr, "refused: %s\n", fault.c_str());
+  };
+  options.on_progress = progress_on_terminal();
+  return inspect_spots(options).map([](const SpotsSummary&) {});
+}
+
+}  // namespace
+
+void add_spots(CommandLine& line) {
+  auto& options = line.keep<SpotsOptions>();
+  CLI::App* sub = line.add(
+      "spots",
+      "Show what the detector and the tracker find in recorded pictures: for setting up exposure "
+      "and threshold");
+  sub->add_option("IMAGE_OR_FOLDER", options.source,
+                  "a picture, a data set's cam0, or any folder of pictures")
+      ->required();
+  sub->add_option("--config", options.config, "crepesd.yaml of the robot that took them")
+      ->required();
+  sub->add_option("--out", options.out, "directory for PNGs with spots, robots and their trails");
+  sub->add_option("--every", options.every, "draw one picture in so many")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
+  sub->add_option("--camera", options.camera,
+                  "its name in the configuration; left out: that of cam0, cam1, ... in the path");
+  sub->add_flag("--json", options.json, "one JSON object a picture, and one for all");
+  line.run(sub, [&options] { return run_spots(options); });
+}
+
+}  // namespace crepes

@@ -1,0 +1,29 @@
+#include "daemon/ctl/waitpose.hpp"
+
+#include "daemon/ctl/commands/command_line.hpp"
+#include "daemon/ctl/commands/commands.hpp"
+
+namespace crepes {
+
+void add_waitpose(CommandLine& line) {
+  auto& options = line.keep<WaitposeOptions>();
+  CLI::App* sub = line.add(
+      "waitpose", "Wait until a neighbor's pose is there; exit code 1 and the reason if it is not");
+  add_daemon_options(sub, options.daemon);
+  sub->add_option_function<int>(
+         "--peer", [&options](int id) { options.peer = RobotId{static_cast<std::uint16_t>(id)}; },
+         "the neighbor's id")
+      ->required()
+      ->check(CLI::Range(1, 65534));
+  sub->add_option("--timeout", options.timeout_s, "seconds")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1e6));
+  sub->add_option_function<double>(
+         "--max-sigma", [&options](double sigma_m) { options.max_sigma_m = sigma_m; },
+         "wait until its position is known so well [m]")
+      ->check(CLI::PositiveNumber);
+  sub->add_flag("--json", options.json, "the daemon's own POSE");
+  line.run(sub, [&options] { return print_result(wait_for_pose(options)); });
+}
+
+}  // namespace crepes

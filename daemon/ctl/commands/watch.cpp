@@ -1,0 +1,22 @@
+#include "daemon/ctl/watch.hpp"
+
+#include "daemon/ctl/commands/command_line.hpp"
+#include "daemon/ctl/commands/commands.hpp"
+
+namespace crepes {
+
+void add_watch(CommandLine& line) {
+  auto& options = line.keep<WatchOptions>();
+  CLI::App* sub = line.add(
+      "watch", "A live table of the neighbors' poses, and why there is none where there is none");
+  add_daemon_options(sub, options.daemon);
+  sub->add_flag("--json", options.json, "the daemon's own objects, one a line");
+  sub->add_option_function<double>(
+         "--for", [&options](double seconds) { options.for_s = seconds; },
+         "stop after so many seconds")
+      ->check(CLI::Range(0.1, 1e6));
+  sub->add_flag("--once", options.once, "one table, then stop");
+  line.run(sub, [&options] { return watch(options); });
+}
+
+}  // namespace crepes

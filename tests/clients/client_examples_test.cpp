@@ -1,0 +1,159 @@
+/// The examples of config/examples/clients, as a user runs them, with live daemons of a simulated
+/// pair: what they print must be the truth.
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "daemon/ctl/child_process.hpp"
+#include "daemon/ctl/csv_file.hpp"
+#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/runtime.hpp"
+#include "tests/support/live_daemon.hpp"
+
+namespace crepes {
+namespace {
+
+const std::string kClients = std::string(CREPES_SOURCE_DIR) + "/config/examples/clients";
+
+/// Where a program of this name is; empty if it is not installed.
+std::string path_of(const std::string& program) {
+  for (const char* folder : {"/usr/bin/", "/bin/"})
+    if (::access((folder + program).c_str(), X_OK) == 0) return folder + program;
+  return "";
+}
+
+class Clients : public LiveDaemon {
+ protected:
+  /// Runs a program until `enough` of what it printed; its lines.
+  std::vector<std::string> lines_of(const std::string& program,
+                                    const std::vector<std::string>& arguments, std::size_t enough) {
+    const auto log = scratch_.path() / "log";
+    auto child = ChildProcess::start(program, arguments, log);
+    if (!child) {
+      ADD_FAILURE() << child.error().message;
+      return {};
+    }
+    const Timestamp end = machine_.now() + kPatience;
+    std::vector<std::string> lines;
+    while (lines.size() < enough && !child->ending() && machine_.now() < end) {
+      ::poll(nullptr, 0, 20);
+      std::istringstream text(read_text_file(log).value_or(""));
+      lines.clear();
+      for (std::string line; std::getline(text, line) && !text.eof();) lines.push_back(line);
+    }
+    EXPECT_GE(lines.size(), enough) << read_text_file(log).value_or("");
+    return lines;
+  }
+
+  /// The pose of a line `t_ns peer mode x y z`, as POSE has it.
+  static Json pose_of(const std::string& line) {
+    std::istringstream words(line);
+    std::string t_ns;
+    std::string mode;
+    int peer = 0;
+    double x = 0.0;
+    double y = 0.0;
+    double z = 0.0;
+    words >> t_ns >> peer >> mode >> x >> y >> z;
+    EXPECT_TRUE(words) << line;
+    return {{"t_ns", t_ns},
+            {"peer", peer},
+            {"mode", mode},
+            {"position", {{"x", x}, {"y", y}, {"z", z}}},
+            {"orientation", {{"w", 1}, {"x", 0}, {"y", 0}, {"z", 0}}}};
+  }
+
+  void expect_truth(const Json& pose) const {
+    EXPECT_EQ(pose["peer"], 2);
+    EXPECT_LT(error_of(pose, first_).position_m, 0.5) << pose.dump();
+  }
+
+  /// Ten poses of the neighbor, each where it is.
+  void expect_poses(const std::string& program, const std::vector<std::string>& arguments) {
+    for (const std::string& line : lines_of(program, arguments, 10)) expect_truth(pose_of(line));
+  }
+
+  Config first_ = pair_config(1, mesh_port_);
+  std::string port_ = std::to_string(first_.subscription.port);
+  Runtime one_{first_, machine_};
+  Runtime two_{pair_config(2, mesh_port_), machine_};
+  ScratchDirectory scratch_ = ScratchDirectory::create({}).value();
+};
+
+TEST_F(Clients, InEachLanguageGetThePosesThatAreTrue) {
+  expect_true_poses(first_);  // so that the programs' own patience is not tried
+
+  {
+    SCOPED_TRACE("Python");
+    expect_poses("/usr/bin/python3", {kClients + "/python/crepes_client.py", "--port", port_,
+                                      "--rate", "20", "--count", "10"});
+  }
+  {
+    SCOPED_TRACE("C++");
+    expect_poses(CREPES_CPP_CLIENT, {"127.0.0.1", port_, "10"});
+  }
+  if (const std::string node = path_of("node"); !node.empty()) {
+    SCOPED_TRACE("Node");
+    expect_poses(node, {kClients + "/node/poses.mjs", "127.0.0.1", port_, "10"});
+  } else {
+    std::puts("not tried: node is not installed (Debian: nodejs)");
+  }
+  if (!path_of("nc").empty()) {
+    SCOPED_TRACE("shell");
+    for (const std::string& line :
+         lines_of("/bin/sh", {kClients + "/shell/poses.sh", "127.0.0.1", port_, "20"}, 10)) {
+      const Json object = Json::parse(line, nullptr, false);
+      ASSERT_TRUE(object.is_object()) << line;
+      if (object["class"] == "POSE") expect_truth(object);
+    }
+  } else {
+    std::puts("not tried: nc is not installed (Debian: netcat-openbsd)");
+  }
+}
+
+TEST_F(Clients, InRosGetPosesWithCovarianceAndTransforms) {
+  expect_true_poses(first_);
+
+  const auto lines =
+      lines_of("/usr/bin/env",
+               {"PYTHONPATH=" + std::string(CREPES_SOURCE_DIR) + "/tests/clients/fake_ros",
+                "FAKE_ROS_COUNT=20", "/usr/bin/python3", kClients + "/ros2/crepes_bridge.py",
+                "--ros-args", "-p", "port:=" + port_, "-p", "publish_tf:=true"},
+               20);
+
+  int poses = 0;
+  int transforms = 0;
+  for (const std::string& line : lines) {
+    const Json told = Json::parse(line);
+    const Json& message = told["message"];
+    EXPECT_EQ(message["header"]["frame_id"], "robot_1/base_link");
+    EXPECT_GT(message["header"]["stamp"]["sec"].get<std::int64_t>(), 1'600'000'000);
+    if (told["topic"] == "/tf") {
+      EXPECT_EQ(message["child_frame_id"], "robot_2/base_link");
+      ++transforms;
+    } else {
+      EXPECT_EQ(told["topic"], "crepes/r2/pose");
+      const Json& covariance = message["pose"]["covariance"];
+      ASSERT_EQ(covariance.size(), 36U);
+      EXPECT_GT(covariance[0].get<double>(), 0.0);
+      EXPECT_GT(covariance[35].get<double>(), 0.0);
+      const double norm =
+          std::hypot(message["pose"]["pose"]["orientation"]["w"].get<double>(),
+                     message["pose"]["pose"]["orientation"]["x"].get<double>(),
+                     std::hypot(message["pose"]["pose"]["orientation"]["y"].get<double>(),
+                                message["pose"]["pose"]["orientation"]["z"].get<double>()));
+      EXPECT_NEAR(norm, 1.0, 1e-6);
+      ++poses;
+    }
+  }
+  EXPECT_EQ(poses, transforms);
+}
+
+}  // namespace
+}  // namespace crepes

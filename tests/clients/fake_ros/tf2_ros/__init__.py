@@ -1,0 +1,9 @@
+import rclpy
+
+
+class TransformBroadcaster:
+    def __init__(self, node):
+        assert isinstance(node, rclpy.Node)
+
+    def sendTransform(self, transform):
+        rclpy.tell("/tf", transform)

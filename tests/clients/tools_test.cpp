@@ -1,0 +1,159 @@
+/// crepesctl as a user or a script runs it, with live daemons of a simulated pair.
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <string>
+#include <vector>
+
+#include "daemon/ctl/child_process.hpp"
+#include "daemon/ctl/csv_file.hpp"
+#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/runtime.hpp"
+#include "tests/support/live_daemon.hpp"
+
+namespace crepes {
+namespace {
+
+struct Ending {
+  std::string how;
+  std::string output;  ///< standard output and error
+};
+
+Ending run(const std::string& program, const std::vector<std::string>& arguments) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const auto log = scratch.path() / "log";
+  auto child = ChildProcess::start(program, arguments, log);
+  if (!child) return {child.error().message, ""};
+  const MonotonicClock clock;
+  const Timestamp end = clock.now() + kPatience;
+  while (!child->ending() && clock.now() < end) ::poll(nullptr, 0, 20);
+  return {child->ending().value_or("still running"), read_text_file(log).value_or("")};
+}
+
+Ending crepesctl(const std::vector<std::string>& arguments) { return run(CREPES_TOOL, arguments); }
+
+class Tools : public LiveDaemon {
+ protected:
+  /// With the pair's first robot.
+  Ending ask(const std::string& command, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words{command, "--port", std::to_string(first_.subscription.port)};
+    words.insert(words.end(), more.begin(), more.end());
+    return crepesctl(words);
+  }
+
+  Config first_ = pair_config(1, mesh_port_);
+  Runtime one_{first_, machine_};
+  Runtime two_{pair_config(2, mesh_port_), machine_};
+};
+
+TEST_F(Tools, WaitForAPoseAndTellOfIt) {
+  const Ending there = ask("waitpose", {"--peer", "2", "--timeout", "50", "--max-sigma", "0.5"});
+  EXPECT_EQ(there.how, "exit code 0") << there.output;
+  EXPECT_NE(there.output.find("r2 direct at"), std::string::npos) << there.output;
+
+  const Ending nobody = ask("waitpose", {"--peer", "9", "--timeout", "1"});
+  EXPECT_EQ(nobody.how, "exit code 1");
+  EXPECT_NE(nobody.output.find("no other robot of this swarm"), std::string::npos) << nobody.output;
+
+  const Ending vague = ask("waitpose", {"--peer", "2", "--timeout", "1", "--max-sigma", "1e-9"});
+  EXPECT_EQ(vague.how, "exit code 1");
+  EXPECT_NE(vague.output.find("is known to"), std::string::npos) << vague.output;
+}
+
+TEST_F(Tools, ShowTheStatusOnOneScreenAndInJson) {
+  EXPECT_TRUE(Client(first_).await_status([](const Json& status) {
+    return status["neighbors"][0]["state"] == "direct" &&
+           sensor_of(status, "uwb").value("ok", false) &&
+           sensor_of(status, "cam0 spots").value("ok", false);
+  }));
+
+  const Ending text = ask("status");
+  EXPECT_EQ(text.how, "exit code 0");
+  for (const char* part : {"robot 1 r1", "% of a core", "MB", "cam0", "imu", "uwb", "mesh", "r2",
+                           "direct", "network:"})
+    EXPECT_NE(text.output.find(part), std::string::npos) << part << "\n" << text.output;
+  EXPECT_LT(std::ranges::count(text.output, '\n'), 24);
+
+  const Json json = Json::parse(ask("status", {"--json"}).output);
+  EXPECT_EQ(json["class"], "STATUS");
+  EXPECT_GT(json["neighbors"][0]["reports"]["received"], 0);
+  EXPECT_TRUE(json["neighbors"][0].contains("measurements"));
+  EXPECT_GT(json["cpu_s"], 0.0);
+  EXPECT_FALSE(json.contains("truncated"));
+}
+
+TEST_F(Tools, NameTheSourcesOfAPose) {
+  expect_true_poses(first_);
+
+  const Json sources = Json::parse(ask("sources", {"--json"}).output);
+
+  for (const char* kind : {"bearing", "peer_bearing", "range", "reports"}) {
+    const auto source =
+        std::ranges::find_if(sources, [&](const Json& entry) { return entry["source"] == kind; });
+    ASSERT_NE(source, sources.end()) << kind;
+    EXPECT_EQ((*source)["peer"], 2);
+    EXPECT_GT((*source)["rate_hz"], 0.0) << kind;
+    EXPECT_LT((*source)["age_s"], 5.0) << kind;
+    EXPECT_GT((*source)["used"], 0) << kind;
+  }
+}
+
+TEST_F(Tools, WatchOnceAndAsAStream) {
+  expect_true_poses(first_);
+
+  const Ending once = ask("watch", {"--once"});
+  EXPECT_EQ(once.how, "exit code 0");
+  EXPECT_NE(once.output.find("direct"), std::string::npos) << once.output;
+
+  const Ending stream = ask("watch", {"--json", "--for", "1"});
+  EXPECT_EQ(stream.how, "exit code 0");
+  EXPECT_NE(stream.output.find(R"({"class":"POSE")"), std::string::npos);
+}
+
+TEST(ToolsAlone, SayThatNobodyAnswersAndEndWithOne) {
+  const std::string port = std::to_string(free_port());
+  for (const char* command : {"status", "watch", "sources"}) {
+    const Ending ending = crepesctl({command, "--port", port});
+    EXPECT_EQ(ending.how, "exit code 1") << command;
+    EXPECT_NE(ending.output.find("no answer from 127.0.0.1"), std::string::npos) << ending.output;
+  }
+  EXPECT_EQ(crepesctl({"waitpose", "--peer", "2", "--timeout", "0.3", "--port", port}).how,
+            "exit code 1");
+}
+
+TEST(ToolsAlone, EndWithTwoWhenTheyAreUsedWrongly) {
+  for (const std::vector<std::string>& words : {std::vector<std::string>{},
+                                                {"dance"},
+                                                {"waitpose"},
+                                                {"status", "--nonsense"},
+                                                {"waitpose", "--peer", "70000"},
+                                                {"completion", "fish"},
+                                                {"status", "--address", "home"}})
+    EXPECT_EQ(crepesctl(words).how, "exit code 2") << (words.empty() ? "" : words.front());
+  EXPECT_NE(crepesctl({"--help"}).output.find("Exit codes: 0"), std::string::npos);
+}
+
+TEST(ToolsAlone, MakeAKeyOnceOnly) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const std::string file = scratch.path() / "mesh.key";
+
+  EXPECT_EQ(crepesctl({"keygen", file}).how, "exit code 0");
+  EXPECT_EQ(crepesctl({"keygen", file}).how, "exit code 1");
+  EXPECT_EQ(std::filesystem::file_size(file), 32U);
+}
+
+TEST(ToolsAlone, CompleteTheirWordsInBash) {
+  const std::string script =
+      std::string("eval \"$(") + CREPES_TOOL +
+      " completion bash)\"; "
+      "try() { COMP_WORDS=(crepesctl \"$@\"); COMP_CWORD=$#; _crepesctl; echo \"${COMPREPLY[*]}\"; "
+      "}; try wait; try waitpose --t; try led s; try led set --bri";
+
+  const Ending ending = run("/bin/bash", {"-c", script});
+
+  EXPECT_EQ(ending.how, "exit code 0");
+  EXPECT_EQ(ending.output, "waitpose\n--timeout\nset\n--brightness\n");
+}
+
+}  // namespace
+}  // namespace crepes
