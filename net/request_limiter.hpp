@@ -19,8 +19,10 @@ class TokenBucket {
 
   explicit TokenBucket(Rate rate) : rate_(rate), tokens_(rate.burst) {}
 
-  /// Whether there was a token left.
-  [[nodiscard]] bool take(Timestamp now);
+  /// Whether there was a token left, besides those that are to stay.
+  [[nodiscard]] bool take(Timestamp now, double reserve = 0.0);
+  /// The share of the burst that is left.
+  [[nodiscard]] double fill() const { return tokens_ / rate_.burst; }
 
  private:
   Rate rate_;
@@ -31,10 +33,11 @@ class TokenBucket {
 /// What one client may ask.
 inline constexpr TokenBucket::Rate kClientRate{.per_s = 50, .burst = 100};
 /// What all may that have no subscription: on this machine, and elsewhere.
-inline constexpr TokenBucket::Rate kStrangersRate{.per_s = 500, .burst = 100};
+inline constexpr TokenBucket::Rate kStrangersRate{.per_s = 500, .burst = 200};
 
 /// Clients without a subscription share a fixed number of buckets, dealt by a hash that they cannot
-/// foresee; machines elsewhere do not use up what programs on this one may ask.
+/// foresee; machines elsewhere do not use up what programs on this one may ask. Half of what all
+/// may is kept for those who ask little.
 class RequestLimiter {
  public:
   explicit RequestLimiter(const HashKey& key);

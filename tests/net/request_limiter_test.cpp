@@ -63,7 +63,19 @@ TEST(RequestLimiter, LimitsAllTogetherHoweverManyTheyAre) {
   int admitted = 0;
   for (int i = 0; i < 60'000; ++i) admitted += limiter.admits(remote(i), kStart) ? 1 : 0;
 
-  EXPECT_EQ(admitted, 100);
+  EXPECT_EQ(admitted, 200);
+}
+
+TEST(RequestLimiter, LetsSomebodyNewInWhileOthersAskForAllTheyCan) {
+  RequestLimiter limiter(HashKey{});
+  int newcomers = 0;
+  for (int ms = 0; ms < 10'000; ++ms) {
+    const Timestamp now = kStart + milliseconds{ms};
+    for (int i = 0; i < 64; ++i) (void)limiter.admits(local(1000 + i), now);
+    if (ms % 1000 == 999) newcomers += limiter.admits(local(2000 + ms), now) ? 1 : 0;
+  }
+
+  EXPECT_EQ(newcomers, 10);
 }
 
 TEST(RequestLimiter, KeepsRoomForThisMachineWhateverComesFromElsewhere) {
