@@ -44,6 +44,7 @@ for page in crepesd.8 crepesctl.1 crepesd.yaml.5; do
   [ "$(inside man --warnings "${page##*.}" "${page%.*}" 2>&1 | tee "$scratch/$page" | wc -l)" -gt 20 ] ||
     { cat "$scratch/$page"; echo "$page: no manual"; exit 1; }
 done
+inside bash -c '. /usr/share/bash-completion/bash_completion; _completion_loader crepesctl; complete -p crepesctl' | grep -v _minimal
 inside id crepes
 
 step "upgrade, remove, install again, purge"
