@@ -117,9 +117,9 @@ class NetLoop {
   }
 
   void on(const Outputs& outputs) {
-    const Timestamp now = clock_.now();
-    if (outputs.report) broadcast(*outputs.report, now);
-    if (!outputs.poses.empty()) server_.publish(outputs.poses, now);
+    // Programs first: a report's stamp says when it leaves, so its wait does no harm.
+    if (!outputs.poses.empty()) server_.publish(outputs.poses, clock_.now());
+    if (outputs.report) broadcast(*outputs.report, clock_.now());
   }
   void on(EstimatorStatus& status) { estimator_ = std::move(status); }
   void on(SensorStatus& status) { sensors_[status.name] = std::move(status); }

@@ -74,6 +74,7 @@ std::vector<std::string> PosePush::datagrams(const std::vector<NeighborPose>& po
     if (rate_.is_due(pose.neighbor, pose.stamp)) due.push_back(pose);
   if (format_ == PushFormat::kPlotJuggler) return plot_json(due);
   std::vector<std::string> texts;
+  texts.reserve(due.size());
   for (const NeighborPose& pose : due)
     texts.push_back(pose_json(sequence_++, self_, names_[pose.neighbor], pose));
   return texts;

@@ -79,6 +79,22 @@ class Robot:
                 self.spot_p99_ms.append(faults["delay_p99_us"] / 1e3)
 
 
+class Threads:
+    """CPU time and time spent waiting for a core of one daemon's threads, from /proc."""
+
+    def __init__(self, demo, config):
+        self.tasks = {}
+        for pid in pathlib.Path(f"/proc/{demo.pid}/task/{demo.pid}/children").read_text().split():
+            if config in pathlib.Path(f"/proc/{pid}/cmdline").read_text():
+                for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
+                    self.tasks[task] = (task / "comm").read_text().strip()
+
+    def times_s(self, name):
+        """(running, waiting) so far."""
+        pairs = [(task / "schedstat").read_text().split() for task, comm in self.tasks.items() if comm == name]
+        return [sum(int(pair[i]) for pair in pairs) / 1e9 for i in (0, 1)] if pairs else [float("nan")] * 2
+
+
 def await_config(folder):
     """The demo writes it before it starts the daemon."""
     for _ in range(200):
@@ -90,7 +106,7 @@ def await_config(folder):
     sys.exit("the demo did not start")
 
 
-def report(robot, settle_s):
+def report(robot, settle_s, spent):
     loads = [load for load in robot.loads if load[0] > settle_s]
     if len(loads) < 2 or not robot.pose_delays_ms:
         sys.exit("not enough was heard of the daemon")
@@ -102,6 +118,10 @@ def report(robot, settle_s):
     print(f"neighbors with poses    {len(robot.peers)}, {len(robot.pose_delays_ms)} poses in {t1 - t0:.0f} s")
     print(f"frame to spots          p50 {spots[0]:.2f} ms   p99 {spots[1]:.2f} ms (of the seconds' p99s, the 99 % quantile)")
     print(f"tick to datagram        p50 {poses[0]:.2f} ms   p99 {poses[1]:.2f} ms")
+    for name, (run0, wait0), (run1, wait1), seconds in spent:
+        ticks = 50.0 * seconds
+        print(f"  {name + ':':21s} {1e3 * (run1 - run0) / ticks:.2f} ms of CPU a tick, "
+              f"{1e3 * (wait1 - wait0) / ticks:.2f} ms a tick waiting for a core")
     print(f"together                p50 {sum([spots[0], poses[0]]):.2f} ms   p99 at most {spots[1] + poses[1]:.2f} ms   (goal: 2)")
     print(f"CPU                     {100 * (cpu1 - cpu0) / (t1 - t0):.1f} % of a core, its simulation included   (goal: 25)")
     print(f"RSS                     {max(rss for _, _, rss in loads):.1f} MB   (goal: 80)")
@@ -111,30 +131,37 @@ def report(robot, settle_s):
 
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--minutes", type=float, default=1.0)
+    options.add_argument("--minutes", type=float, default=1.0, help="at most 9")
     options.add_argument("--build", default="build/release")
     options.add_argument("--port", type=int, default=47600)
+    options.add_argument("--scenario", default="occluded", help="of the demo; occluded has five robots")
     asked = options.parse_args()
     run_s, settle_s = 60.0 * asked.minutes, min(5.0, 15.0 * asked.minutes)
     with tempfile.TemporaryDirectory() as folder:
         demo = subprocess.Popen(
-            [os.path.join(asked.build, "daemon", "crepesctl"), "demo", "--scenario", "occluded", "--for",
+            [os.path.join(asked.build, "daemon", "crepesctl"), "demo", "--scenario", asked.scenario, "--for",
              str(min(600.0, run_s + settle_s + 5.0)), "--port", str(asked.port), "--keep", folder],
             stdout=subprocess.DEVNULL)
         try:
             robot = Robot(asked.port, RobotClock(await_config(folder)))
-            end = time.monotonic() + run_s + settle_s
             start = time.monotonic()
+            end = start + run_s + settle_s
+            threads, first = None, {}
             while (now := time.monotonic()) < end:
                 if now - start < settle_s:
                     robot.pose_delays_ms.clear()
+                elif threads is None:
+                    threads, counted_from = Threads(demo, os.path.join(folder, "r1.yaml")), now
+                    first = {name: threads.times_s(name) for name in ("estimator", "net")}
                 robot.ask(**{"class": "WATCH", "enable": True})
                 robot.ask(**{"class": "POLL", "about": "sensors"})
                 robot.listen(min(now + 1.0, end))
+            spent = [(name, begin, threads.times_s(name), time.monotonic() - counted_from)
+                     for name, begin in first.items()]
         finally:
             demo.send_signal(signal.SIGINT)
             demo.wait(20)
-    report(robot, settle_s)
+    report(robot, settle_s, spent)
 
 
 if __name__ == "__main__":
