@@ -58,9 +58,10 @@ Json neighbor_json(const NeighborStatus& neighbor) {
 Json ages_json(const NeighborStatus& neighbor, Timestamp now) {
   Json json = Json::object();
   for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind) {
-    if (const auto& newest = neighbor.newest.at(kind))
+    if (const auto& newest = neighbor.newest.at(kind)) {
       put(json, std::string(name_of(static_cast<MeasurementKind>(kind))).c_str(),
           to_seconds(now - *newest), 3);
+    }
   }
   if (neighbor.newest_imu) put(json, "imu", to_seconds(now - *neighbor.newest_imu), 3);
   return json;

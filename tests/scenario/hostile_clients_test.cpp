@@ -24,6 +24,13 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
+// A sanitizer makes the flood and the daemon that reads it ten times as dear.
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr double kAllowance = 0.5;
+#else
+constexpr double kAllowance = 0.05;
+#endif
+
 /// A hundred thousand requests a second from as many ports as there are sockets, until destruction:
 /// 65 kB of nested JSON, garbage, and requests that would be answered at length.
 class Flood {
@@ -174,7 +181,7 @@ TEST_F(HostileClients, DoNotDelayThePosesOfOthersByAHundredThousandRequestsASeco
   EXPECT_EQ(stormy.lost, 0);
   // A machine that runs other tests beside these makes even calm poses late: some of the
   // scheduler's slices, for a flood that takes much of a core.
-  EXPECT_LT(stormy.quantile(0.99), calm.quantile(0.99) + 0.05);
+  EXPECT_LT(stormy.quantile(0.99), calm.quantile(0.99) + kAllowance);
   EXPECT_GT(stormy.delays_s.size(), calm.delays_s.size() / 2);
   // 200 at once and 500 a second are read, of all who have no subscription; four of them may have
   // one, with 50 poses and 50 answers a second each.
