@@ -111,9 +111,10 @@ std::vector<Source> sources_of(const StatusMessage& before, const StatusMessage&
         std::ranges::find(before.neighbors, neighbor.neighbor, &StatusMessage::Neighbor::neighbor);
     const StatusMessage::Neighbor old =
         found == before.neighbors.end() ? StatusMessage::Neighbor{} : *found;
-    for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind)
+    for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind) {
       sources.push_back(measured(
           old, neighbor, std::string(name_of(static_cast<MeasurementKind>(kind))), elapsed_s));
+    }
     sources.push_back(reported(old, neighbor, elapsed_s));
     sources.push_back({.neighbor = neighbor.neighbor,
                        .name = neighbor.name,
