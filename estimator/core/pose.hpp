@@ -52,13 +52,13 @@ struct GaussianPose {
 /// T_A_C, for independent errors:  dp = dp1 - R1 [p2]x dtheta1 + R1 dp2,
 /// dtheta = R2^T dtheta1 + dtheta2.
 [[nodiscard]] inline GaussianPose operator*(const GaussianPose& T_A_B, const GaussianPose& T_B_C) {
-  Matrix6d J1 = Matrix6d::Identity();
-  J1.topRightCorner<3, 3>() = -T_A_B.pose.R() * hat(T_B_C.pose.p);
-  J1.bottomRightCorner<3, 3>() = T_B_C.pose.R().transpose();
-  Matrix6d J2 = Matrix6d::Identity();
-  J2.topLeftCorner<3, 3>() = T_A_B.pose.R();
-  return {T_A_B.pose * T_B_C.pose,
-          J1 * T_A_B.covariance * J1.transpose() + J2 * T_B_C.covariance * J2.transpose()};
+  Matrix6d J_first = Matrix6d::Identity();
+  J_first.topRightCorner<3, 3>() = -T_A_B.pose.R() * hat(T_B_C.pose.p);
+  J_first.bottomRightCorner<3, 3>() = T_B_C.pose.R().transpose();
+  Matrix6d J_second = Matrix6d::Identity();
+  J_second.topLeftCorner<3, 3>() = T_A_B.pose.R();
+  return {T_A_B.pose * T_B_C.pose, J_first * T_A_B.covariance * J_first.transpose() +
+                                       J_second * T_B_C.covariance * J_second.transpose()};
 }
 
 /// The perturbation d that takes `from` to `to`, in GaussianPose's error convention.
