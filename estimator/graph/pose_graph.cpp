@@ -55,21 +55,26 @@ Matrix6d weight(const RelativePoseEdge& edge, const std::vector<RelativePoseEdge
   return chol.matrixL().solve(Matrix6d::Identity());
 }
 
+// What Ceres takes over as a bare pointer.
+template <class T, class... Arguments>
+T* given(Arguments&&... arguments) {
+  return std::make_unique<T>(std::forward<Arguments>(arguments)...).release();
+}
+
+template <int kResiduals, class Factor>
+ceres::CostFunction* cost_of(const Factor& factor) {
+  using Cost = ceres::AutoDiffCostFunction<Factor, kResiduals, kPoseParameters, kPoseParameters>;
+  return given<Cost>(given<Factor>(factor));
+}
+
 void add_factor(const RelativePoseEdge& edge, const Matrix6d& L, const GraphConfig& config,
                 Nodes& nodes, ceres::Problem& problem) {
-  double* X_i = nodes.at(edge.from).data();
-  double* X_j = nodes.at(edge.to).data();
-  if (config.cost == GraphCost::kPaper) {
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<FrobeniusFactor, 12, kPoseParameters, kPoseParameters>(
-            new FrobeniusFactor{edge.T_from_to.pose}),
-        new ceres::CauchyLoss(kFrobeniusSigma * config.kernel_scale), X_i, X_j);
-    return;
-  }
-  problem.AddResidualBlock(
-      new ceres::AutoDiffCostFunction<LieFactor, 6, kPoseParameters, kPoseParameters>(
-          new LieFactor{edge.T_from_to.pose, L}),
-      new ceres::CauchyLoss(config.kernel_scale), X_i, X_j);
+  const bool paper = config.cost == GraphCost::kPaper;
+  ceres::CostFunction* cost = paper ? cost_of<12>(FrobeniusFactor{edge.T_from_to.pose})
+                                    : cost_of<6>(LieFactor{edge.T_from_to.pose, L});
+  const double scale = paper ? kFrobeniusSigma * config.kernel_scale : config.kernel_scale;
+  problem.AddResidualBlock(cost, given<ceres::CauchyLoss>(scale), nodes.at(edge.from).data(),
+                           nodes.at(edge.to).data());
 }
 
 // A graph over `nodes`, with self held fast.
@@ -79,7 +84,7 @@ std::unique_ptr<ceres::Problem> build(const GraphProblem& input, const GraphConf
   for (auto& [robot, x] : nodes) {
     problem->AddParameterBlock(
         x.data(), kPoseParameters,
-        new ceres::AutoDiffManifold<RightPerturbation, kPoseParameters, 6>());
+        given<ceres::AutoDiffManifold<RightPerturbation, kPoseParameters, 6>>());
   }
   problem->SetParameterBlockConstant(nodes.at(input.self).data());
   for (const RelativePoseEdge& edge : input.edges) {
