@@ -59,6 +59,11 @@ class BoundedQueue {
     return take();
   }
 
+  [[nodiscard]] bool empty() const {
+    const std::lock_guard lock(mutex_);
+    return values_.empty();
+  }
+
   /// How many values were given up since the start.
   [[nodiscard]] std::uint64_t dropped() const {
     const std::lock_guard lock(mutex_);

@@ -6,8 +6,9 @@
 
 #include "daemon/config_file.hpp"
 #include "daemon/logging.hpp"
+#include "daemon/reload.hpp"
 #include "daemon/runtime.hpp"
-#include "daemon/stop_signals.hpp"
+#include "daemon/signals.hpp"
 #include "daemon/version.hpp"
 #include "daemon/watchdog.hpp"
 #include "drivers/monotonic_clock.hpp"
@@ -27,16 +28,21 @@ int print(const Result<std::string>& text) {
 int run(const std::string& file) {
   Result<Config> config = load_config(file);
   if (!config) return print(tl::unexpected(config.error()));
-  const StopSignals signals;
+  const Signals signals;
   const LogSession log(config->log.level);
   const MonotonicClock machine;
-  const Runtime runtime(std::move(*config), machine);
+  Runtime runtime(std::move(*config), machine);
   Watchdog watchdog(runtime.heartbeats());
   log_message(LogLevel::kInfo, "running with " + file);
   Watchdog::tell_ready();
   Watchdog::tell_status("running with " + file +
                         "; `crepesctl status` tells sensors and neighbors");
-  while (!signals.came_within_a_second()) {
+  for (Signal signal = signals.wait_a_second(); signal != Signal::kStop;
+       signal = signals.wait_a_second()) {
+    if (signal == Signal::kReload) {
+      reload(file, runtime, machine);
+      continue;
+    }
     for (const std::string& loop : watchdog.check())
       log_message(LogLevel::kError, loop + ": this loop makes no progress");
   }

@@ -18,13 +18,18 @@ void hand_on(Outputs outputs, const EstimatorSinks& sinks) {
 }  // namespace
 
 void run_estimator(const Config& config, EventQueue& events, const EstimatorSinks& sinks,
-                   const Clock& clock, Counter& turns, const std::stop_token& stop) {
-  const Duration period = from_seconds(1.0 / config.estimator.output_rate_hz);
+                   const StageContext& context, const std::stop_token& stop) {
+  const Clock& clock = context.clock;
+  Duration period = from_seconds(1.0 / config.estimator.output_rate_hz);
   Estimator estimator(config);
   Timestamp next_tick = clock.now() + period;
   Timestamp next_status = next_tick;
   while (!stop.stop_requested()) {
-    turns.add();
+    context.turns.add();
+    if (const auto wanted = context.settings.try_pop()) {
+      estimator.reconfigure(*wanted);
+      period = from_seconds(1.0 / wanted->estimator.output_rate_hz);
+    }
     // Waiting events go first: a Tick says that what came before it is known.
     std::optional<Event> event = events.try_pop();
     if (const Duration wait = next_tick - clock.now(); !event && wait > Duration::zero())

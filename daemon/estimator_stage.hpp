@@ -5,8 +5,7 @@
 #include <stop_token>
 
 #include "daemon/bounded_queue.hpp"
-#include "daemon/counters.hpp"
-#include "estimator/core/clock.hpp"
+#include "daemon/sensor_stages.hpp"
 #include "estimator/core/config.hpp"
 #include "estimator/core/event.hpp"
 #include "estimator/swarm/estimator.hpp"
@@ -24,6 +23,6 @@ struct EstimatorSinks {
 
 /// Steps the estimator until `stop`, with a Tick `estimator.output_rate_hz` times a second.
 void run_estimator(const Config& config, EventQueue& events, const EstimatorSinks& sinks,
-                   const Clock& clock, Counter& turns, const std::stop_token& stop);
+                   const StageContext& context, const std::stop_token& stop);
 
 }  // namespace crepes

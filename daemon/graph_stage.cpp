@@ -7,11 +7,12 @@
 
 namespace crepes {
 
-void run_graph(const GraphConfig& config, GraphQueue& problems,
-               const std::function<void(GraphSolution)>& answer, Counter& turns,
+void run_graph(GraphConfig config, GraphQueue& problems,
+               const std::function<void(GraphSolution)>& answer, const StageContext& context,
                const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    turns.add();
+    context.turns.add();
+    if (const auto wanted = context.settings.try_pop()) config = wanted->graph;
     std::optional<GraphProblem> problem = problems.pop_for(std::chrono::milliseconds{100}, stop);
     // Only the newest is worth an answer.
     while (auto newer = problem ? problems.try_pop() : std::nullopt) problem = std::move(newer);

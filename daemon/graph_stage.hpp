@@ -5,7 +5,7 @@
 #include <stop_token>
 
 #include "daemon/bounded_queue.hpp"
-#include "daemon/counters.hpp"
+#include "daemon/sensor_stages.hpp"
 #include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
 
@@ -14,8 +14,8 @@ namespace crepes {
 using GraphQueue = BoundedQueue<GraphProblem>;
 
 /// Solves what comes until `stop`.
-void run_graph(const GraphConfig& config, GraphQueue& problems,
-               const std::function<void(GraphSolution)>& answer, Counter& turns,
+void run_graph(GraphConfig config, GraphQueue& problems,
+               const std::function<void(GraphSolution)>& answer, const StageContext& context,
                const std::stop_token& stop);
 
 }  // namespace crepes

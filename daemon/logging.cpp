@@ -49,6 +49,11 @@ LogSession::LogSession(LogLevel least) {
 
 LogSession::~LogSession() { spdlog::shutdown(); }
 
+void set_log_level(LogLevel least) {
+  if (spdlog::logger* logger = spdlog::default_logger_raw(); logger != nullptr)
+    logger->set_level(level_of(least));
+}
+
 void log_message(LogLevel level, const std::string& message) {
   if (spdlog::logger* logger = spdlog::default_logger_raw(); logger != nullptr)
     logger->log(level_of(level), message);

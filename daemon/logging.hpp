@@ -19,6 +19,9 @@ class LogSession {
   ~LogSession();
 };
 
+/// Thread-safe.
+void set_log_level(LogLevel least);
+
 /// Thread-safe. Without a LogSession lines go to stdout at once.
 void log_message(LogLevel level, const std::string& message);
 

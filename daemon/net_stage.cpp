@@ -75,11 +75,25 @@ class NetLoop {
   NetLoop(const NetStage& stage, const Clock& clock)
       : stage_(stage),
         clock_(clock),
+        config_(stage.config),
         start_(clock.now()),
-        link_(stage.config.robot.id, ids_of(stage.config.swarm)),
-        mesh_(stage.config.net),
-        server_(stage.config, [this] { return status(); }) {
-    for (const std::string& fault : server_.faults()) log_message(LogLevel::kWarning, fault);
+        link_(config_.robot.id, ids_of(config_.swarm)),
+        mesh_(config_.net) {
+    config_status_.since = start_;
+    open_server();
+  }
+
+  void reconfigure(const Config& config) {
+    const Config before = std::exchange(config_, config);
+    link_.set_members(ids_of(config_.swarm));
+    if (before.net.interface != config_.net.interface || before.net.port != config_.net.port)
+      mesh_ = MeshSocket(config_.net);
+    if (before.subscription.listen != config_.subscription.listen ||
+        before.subscription.port != config_.subscription.port) {
+      open_server();
+    } else {
+      server_->reconfigure(config_);
+    }
   }
 
   void turn() {
@@ -90,16 +104,24 @@ class NetLoop {
       std::visit([this](auto& what) { on(what); }, *input);
       receive();  // arrivals are stamped here: clock offsets must not wait for all the sending
     }
-    server_.serve(clock_.now());
+    if (auto status = stage_.config_status.try_pop()) config_status_ = std::move(*status);
+    server_->serve(clock_.now());
   }
 
  private:
+  /// Those who subscribed at other addresses are gone.
+  void open_server() {
+    server_.reset();
+    server_.emplace(config_, [this] { return status(); });
+    for (const std::string& fault : server_->faults()) log_message(LogLevel::kWarning, fault);
+  }
+
   void wait() {
     std::vector<pollfd> watched;
     const auto watch = [&](int fd) { watched.push_back({fd, POLLIN, 0}); };
     watch(stage_.inbox.descriptor());
     watch(mesh_.descriptor());  // -1 is passed over
-    for (const int fd : server_.descriptors()) watch(fd);
+    for (const int fd : server_->descriptors()) watch(fd);
     ::poll(watched.data(), watched.size(), kPollTimeoutMs);
   }
 
@@ -118,7 +140,7 @@ class NetLoop {
 
   void on(const Outputs& outputs) {
     // Programs first: a report's stamp says when it leaves, so its wait does no harm.
-    if (!outputs.poses.empty()) server_.publish(outputs.poses, clock_.now());
+    if (!outputs.poses.empty()) server_->publish(outputs.poses, clock_.now());
     if (outputs.report) broadcast(*outputs.report, clock_.now());
   }
   void on(EstimatorStatus& status) { estimator_ = std::move(status); }
@@ -133,14 +155,16 @@ class NetLoop {
 
   [[nodiscard]] SystemStatus status() const {
     SystemStatus status;
-    status.self = stage_.config.robot.id;
-    for (const MemberConfig& member : stage_.config.swarm.members) {
+    status.self = config_.robot.id;
+    for (const MemberConfig& member : config_.swarm.members) {
       if (member.id == status.self) status.name = member.name;
     }
     status.stamp = clock_.now();
     status.uptime_s = to_seconds(status.stamp - start_);
     status.cpu_s = process_cpu_s();
     status.rss_mb = process_rss_mb();
+    status.config = config_status_;
+    status.config_age_s = to_seconds(status.stamp - config_status_.since);
     for (const auto& [name, sensor] : sensors_) status.sensors.push_back(sensor);
     status.sensors.push_back({"mesh", 0.0, mesh_.fault().empty(), mesh_.fault(), {}});
     status.estimator = estimator_;
@@ -148,16 +172,18 @@ class NetLoop {
     status.traffic = link_.traffic(status.stamp);
     status.queues = stage_.queues();
     status.network = link_.counters();
-    for (auto& counter : server_.counters()) status.network.push_back(std::move(counter));
+    for (auto& counter : server_->counters()) status.network.push_back(std::move(counter));
     return status;
   }
 
   const NetStage& stage_;
   const Clock& clock_;
+  Config config_;
+  ConfigStatus config_status_;
   Timestamp start_;
   PeerLink link_;
   MeshSocket mesh_;
-  SubscriptionServer server_;
+  std::optional<SubscriptionServer> server_;
   EstimatorStatus estimator_;
   std::map<std::string, SensorStatus> sensors_;
 };
@@ -178,11 +204,11 @@ void NetInbox::clear_wake() {
   ::eventfd_read(wake_.get(), &ignored);
 }
 
-void run_net(const NetStage& stage, const Clock& clock, Counter& turns,
-             const std::stop_token& stop) {
-  NetLoop loop(stage, clock);
+void run_net(const NetStage& stage, const StageContext& context, const std::stop_token& stop) {
+  NetLoop loop(stage, context.clock);
   while (!stop.stop_requested()) {
-    turns.add();
+    context.turns.add();
+    if (const auto config = context.settings.try_pop()) loop.reconfigure(*config);
     loop.turn();
   }
 }

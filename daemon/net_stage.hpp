@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "daemon/bounded_queue.hpp"
-#include "daemon/counters.hpp"
+#include "daemon/sensor_stages.hpp"
 #include "drivers/unique_fd.hpp"
 #include "estimator/core/clock.hpp"
 #include "estimator/core/config.hpp"
@@ -44,12 +44,12 @@ class NetInbox {
 struct NetStage {
   const Config& config;
   NetInbox& inbox;
+  BoundedQueue<ConfigStatus>& config_status;
   std::function<void(ReceivedReport)> on_report;
   std::function<std::vector<QueueStatus>()> queues;  ///< thread-safe
 };
 
 /// Exchanges reports with peers and serves subscribers until `stop`.
-void run_net(const NetStage& stage, const Clock& clock, Counter& turns,
-             const std::stop_token& stop);
+void run_net(const NetStage& stage, const StageContext& context, const std::stop_token& stop);
 
 }  // namespace crepes

@@ -6,10 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "daemon/config_change.hpp"
 #include "daemon/counters.hpp"
 #include "daemon/estimator_stage.hpp"
 #include "daemon/graph_stage.hpp"
 #include "daemon/net_stage.hpp"
+#include "daemon/recorder_stage.hpp"
 #include "daemon/sensor_stages.hpp"
 #include "daemon/watchdog.hpp"
 #include "daemon/worker.hpp"
@@ -37,6 +39,13 @@ class Runtime {
   /// For the watchdog; valid while this lives.
   [[nodiscard]] std::vector<Heartbeat> heartbeats() const;
 
+  /// Applies what can change live, and tells in STATUS what cannot. An error, and nothing changes:
+  /// with what cannot change now the wanted settings would break a rule. For the thread that made
+  /// this, as is `tell_reload_refused`.
+  [[nodiscard]] Result<ConfigChange> reconfigure(Config wanted);
+  /// Says in STATUS why there are no other settings, though they were asked for.
+  void tell_reload_refused(const std::string& fault);
+
  private:
   struct CameraQueues {
     FrameQueue frames{1, Overflow::kDropOldest};  // only the newest picture matters
@@ -44,25 +53,35 @@ class Runtime {
   };
   struct Loop {
     std::string name;
+    std::vector<std::string> keys;  // a change of what begins with one of these concerns it
     Counter turns;
+    SettingsQueue settings{1, Overflow::kDropOldest};
   };
 
   void open_simulation();
-  void start_sensor(Sensor sensor);
-  void start_camera(std::size_t index);
+  void start_sensor(Sensor sensor, std::vector<std::string> keys);
+  void start_camera(std::size_t index, const EventSink& sense);
+  void use_simulated_devices(Config& wanted) const;
   /// A thread that runs `run(context, stop)`.
   template <class Run>
-  void start(const std::string& name, Run run);
+  void start(const std::string& name, std::vector<std::string> keys, Run run);
   [[nodiscard]] std::vector<QueueStatus> queue_status() const;
 
-  Config config_;
+  Config config_;  // as at the start: threads read it, nobody changes it
   SimClock sim_clock_;
   const Clock& clock_;
 
   EventQueue events_{1024, Overflow::kDropOldest};  // about one second of everything
   GraphQueue problems_{256, Overflow::kDropOldest};
   NetInbox outputs_{64};
+  RecordQueue recorded_{4096, Overflow::kDropNewest};
+  BoundedQueue<ConfigStatus> config_status_{1, Overflow::kDropOldest};
   std::deque<CameraQueues> cameras_;
+  std::deque<PictureTap> picture_taps_;  // one a camera
+
+  // The main thread's.
+  Config in_force_;
+  ConfigStatus reload_status_;
 
   std::optional<SimWorld> world_;
   std::deque<SimSerial> sim_devices_;

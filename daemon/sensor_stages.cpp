@@ -68,13 +68,13 @@ class HealthReport {
   std::string logged_;
 };
 
-/// Reads until the device fails (the error) or `stop` (none). What is wrong is told within two
-/// seconds.
+/// Reads until the device fails (the error), or `stop` or new settings (none). What is wrong is
+/// told within two seconds.
 Result<void> read_device(Device& device, const Sensor& sensor, const StageContext& context,
                          HealthReport& health, const std::stop_token& stop) {
   Timestamp last_heard = context.clock.now();
   Timestamp last_look = last_heard;
-  while (!stop.stop_requested()) {
+  while (!stop.stop_requested() && context.settings.empty()) {
     context.turns.add();
     const Result<std::size_t> count = device.read_once(kReadTimeout);
     if (!count) return tl::unexpected(count.error());
@@ -93,7 +93,7 @@ Result<void> read_device(Device& device, const Sensor& sensor, const StageContex
 /// A wait in small steps, so that the watchdog sees a living loop.
 void back_off(Duration wait, const StageContext& context, const std::stop_token& stop) {
   const Timestamp end = context.clock.now() + wait;
-  while (!stop.stop_requested() && context.clock.now() < end) {
+  while (!stop.stop_requested() && context.settings.empty() && context.clock.now() < end) {
     context.turns.add();
     wait_for(milliseconds{100}, stop);
   }
@@ -136,6 +136,23 @@ class CameraDevice final : public Device {
   FrameQueue& frames_;
   FrameQueue& used_;
 };
+
+/// In memory of its own.
+Frame copy_of(const Frame& frame) {
+  Frame copy{.stamp = frame.stamp,
+             .arrival = frame.arrival,
+             .camera = frame.camera,
+             .width = frame.width,
+             .height = frame.height,
+             .pixels = std::vector<std::uint8_t>()};
+  copy.pixels.reserve(static_cast<std::size_t>(frame.width) *
+                      static_cast<std::size_t>(frame.height));
+  for (int row = 0; row < frame.height; ++row) {
+    const std::uint8_t* const begin = frame.data() + row * frame.stride();
+    copy.pixels.insert(copy.pixels.end(), begin, begin + frame.width);
+  }
+  return copy;
+}
 
 std::string_view diagnosis_of(const Detection& found) {
   if (!found.failure.empty()) return found.failure;
@@ -194,11 +211,16 @@ Sensor camera_sensor(const std::string& name, const OpenCamera& open, const Cloc
   return sensor;
 }
 
-void run_sensor(const Sensor& sensor, const StageContext& context, const std::stop_token& stop) {
+void run_sensor(Sensor sensor, const StageContext& context, const std::stop_token& stop) {
   HealthReport health(sensor.name, context);
   Duration retry = kFirstRetry;
   while (!stop.stop_requested()) {
     context.turns.add();
+    if (const auto config = context.settings.try_pop()) {
+      Sensor renewed = sensor.renewed(*config);
+      sensor = std::move(renewed);
+      retry = kFirstRetry;
+    }
     Result<std::unique_ptr<Device>> device = do_aside(context, sensor.name + " open", sensor.open);
     if (device) {
       const Timestamp opened = context.clock.now();
@@ -220,17 +242,18 @@ void run_sensor(const Sensor& sensor, const StageContext& context, const std::st
 
 void run_vision(const VisionStage& stage, const StageContext& context,
                 const std::stop_token& stop) {
-  SpotDetector detector(stage.config);
+  std::optional<SpotDetector> detector(stage.config);
   HealthReport health(stage.camera_name + " spots", context);
   Rejected rejected;
   Delays delays;
   std::uint64_t failures = 0;
   while (!stop.stop_requested()) {
     context.turns.add();
+    if (const auto config = context.settings.try_pop()) detector.emplace(config->vision);
     std::optional<Frame> frame = stage.frames.pop_for(milliseconds{100}, stop);
     if (!frame) continue;
     const Detection found =
-        detector.detect({frame->data(), frame->width, frame->height, frame->stride()});
+        detector->detect({frame->data(), frame->width, frame->height, frame->stride()});
     stage.sink(SpotFrame{frame->stamp, frame->camera, {found.spots.begin(), found.spots.end()}});
     delays.add(context.clock.now() - frame->arrival);
     health.count(1);
@@ -238,6 +261,7 @@ void run_vision(const VisionStage& stage, const StageContext& context,
     failures += found.failure.empty() ? 0 : 1;
     if (health.is_due())
       health.tell(std::string(diagnosis_of(found)), counters_of(found, rejected, failures, delays));
+    if (stage.tap.wanted.try_pop()) stage.tap.taken.push(copy_of(*frame));
     stage.used.push(std::move(*frame));
   }
 }

@@ -51,18 +51,23 @@ struct Sensor {
   std::string name;
   std::function<Result<std::unique_ptr<Device>>()> open;
   std::string when_silent;  ///< what to look at when the open device says nothing
+  std::function<Sensor(const Config&)> renewed;  ///< the same with other settings
 };
+
+/// Settings on their way to a stage, of which the newest count.
+using SettingsQueue = BoundedQueue<Config>;
 
 /// What every stage is given. All must outlive it.
 struct StageContext {
   const Clock& clock;
   StatusSink tell;  ///< thread-safe
   Counter& turns;   ///< grows at least once in 200 ms
+  SettingsQueue& settings;
 };
 
-/// Reads a sensor until `stop`; reopens it after 0.1 s, at last 5 s, when it fails. One that is not
-/// there (kNotFound) is looked for every 0.1 s.
-void run_sensor(const Sensor& sensor, const StageContext& context, const std::stop_token& stop);
+/// Reads a sensor until `stop`; reopens it after 0.1 s, at last 5 s, when it fails, and at once
+/// when there are new settings. One that is not there (kNotFound) is looked for every 0.1 s.
+void run_sensor(Sensor sensor, const StageContext& context, const std::stop_token& stop);
 
 /// The ranging module and the inertial sensor of the configuration, on their serial ports. Links in
 /// `by_id` tell which device is the same as before.
@@ -79,12 +84,20 @@ using OpenCamera = std::function<Result<std::unique_ptr<Camera>>()>;
 [[nodiscard]] Sensor camera_sensor(const std::string& name, const OpenCamera& open,
                                    const Clock& clock, FrameQueue& frames, FrameQueue& used);
 
+/// For whoever asks to see a picture now and then: it is copied when one is wanted, and only then.
+struct PictureTap {
+  struct Wish {};
+  BoundedQueue<Wish> wanted{1, Overflow::kDropNewest};
+  BoundedQueue<Frame> taken{1, Overflow::kDropNewest};
+};
+
 /// What the vision thread of one camera works on. All references must outlive it.
 struct VisionStage {
   std::string camera_name;
   VisionConfig config;
   FrameQueue& frames;
   FrameQueue& used;
+  PictureTap& tap;
   EventSink sink;
 };
 

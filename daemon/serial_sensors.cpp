@@ -213,13 +213,22 @@ Sensor serial_sensor(const std::string& name, const std::string& port, int baud,
 Sensor uwb_sensor(const UwbConfig& config, const SwarmConfig& swarm, const Clock& clock,
                   const EventSink& sink, const std::string& by_id) {
   const NlinkParser parser(uwb_modules_of(swarm), config.max_range_m);
-  return serial_sensor("uwb", config.port, config.baud,
-                       device_with(parser, UwbIntake{}, clock, sink), by_id);
+  Sensor sensor = serial_sensor("uwb", config.port, config.baud,
+                                device_with(parser, UwbIntake{}, clock, sink), by_id);
+  sensor.renewed = [=, &clock](const Config& renewed) {
+    return uwb_sensor(renewed.uwb, renewed.swarm, clock, sink, by_id);
+  };
+  return sensor;
 }
 
 Sensor imu_sensor(const ImuConfig& config, const Clock& clock, const EventSink& sink,
                   const std::string& by_id) {
-  return serial_sensor("imu", config.port, config.baud, configured_imu(config, clock, sink), by_id);
+  Sensor sensor =
+      serial_sensor("imu", config.port, config.baud, configured_imu(config, clock, sink), by_id);
+  sensor.renewed = [=, &clock](const Config& renewed) {
+    return imu_sensor(renewed.imu, clock, sink, by_id);
+  };
+  return sensor;
 }
 
 }  // namespace crepes

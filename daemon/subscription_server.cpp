@@ -32,7 +32,6 @@ HashKey random_key() {
 SubscriptionServer::SubscriptionServer(const Config& config, SubscriptionDesk::StatusSource status)
     : self_(config.robot.id),
       desk_(config.subscription, std::string(kVersion), std::move(status), random_key()) {
-  for (const MemberConfig& member : config.swarm.members) names_[member.id] = member.name;
   for (const std::string& address : config.subscription.listen) {
     Result<UdpSocket> socket =
         UdpSocket::bind(address, static_cast<std::uint16_t>(config.subscription.port));
@@ -42,15 +41,16 @@ SubscriptionServer::SubscriptionServer(const Config& config, SubscriptionDesk::S
       faults_.push_back("subscription: " + socket.error().message);
     }
   }
-  open_push(config);
+  reconfigure(config);
 }
 
 void SubscriptionServer::open_push(const Config& config) {
+  pushes_.clear();
   for (const PushConfig& push : config.subscription.push) pushes_.emplace_back(push, self_, names_);
   const auto open = [&](bool ipv4, std::optional<UdpSocket>& socket) {
     const bool is_needed = std::ranges::any_of(
         pushes_, [&](const PosePush& push) { return push.target().is_ipv4() == ipv4; });
-    if (!is_needed) return;
+    if (!is_needed || socket) return;
     Result<UdpSocket> opened = UdpSocket::bind(ipv4 ? "0.0.0.0" : "::", 0);
     if (opened) {
       socket = std::move(*opened);
@@ -60,6 +60,13 @@ void SubscriptionServer::open_push(const Config& config) {
   };
   open(true, push_ipv4_);
   open(false, push_ipv6_);
+}
+
+void SubscriptionServer::reconfigure(const Config& config) {
+  names_.clear();
+  for (const MemberConfig& member : config.swarm.members) names_[member.id] = member.name;
+  desk_.set_limits(config.subscription);
+  open_push(config);
 }
 
 void SubscriptionServer::serve(Timestamp now) {

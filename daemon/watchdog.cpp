@@ -2,6 +2,7 @@
 
 #include <systemd/sd-daemon.h>
 
+#include <chrono>
 #include <cstddef>
 #include <utility>
 
@@ -12,6 +13,10 @@ Watchdog::Watchdog(std::vector<Heartbeat> heartbeats)
 
 // Failing to reach systemd is no reason to stop: its watchdog then does what it is for.
 void Watchdog::tell_ready() { ::sd_notify(0, "READY=1"); }
+void Watchdog::tell_reloading(Timestamp now) {
+  const auto us = std::chrono::duration_cast<std::chrono::microseconds>(now.time_since_epoch());
+  ::sd_notify(0, ("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(us.count())).c_str());
+}
 void Watchdog::tell_stopping() { ::sd_notify(0, "STOPPING=1"); }
 void Watchdog::tell_status(const std::string& text) { ::sd_notify(0, ("STATUS=" + text).c_str()); }
 

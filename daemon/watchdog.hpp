@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/counters.hpp"
+#include "estimator/core/time.hpp"
 
 namespace crepes {
 
@@ -21,6 +22,8 @@ class Watchdog {
   explicit Watchdog(std::vector<Heartbeat> heartbeats);
 
   static void tell_ready();
+  /// `now` is the machine's monotonic time. To be followed by `tell_ready`.
+  static void tell_reloading(Timestamp now);
   static void tell_stopping();
   static void tell_status(const std::string& text);
 

@@ -1,5 +1,6 @@
 #include "net/peer_link.hpp"
 
+#include <algorithm>
 #include <chrono>
 
 #include "estimator/core/contract.hpp"
@@ -29,8 +30,15 @@ Report to_local(const PeerReport& theirs, const ClockOffset& clock) {
 }  // namespace
 
 PeerLink::PeerLink(RobotId self, const std::vector<RobotId>& members) : self_(self) {
+  set_members(members);
+}
+
+void PeerLink::set_members(const std::vector<RobotId>& members) {
+  std::erase_if(peers_, [&](const auto& peer) {
+    return std::find(members.begin(), members.end(), peer.first) == members.end();
+  });
   for (const RobotId member : members)
-    if (member != self) peers_.emplace(member, std::nullopt);
+    if (member != self_) peers_.try_emplace(member, std::nullopt);
 }
 
 void PeerLink::count(std::string_view what, std::uint64_t by) {

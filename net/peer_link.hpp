@@ -22,6 +22,9 @@ class PeerLink {
   /// `members` are all robots of the swarm; `self` may be among them.
   PeerLink(RobotId self, const std::vector<RobotId>& members);
 
+  /// Forgets who is no member any more; new ones are peers from now on.
+  void set_members(const std::vector<RobotId>& members);
+
   /// A peer's report, each measurement once however often it was sent. Empty when there is nothing
   /// to tell: refused (see counters), our own echo, or the peer's clock is not yet known.
   [[nodiscard]] std::optional<ReceivedReport> receive(std::span<const std::uint8_t> datagram,

@@ -88,6 +88,16 @@ Json head_json(const SystemStatus& status) {
   return json;
 }
 
+Json config_json(const SystemStatus& status) {
+  Json json{{"generation", status.config.generation}};
+  put(json, "age_s", status.config_age_s, 5);
+  std::string keys;
+  for (const std::string& key : status.config.restart) keys += (keys.empty() ? "" : ", ") + key;
+  if (!keys.empty()) json["restart"] = shortened(keys, kMaxText);
+  if (!status.config.fault.empty()) json["fault"] = shortened(status.config.fault, kMaxText);
+  return json;
+}
+
 void put_sensors(Json& json, const SystemStatus& status) {
   json["sensors"] = Json::array();
   for (const SensorStatus& sensor : status.sensors) json["sensors"].push_back(sensor_json(sensor));
@@ -149,7 +159,7 @@ bool drop_last_neighbor(Json& status) {
 /// The least important parts first; each is dropped only if what is left is still too long.
 std::string fitted(Json status) {
   using Cut = void (*)(Json&);
-  constexpr std::array<Cut, 11> kCuts{
+  constexpr std::array<Cut, 12> kCuts{
       [](Json& s) { erase_in_each(s, "neighbors", "measurements"); },
       [](Json& s) { s.erase("network"); },
       [](Json& s) { erase_in_each(s, "neighbors", "id_decodes"); },
@@ -160,6 +170,7 @@ std::string fitted(Json status) {
       [](Json& s) { erase_in_each(s, "neighbors", "name"); },
       [](Json& s) { for_each_in(s, "sensors", shorten_message); },
       [](Json& s) { s.erase("queues"); },
+      [](Json& s) { s.erase("config"); },
       [](Json& s) { s.erase("clocks"); },
   };
   std::string text = dump(status);
@@ -183,6 +194,7 @@ std::string status_json(const SystemStatus& status, StatusPart about) {
   Json json = head_json(status);
   put(json, "cpu_s", status.cpu_s, 5);
   put(json, "rss_mb", status.rss_mb, 4);
+  json["config"] = config_json(status);
   if (about != StatusPart::kNetwork) put_sensors(json, status);
   if (about == StatusPart::kAll) {
     json["neighbors"] = Json::array();

@@ -26,6 +26,9 @@ class SubscriberTable {
  public:
   explicit SubscriberTable(SubscriptionConfig config) : config_(std::move(config)) {}
 
+  /// Leases and limits from now on; who is subscribed stays.
+  void set_limits(const SubscriptionConfig& config) { config_ = config; }
+
   /// Begins, renews, changes or ends a subscription; refused when the table is full or the address
   /// has its share. `via` says over which socket to answer.
   [[nodiscard]] Result<void> watch(const Endpoint& client, const WatchRequest& request,

@@ -12,6 +12,12 @@ SubscriptionDesk::SubscriptionDesk(const SubscriptionConfig& config, std::string
       cookies_(key),
       limiter_(key) {}
 
+void SubscriptionDesk::set_limits(const SubscriptionConfig& config) {
+  port_ = config.port;
+  lease_s_ = config.lease_s;
+  table_.set_limits(config);
+}
+
 std::optional<std::string> SubscriptionDesk::answer(const Endpoint& client,
                                                     std::string_view request, Timestamp now,
                                                     std::size_t via) {

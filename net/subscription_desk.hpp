@@ -27,6 +27,9 @@ class SubscriptionDesk {
   SubscriptionDesk(const SubscriptionConfig& config, std::string release, StatusSource status,
                    const HashKey& key);
 
+  /// Leases and limits from now on; who is subscribed stays.
+  void set_limits(const SubscriptionConfig& config);
+
   /// What to answer to a datagram that came over socket `via`, if anything.
   [[nodiscard]] std::optional<std::string> answer(const Endpoint& client, std::string_view request,
                                                   Timestamp now, std::size_t via = 0);

@@ -26,6 +26,8 @@ struct VisionConfig {
   double max_false_robot = 1e-5;
   double flip_rate = 0.02;
 
+  [[nodiscard]] bool operator==(const VisionConfig&) const = default;
+
   template <class Visitor>
   void visit(Visitor& v) {
     v.choice("detector", detector, kSpotDetectors, "fast: ours; hough: the paper's pipeline");

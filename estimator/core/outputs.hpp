@@ -206,6 +206,14 @@ struct QueueStatus {
   std::uint64_t dropped = 0;
 };
 
+/// Which configuration is in force.
+struct ConfigStatus {
+  int generation = 1;                ///< 1 at start, one more with each reload that was applied
+  Timestamp since{};                 ///< when that was
+  std::vector<std::string> restart;  ///< keys that have changed and wait for a restart
+  std::string fault;                 ///< why the last reload was refused, or empty
+};
+
 /// The answer to POLL.
 struct SystemStatus {
   RobotId self{};
@@ -214,6 +222,8 @@ struct SystemStatus {
   double uptime_s = 0.0;
   double cpu_s = 0.0;   ///< of all threads since start
   double rss_mb = 0.0;  ///< resident memory [10^6 bytes]
+  ConfigStatus config;
+  double config_age_s = 0.0;
   std::vector<SensorStatus> sensors;
   EstimatorStatus estimator;
   std::vector<ClockStatus> clocks;

@@ -30,6 +30,8 @@ struct MemberConfig {
   Eigen::Vector3d p_body_led = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_body_uwb = Eigen::Vector3d::Zero();
 
+  [[nodiscard]] bool operator==(const MemberConfig&) const = default;
+
   template <class Visitor>
   void visit(Visitor& v) {
     v.required("id", id, Bounds{1, 65534}, "robot id");
@@ -49,6 +51,8 @@ struct SwarmConfig {
   double slot_ms = 10.0;
   double period_ms = 50.0;
   std::vector<MemberConfig> members;
+
+  [[nodiscard]] bool operator==(const SwarmConfig&) const = default;
 
   template <class Visitor>
   void visit(Visitor& v) {

@@ -48,6 +48,9 @@ class NeighborFilter {
   NeighborFilter(Timestamp stamp, const GraphPose& first, const ProcessNoise& noise,
                  const Priors& priors);
 
+  /// Of both robots' motion and sensors from now on.
+  void set_noise(const ProcessNoise& noise) { noise_ = noise; }
+
   [[nodiscard]] Timestamp stamp() const { return stamp_; }
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
 

@@ -53,6 +53,9 @@ class PaperFilter {
   /// From the pose graph, for a neighbor that was never seen directly.
   PaperFilter(Timestamp stamp, const GraphPose& first, const ProcessNoise& noise);
 
+  /// Of both robots' motion from now on.
+  void set_noise(const ProcessNoise& noise) { noise_ = noise; }
+
   [[nodiscard]] Timestamp stamp() const { return stamp_; }
   /// Eq. 9 to 13, in steps of at most 10 ms. `to` may not lie before `stamp()`.
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);

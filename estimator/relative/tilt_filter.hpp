@@ -18,6 +18,9 @@ class TiltFilter {
  public:
   explicit TiltFilter(const ImuConfig& config);
 
+  /// Another noise from now on; what is known stays known.
+  void set_noise(const ImuConfig& config) { config_ = config; }
+
   /// False, and nothing changes: not plausible, or a stamp that does not advance. A gap of more
   /// than half a second starts the filter anew.
   bool add(const ImuSample& sample);

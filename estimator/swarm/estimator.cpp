@@ -84,13 +84,14 @@ struct Estimator::State {
         graph_enabled(config.graph.enabled),
         report_clock(period_of(config.net.report_rate_hz)),
         estimate_clock(kEstimatePeriod),
-        graph_clock(period_of(config.graph.rate_hz)) {
-    const FilterSettings settings = filter_settings(config.estimator, config.imu, config.uwb);
-    const MemberConfig& own = member_of(config.swarm, id);
-    for (const MemberConfig& member : config.swarm.members) {
-      if (member.id != id) neighbors.try_emplace(member.id, own, member, settings);
-    }
+        graph_clock(period_of(config.graph.rate_hz)),
+        swarm(config.swarm),
+        vision(config.vision) {
+    meet_members(filter_settings(config.estimator, config.imu, config.uwb));
   }
+
+  void reconfigure(const Config& config);
+  void meet_members(const FilterSettings& settings);
 
   Outputs on(const ImuSample& sample);
   Outputs on(const UwbRange& range);
@@ -113,9 +114,44 @@ struct Estimator::State {
   Metronome estimate_clock;
   Metronome graph_clock;
   Timestamp last_tick = kNever;
+  SwarmConfig swarm;
+  VisionConfig vision;
+  bool keeps_records = false;
   std::uint64_t unknown_senders = 0;
   std::uint64_t refused_samples = 0;
 };
+
+/// A Neighbor for every member that has none yet.
+void Estimator::State::meet_members(const FilterSettings& settings) {
+  const MemberConfig& own = member_of(swarm, id);
+  for (const MemberConfig& member : swarm.members) {
+    if (member.id == id) continue;
+    const auto [neighbor, is_new] = neighbors.try_emplace(member.id, own, member, settings);
+    if (is_new && keeps_records) neighbor->second.keep_records();
+  }
+}
+
+void Estimator::State::reconfigure(const Config& config) {
+  CREPES_EXPECT(config.robot.id == id && config.cameras.size() == trackers.size(),
+                "robot and cameras stay the same");
+  const SwarmConfig before = std::exchange(swarm, config.swarm);
+  const FilterSettings settings = filter_settings(config.estimator, config.imu, config.uwb);
+  const bool own_is_same = member_of(before, id) == member_of(swarm, id);
+  std::erase_if(neighbors, [&](const auto& entry) {
+    const auto& now = swarm.members;
+    return !own_is_same ||
+           std::find(now.begin(), now.end(), member_of(before, entry.first)) == now.end();
+  });
+  for (auto& [robot, neighbor] : neighbors) neighbor.reconfigure(settings);
+  meet_members(settings);
+
+  tilt_filter.set_noise(config.imu);
+  if (!(swarm == before && config.vision == vision)) trackers = make_trackers(config);
+  vision = config.vision;
+  graph_enabled = config.graph.enabled;
+  report_clock = Metronome(period_of(config.net.report_rate_hz));
+  graph_clock = Metronome(period_of(config.graph.rate_hz));
+}
 
 Outputs Estimator::State::on(const ImuSample& sample) {
   if (!self.watch.accept(sample) || !tilt_filter.add(sample) || !self.imu.push(sample)) {
@@ -222,7 +258,10 @@ Outputs Estimator::step(const Event& event) {
   return std::visit([this](const auto& e) { return state_->on(e); }, event);
 }
 
+void Estimator::reconfigure(const Config& config) { state_->reconfigure(config); }
+
 void Estimator::keep_records() {
+  state_->keeps_records = true;
   for (auto& [robot, neighbor] : state_->neighbors) neighbor.keep_records();
 }
 

@@ -33,6 +33,10 @@ class Estimator {
   ~Estimator();
 
   [[nodiscard]] Outputs step(const Event& event);
+  /// Other settings from now on, with the same `robot` and `cameras`. Filters keep what they know,
+  /// unless the profile or a mounting changes. New members are unknown, missing ones forgotten.
+  /// Where `vision` or a code changes, tracks begin anew and read their IDs again.
+  void reconfigure(const Config& config);
   /// From now on `Outputs::records` tells of every measurement. Changes nothing else.
   void keep_records();
   [[nodiscard]] EstimatorStatus status() const;

@@ -43,6 +43,8 @@ class EventSequencer {
 
   explicit EventSequencer(Duration lag) : lag_(lag) {}
 
+  void set_lag(Duration lag) { lag_ = lag; }
+
   /// False if the stamp lies before what was released already.
   bool push(Measurement measurement);
 

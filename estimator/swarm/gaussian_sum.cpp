@@ -37,6 +37,10 @@ GaussianSum::GaussianSum(std::vector<NeighborTrack> parts) {
   normalize();
 }
 
+void GaussianSum::set_noise(const ProcessNoise& noise) {
+  for (Part& part : parts_) part.track.set_noise(noise);
+}
+
 void GaussianSum::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
   for (Part& part : parts_) part.track.advance_to(to, imu_B, imu_N);
 }

@@ -27,6 +27,7 @@ class GaussianSum {
   /// Of parts that are as likely one as the other.
   explicit GaussianSum(std::vector<NeighborTrack> parts);
 
+  void set_noise(const ProcessNoise& noise);
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Corrects every part with the candidate that is likeliest to the heaviest part. A crowd takes
   /// only so many readings a second, and calls the others degenerate: it may last for long.

@@ -29,6 +29,12 @@ constexpr auto kIsWorse = [](const auto& a, const auto& b) {
 
 }  // namespace
 
+void Hypotheses::reconfigure(const FilterSettings& settings) {
+  if (settings.profile != settings_.profile) clear();
+  settings_ = settings;
+  for (Start& start : starts_) start.sum.set_noise(settings.noise);
+}
+
 bool Hypotheses::wants_start(Timestamp now) const {
   if (empty()) return true;
   const Start& leader = starts_.front();

@@ -22,6 +22,9 @@ class Hypotheses {
   [[nodiscard]] bool empty() const { return starts_.empty(); }
   void clear() { starts_.clear(); }
 
+  /// Noise and gates from now on, priors for starts to come. Another profile's starts are dropped.
+  void reconfigure(const FilterSettings& settings);
+
   /// Whether a raw pose would be welcome.
   [[nodiscard]] bool wants_start(Timestamp now) const;
   /// A new rival at `stamp()`. False, and nothing changes: one that is there explains it already,

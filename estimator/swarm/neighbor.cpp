@@ -18,6 +18,14 @@ constexpr double kHiddenShare = 0.25;       // in line of sight reflections are 
 constexpr Duration kHiddenAfter = std::chrono::milliseconds{150};
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
 
+double calibration_sigma_rad(const FilterSettings& settings) {
+  return settings.profile == Profile::kTight ? kLooseBearing : settings.priors.misalignment_rad;
+}
+
+double single_range_sigma_m(const FilterSettings& settings) {
+  return std::hypot(settings.range_sigma_m, settings.priors.range_bias_m);
+}
+
 }  // namespace
 
 Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
@@ -26,14 +34,18 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
       self_id_(self.id),
       mounting_{self.p_body_led, self.p_body_uwb, neighbor.p_body_led, neighbor.p_body_uwb},
       settings_(settings),
-      sightings_(
-          self, neighbor,
-          settings.profile == Profile::kTight ? kLooseBearing : settings.priors.misalignment_rad,
-          std::hypot(settings.range_sigma_m, settings.priors.range_bias_m)),
+      sightings_(self, neighbor, calibration_sigma_rad(settings), single_range_sigma_m(settings)),
       sequencer_(settings.lag),
       hypotheses_(settings, mounting_) {
   status_.neighbor = neighbor.id;
   status_.name = neighbor.name;
+}
+
+void Neighbor::reconfigure(const FilterSettings& settings) {
+  settings_ = settings;
+  sightings_.set_sigmas(calibration_sigma_rad(settings), single_range_sigma_m(settings));
+  sequencer_.set_lag(settings.lag);
+  hypotheses_.reconfigure(settings);
 }
 
 void Neighbor::add_bearing(const Bearing& bearing) {

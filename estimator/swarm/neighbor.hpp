@@ -22,6 +22,10 @@ class Neighbor {
  public:
   Neighbor(const MemberConfig& self, const MemberConfig& neighbor, const FilterSettings& settings);
 
+  /// Other settings from now on; what is known of the neighbor stays known, but for another
+  /// profile.
+  void reconfigure(const FilterSettings& settings);
+
   void add_bearing(const Bearing& bearing);
   void add_range(const UwbRange& range);
   void add_report(const ReceivedReport& received, const RobotState& self);

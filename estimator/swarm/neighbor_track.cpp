@@ -81,6 +81,10 @@ NeighborTrack::NeighborTrack(Timestamp stamp, const GaussianPose& T_B_N,
     : filter_(NeighborFilter(stamp, T_B_N, settings.noise, settings.priors)),
       priors_(settings.priors) {}
 
+void NeighborTrack::set_noise(const ProcessNoise& noise) {
+  std::visit([&](auto& filter) { filter.set_noise(noise); }, filter_);
+}
+
 Timestamp NeighborTrack::stamp() const {
   return std::visit([](const auto& filter) { return filter.stamp(); }, filter_);
 }

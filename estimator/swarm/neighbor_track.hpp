@@ -41,6 +41,8 @@ class NeighborTrack {
   /// At rest or at any speed.
   NeighborTrack(Timestamp stamp, const GaussianPose& T_B_N, const FilterSettings& settings);
 
+  void set_noise(const ProcessNoise& noise);
+
   [[nodiscard]] Timestamp stamp() const;
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// The one of some readings of the same kind, taken at `stamp()`, that is nearest to what this

@@ -21,6 +21,11 @@ class SightingLog {
   SightingLog(MemberConfig self, MemberConfig neighbor, double calibration_sigma_rad,
               double range_sigma_m);
 
+  void set_sigmas(double calibration_sigma_rad, double range_sigma_m) {
+    calibration_sigma_rad_ = calibration_sigma_rad;
+    range_sigma_m_ = range_sigma_m;
+  }
+
   void add_own(const Bearing& bearing);
   void add_peer(const Bearing& bearing);
   void add_range(Timestamp stamp, double range_m);
