@@ -104,8 +104,8 @@ class Recorder {
     }
     listen();
     wait();
-    accept();
     if (recipient_ && !recipient_->turn()) end();
+    accept();
     if (recipient_ && recipient_->wants_rows()) {
       if (recipient_->is_idle()) hand_over();
     } else {

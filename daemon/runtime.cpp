@@ -175,7 +175,8 @@ void Runtime::start_camera(std::size_t index, const EventSink& sense) {
 std::vector<QueueStatus> Runtime::queue_status() const {
   std::vector<QueueStatus> status{{"events", events_.dropped()},
                                   {"graph problems", problems_.dropped()},
-                                  {"outputs", outputs_.dropped()}};
+                                  {"outputs", outputs_.dropped()},
+                                  {"recording", recorded_.dropped()}};
   for (std::size_t i = 0; i < cameras_.size(); ++i)
     status.push_back({config_.cameras[i].name + " frames", cameras_[i].frames.dropped()});
   return status;

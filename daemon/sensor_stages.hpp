@@ -51,7 +51,7 @@ struct Sensor {
   std::string name;
   std::function<Result<std::unique_ptr<Device>>()> open;
   std::string when_silent;  ///< what to look at when the open device says nothing
-  std::function<Sensor(const Config&)> renewed;  ///< the same with other settings
+  std::function<Sensor(const Config&)> renewed{};  ///< the same with other settings
 };
 
 /// Settings on their way to a stage, of which the newest count.

@@ -73,8 +73,10 @@ ChildProcess::~ChildProcess() {
   ::waitpid(pid_, nullptr, 0);
 }
 
-void ChildProcess::ask_to_stop() const {
-  if (pid_ > 0 && !ending_) ::kill(pid_, SIGTERM);
+void ChildProcess::ask_to_stop() const { send_signal(SIGTERM); }
+
+void ChildProcess::send_signal(int signal) const {
+  if (pid_ > 0 && !ending_) ::kill(pid_, signal);
 }
 
 const std::optional<std::string>& ChildProcess::ending() {

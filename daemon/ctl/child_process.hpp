@@ -33,6 +33,7 @@ class ChildProcess {
 
   /// Asks it to end, without waiting.
   void ask_to_stop() const;
+  void send_signal(int signal) const;
 
  private:
   explicit ChildProcess(pid_t pid) : pid_(pid) {}

@@ -34,14 +34,6 @@ template <class Number>
   return {};
 }
 
-/// Appends the shortest text that reads back to the same bits.
-template <class Number>
-void append_number(std::string& text, Number value) {
-  std::array<char, 32> buffer{};
-  const auto [end, status] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
-  text.append(buffer.data(), end);
-}
-
 /// The rows of a file whose first line is a header. A row with a wrong number of columns, a last
 /// line without its end (it may have lost digits) and a header without '#' are added to the faults;
 /// in the last case the line is taken for a row.

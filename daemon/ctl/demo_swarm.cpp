@@ -61,6 +61,7 @@ std::vector<DemoRobot> demo_swarm(const SimConfig& world, const std::vector<Robo
     robot.config.net.port = mesh_port;
     robot.config.subscription.listen = {"127.0.0.1"};
     robot.config.subscription.port = first_port + static_cast<int>(i);
+    robot.config.recording.socket.clear();
     robot.config.sim = world;
     robot.config.sim.enabled = true;
     robot.config.sim.epoch_s = epoch_s;

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "daemon/ctl/csv_file.hpp"
+#include "daemon/number_text.hpp"
 
 namespace crepes {
 namespace {

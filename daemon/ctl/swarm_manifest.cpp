@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "daemon/ctl/csv_file.hpp"
+#include "daemon/number_text.hpp"
 
 namespace crepes {
 namespace {
@@ -90,6 +91,32 @@ SwarmManifest manifest_from(const YAML::Node& root) {
 }
 
 }  // namespace
+
+std::string robot_text(const SwarmRobot& robot) {
+  std::string text = "- {id: " + std::to_string(robot.id.value);
+  text += ", name: " + robot.name + ", dir: " + robot.dir.string() + ", clock: {offset_s: ";
+  append_number(text, robot.clock.offset_s);
+  text += ", skew_ppm: ";
+  append_number(text, robot.clock.skew_ppm);
+  return text + "}}\n";
+}
+
+std::string manifest_text(const SwarmManifest& manifest) {
+  std::string text = "scenario: " + manifest.scenario;
+  const auto number = [&text](const char* before, auto value) {
+    text += before;
+    append_number(text, value);
+  };
+  number("\nseed: ", manifest.network.seed);
+  number("\nduration_s: ", manifest.duration_s);
+  number("\nnetwork: {latency_ms: ", manifest.network.latency_ms);
+  number(", jitter_ms: ", manifest.network.jitter_ms);
+  number(", loss: ", manifest.network.loss);
+  number(", seed: ", manifest.network.seed);
+  text += "}\nrobots:\n";
+  for (const SwarmRobot& robot : manifest.robots) text += robot_text(robot);
+  return text;
+}
 
 Result<SwarmManifest> load_manifest(const std::filesystem::path& dir) {
   const std::filesystem::path file = dir / "swarm.yaml";

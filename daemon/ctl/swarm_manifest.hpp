@@ -36,6 +36,10 @@ struct SwarmManifest {
   std::vector<SwarmRobot> robots;
 };
 
+/// The text of swarm.yaml, and of one robot's line in it.
+[[nodiscard]] std::string manifest_text(const SwarmManifest& manifest);
+[[nodiscard]] std::string robot_text(const SwarmRobot& robot);
+
 /// Reads and checks DIR/swarm.yaml; an error names file, line and key.
 [[nodiscard]] Result<SwarmManifest> load_manifest(const std::filesystem::path& dir);
 

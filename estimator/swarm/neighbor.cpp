@@ -42,6 +42,8 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
 }
 
 void Neighbor::reconfigure(const FilterSettings& settings) {
+  // What waits is meant for the filter that there was.
+  if (settings.profile != settings_.profile) sequencer_.clear();
   settings_ = settings;
   sightings_.set_sigmas(calibration_sigma_rad(settings), single_range_sigma_m(settings));
   sequencer_.set_lag(settings.lag);

@@ -198,7 +198,9 @@ std::pair<Timestamp, std::string> first_fault(const std::string& fault) {
     message = status.message;
     if (!status.ok || clock.now() > Timestamp{10s}) stop.request_stop();
   };
-  run_sensor(sensor, {.clock = clock, .tell = tell, .turns = turns}, stop.get_token());
+  SettingsQueue settings{1, Overflow::kDropOldest};
+  run_sensor(sensor, {.clock = clock, .tell = tell, .turns = turns, .settings = settings},
+             stop.get_token());
   return {clock.now(), message};
 }
 
@@ -223,7 +225,9 @@ TEST(SensorStage, LooksOftenForADeviceThatIsNotThere) {
                       },
                       .when_silent = ""};
 
-  run_sensor(sensor, {.clock = clock, .tell = [](SensorStatus) {}, .turns = turns},
+  SettingsQueue settings{1, Overflow::kDropOldest};
+  run_sensor(sensor,
+             {.clock = clock, .tell = [](SensorStatus) {}, .turns = turns, .settings = settings},
              stop.get_token());
 
   EXPECT_EQ(looks, 8);

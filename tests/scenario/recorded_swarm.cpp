@@ -8,6 +8,9 @@
 
 #include "daemon/config_file.hpp"
 #include "daemon/ctl/demo_swarm.hpp"
+#include "daemon/ctl/robot_folder.hpp"
+#include "daemon/ctl/swarm_manifest.hpp"
+#include "daemon/dataset_rows.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/sim/ring_renderer.hpp"
 #include "drivers/sim/sim_imu.hpp"
@@ -40,38 +43,31 @@ void record_truth(const fs::path& file, const SimWorld& world, RobotId robot, do
   }
 }
 
-void record_imu(const fs::path& file, const SimWorld& world, const DemoRobot& robot,
-                double duration_s) {
-  auto out = create(file, "#timestamp [ns],wx,wy,wz,ax,ay,az");
+std::string imu_rows(const SimWorld& world, const DemoRobot& robot, double duration_s) {
+  std::string rows;
   SimImu imu(world, robot.config.robot.id, robot.config.imu);
   WitMotionParser parser;
   for (int i = 1; i * 0.01 <= duration_s; ++i) {
     const auto bytes = imu.sample(i * 0.01);
-    const auto write = [&](const ImuSample& sample) {
-      const auto& w = sample.gyro_radps;
-      const auto& a = sample.accel_mps2;
-      out << to_ns(sample.stamp) << ',' << w.x() << ',' << w.y() << ',' << w.z() << ',' << a.x()
-          << ',' << a.y() << ',' << a.z() << '\n';
-    };
+    const auto write = [&](const ImuSample& sample) { append_rows(rows, sample); };
     parser.parse(bytes, robot.clock.local(i * 0.01), write);
   }
+  return rows;
 }
 
-void record_uwb(const fs::path& file, const SimWorld& world, const DemoRobot& robot,
-                double duration_s) {
-  auto out = create(file, "#timestamp [ns],peer,distance [m],first path [dBm],received [dBm]");
+std::string range_rows(const SimWorld& world, const DemoRobot& robot, double duration_s) {
+  std::string rows;
   const auto module =
       SimUwb::make(world, robot.config.robot.id, robot.config.swarm, robot.config.uwb);
-  ASSERT_TRUE(module) << module.error().message;
+  EXPECT_TRUE(module) << module.error().message;
   NlinkParser parser(uwb_modules_of(robot.config.swarm), robot.config.uwb.max_range_m);
   for (int i = 1; i * 0.02 <= duration_s; ++i) {
     const double t = i * 0.02 - 0.003;
     const auto bytes = module->sample(t);
-    parser.parse(Bytes(bytes), robot.clock.local(t), [&](const UwbRange& range) {
-      out << to_ns(range.stamp) << ',' << range.neighbor.value << ',' << range.range_m << ','
-          << range.first_path_dbm << ',' << range.received_dbm << '\n';
-    });
+    parser.parse(Bytes(bytes), robot.clock.local(t),
+                 [&](const UwbRange& range) { append_rows(rows, range); });
   }
+  return rows;
 }
 
 class CameraRecorder {
@@ -114,20 +110,15 @@ class CameraRecorder {
   SpotSource source_;
 };
 
-void record_camera(const fs::path& file, const SimWorld& world, const DemoRobot& robot,
-                   const RecordingOptions& options) {
-  auto out = create(file, "#timestamp [ns],u,v,area,peak");
+std::string spot_rows(const SimWorld& world, const DemoRobot& robot,
+                      const RecordingOptions& options) {
+  std::string rows;
   CameraRecorder camera(world, robot, options);
   for (int i = 1; i * 0.005 <= options.duration_s; ++i) {
     const double t = i * 0.005 - 0.001;
-    const std::int64_t stamp = to_ns(robot.clock.local(t));
-    const std::vector<Spot> spots = camera.spots(t);
-    if (spots.empty()) out << stamp << ",,,,\n";
-    for (const Spot& spot : spots) {
-      out << stamp << ',' << spot.u_px << ',' << spot.v_px << ',' << spot.area_px2 << ','
-          << spot.peak << '\n';
-    }
+    append_rows(rows, SpotFrame{robot.clock.local(t), 0, camera.spots(t)});
   }
+  return rows;
 }
 
 }  // namespace
@@ -140,24 +131,22 @@ void record_swarm(const fs::path& dir, const RecordingOptions& options) {
   const SimWorld world(sim);
   const auto swarm = demo_swarm(sim, world.robots(), 0.0, 40000, 40100);
 
-  auto manifest = create(dir / "swarm.yaml", "# made from the simulated world");
-  manifest << "scenario: simulated\nseed: " << options.seed
-           << "\nduration_s: " << options.duration_s
-           << "\nnetwork: {latency_ms: 3.0, jitter_ms: 3.0, loss: 0.02, seed: " << options.seed
-           << "}\nrobots:\n";
+  SwarmManifest manifest;
+  manifest.scenario = "simulated";
+  manifest.duration_s = options.duration_s;
+  manifest.network = {3.0, 3.0, 0.02, static_cast<std::uint64_t>(options.seed)};
   for (const DemoRobot& robot : swarm) {
     const RobotId id = robot.config.robot.id;
     const std::string name = "r" + std::to_string(id.value);
-    manifest << "- {id: " << id.value << ", name: " << name << ", dir: " << name
-             << ", clock: {offset_s: " << robot.clock.offset_s
-             << ", skew_ppm: " << robot.clock.skew_ppm << "}}\n";
-    fs::create_directories(dir / name);
-    std::ofstream(dir / name / "crepesd.yaml") << write_config(robot.config);
+    manifest.robots.push_back({id, name, name, robot.clock});
+    RobotFolder folder(dir / name);
+    ASSERT_TRUE(folder.write_config(write_config(robot.config)));
+    ASSERT_TRUE(folder.append("imu0", imu_rows(world, robot, options.duration_s)));
+    ASSERT_TRUE(folder.append("uwb0", range_rows(world, robot, options.duration_s)));
+    ASSERT_TRUE(folder.append("cam0", spot_rows(world, robot, options)));
     record_truth(dir / "truth" / (name + ".csv"), world, id, options.duration_s);
-    record_imu(dir / name / "imu0" / "data.csv", world, robot, options.duration_s);
-    record_uwb(dir / name / "uwb0" / "data.csv", world, robot, options.duration_s);
-    record_camera(dir / name / "cam0" / "spots.csv", world, robot, options);
   }
+  ASSERT_TRUE(write_text_file(dir / "swarm.yaml", manifest_text(manifest)));
 }
 
 }  // namespace crepes::test

@@ -51,6 +51,12 @@ class EstimatorPair {
     for (const Duration end = now_ + duration; now_ < end;) advance(with);
   }
 
+  /// Our estimator goes on with other settings.
+  void reconfigure(const std::function<void(Config&)>& change) {
+    change(config_);
+    estimator_.reconfigure(config_);
+  }
+
   /// Our clock goes on from elsewhere, or the neighbor starts anew with another clock.
   void jump_own_clock(Duration by) { own_clock_ += by; }
   void reboot_peer(Duration by) {

@@ -16,6 +16,7 @@ void add_import_calibration(CommandLine& line);
 void add_keygen(CommandLine& line);
 void add_led(CommandLine& line);
 void add_plot(CommandLine& line);
+void add_record(CommandLine& line);
 void add_replay(CommandLine& line);
 void add_setup_witmotion(CommandLine& line);
 void add_sources(CommandLine& line);
@@ -25,21 +26,11 @@ void add_waitpose(CommandLine& line);
 void add_watch(CommandLine& line);
 
 /// In the order of --help: what runs, what was recorded, what is set up.
-inline constexpr std::array kCommands{&add_status,
-                                      &add_watch,
-                                      &add_sources,
-                                      &add_waitpose,
-                                      &add_replay,
-                                      &add_evaluate,
-                                      &add_plot,
-                                      &add_spots,
-                                      &add_demo,
-                                      &add_devices,
-                                      &add_import_calibration,
-                                      &add_codebook,
-                                      &add_led,
-                                      &add_setup_witmotion,
-                                      &add_keygen,
-                                      &add_completion};
+inline constexpr std::array kCommands{&add_status,   &add_watch,     &add_sources,
+                                      &add_waitpose, &add_record,    &add_replay,
+                                      &add_evaluate, &add_plot,      &add_spots,
+                                      &add_demo,     &add_devices,   &add_import_calibration,
+                                      &add_codebook, &add_led,       &add_setup_witmotion,
+                                      &add_keygen,   &add_completion};
 
 }  // namespace crepes

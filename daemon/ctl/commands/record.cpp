@@ -1,0 +1,64 @@
+#include "daemon/ctl/record.hpp"
+
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "daemon/ctl/commands/command_line.hpp"
+#include "daemon/ctl/commands/commands.hpp"
+#include "daemon/ctl/live_screen.hpp"
+#include "daemon/ctl/text_table.hpp"
+
+namespace crepes {
+namespace {
+
+Result<void> run_record(RecordOptions options) {
+  if (::isatty(STDERR_FILENO) == 1) {
+    options.on_progress = [](const RecordProgress& progress) {
+      std::fprintf(stderr, "\r%6.1f s  %8.2f MB  %llu rows ", progress.seconds,
+                   1e-6 * static_cast<double>(progress.bytes),
+                   static_cast<unsigned long long>(progress.rows));
+    };
+  }
+  const Result<RecordSummary> summary = record(options);
+  if (options.on_progress) std::fputs("\r", stderr);
+  if (!summary) return tl::unexpected(summary.error());
+  const RecordProgress& progress = summary->progress;
+  std::string text = summary->why + ": " + fixed(progress.seconds, 1) + " s, " +
+                     std::to_string(progress.rows) + " rows, " + std::to_string(progress.pictures) +
+                     " pictures, " + fixed(1e-6 * static_cast<double>(progress.bytes), 2) +
+                     " MB in " + summary->folder.string() + "\n";
+  if (progress.missing > 0)
+    text += std::to_string(progress.missing) + " events are missing: the disk was too slow\n";
+  if (progress.configurations > 1)
+    text += "the daemon was reloaded meanwhile; crepesd.yaml is what it ended with\n";
+  print(text);
+  return {};
+}
+
+}  // namespace
+
+void add_record(CommandLine& line) {
+  auto& options = line.keep<RecordOptions>();
+  CLI::App* sub = line.add(
+      "record", "Write what a running daemon's sensors measure as a data set that replays");
+  sub->add_option("DIR", options.dir, "for swarm.yaml and the robot's folder; has no data set yet")
+      ->required();
+  sub->add_flag("--images", options.pictures, "pictures, too, as many as there is time for");
+  sub->add_option_function<double>(
+         "--duration", [&options](double seconds) { options.duration_s = seconds; },
+         "stop after so many seconds; left out: Ctrl-C")
+      ->check(CLI::Range(0.1, 1e6));
+  sub->add_option_function<double>(
+         "--max-size",
+         [&options](double megabytes) {
+           options.max_bytes = static_cast<std::uint64_t>(1e6 * megabytes);
+         },
+         "stop at so many MB; left out: 1074, a gibibyte")
+      ->check(CLI::Range(0.1, 1e7));
+  sub->add_option("--socket", options.socket, "the daemon's recording.socket")
+      ->capture_default_str();
+  line.run(sub, [&options] { return run_record(options); });
+}
+
+}  // namespace crepes

@@ -1,0 +1,229 @@
+/// What live daemons measure, recorded and replayed.
+#include "daemon/ctl/record.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/ctl/swarm_dataset.hpp"
+#include "daemon/ctl/swarm_replay.hpp"
+#include "daemon/recorder_stage.hpp"
+#include "daemon/runtime.hpp"
+#include "daemon/unix_socket.hpp"
+#include "tests/support/live_daemon.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+std::string text_of(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+class Record : public LiveDaemon {
+ protected:
+  [[nodiscard]] Config recorded_config(std::uint16_t id) const {
+    Config config = pair_config(id, mesh_port_);
+    config.recording.socket = folder_.path() / ("r" + std::to_string(id) + ".socket");
+    return config;
+  }
+  [[nodiscard]] RecordOptions options(const Config& config, double duration_s) const {
+    return {.dir = folder_.path() / ("recording" + std::to_string(config.robot.id.value)),
+            .socket = config.recording.socket,
+            .duration_s = duration_s};
+  }
+  /// The socket is there a moment after its daemon.
+  void await_socket(const Config& config) const {
+    const Timestamp end = machine_.now() + kPatience;
+    while (machine_.now() < end && !connect_unix(config.recording.socket)) {
+      wait_for(10ms, {});
+    }
+  }
+
+  ScratchDirectory folder_ = ScratchDirectory::create({}).value();
+};
+
+TEST_F(Record, ReplaysTogetherWithTheOtherRobotsRecording) {
+  const Config first = recorded_config(1);
+  Config second = recorded_config(2);
+  second.sim.clock_offset_s = 7.25;
+  second.sim.clock_skew_ppm = 40.0;
+  const auto runtime_1 = std::make_unique<Runtime>(first, machine_);
+  const auto runtime_2 = std::make_unique<Runtime>(second, machine_);
+  expect_true_poses(first);
+  std::optional<Result<RecordSummary>> from_thread;
+  auto other = std::make_unique<Worker>("record", [&](const std::stop_token& /*stop*/) {
+    from_thread = record(options(second, 8.0));
+  });
+  const auto own = record(options(first, 8.0));
+  other.reset();
+  const auto& others = from_thread.value();
+  ASSERT_TRUE(own) << own.error().message;
+  ASSERT_TRUE(others) << others.error().message;
+  EXPECT_EQ(own->why, "--duration is over");
+  EXPECT_EQ(own->progress.missing, 0U);
+
+  // As swarm.yaml says: the other folder beside this one, and the # off its line.
+  const fs::path swarm = options(first, 0).dir;
+  fs::rename(others->folder, swarm / "r2");
+  std::string manifest = text_of(swarm / "swarm.yaml");
+  const std::size_t line = manifest.find("# - {id: 2");
+  ASSERT_NE(line, std::string::npos) << manifest;
+  std::ofstream(swarm / "swarm.yaml") << manifest.erase(line, 2);
+
+  const auto replayed = replay_swarm({.swarm_dir = swarm, .out_dir = folder_.path() / "poses"});
+
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_EQ(replayed->robots, 2U);
+  EXPECT_GT(replayed->poses, 2 * 50 * 4U);  // both see each other most of the time
+  const std::string poses = text_of(folder_.path() / "poses/r1/r2.csv");
+  EXPECT_GT(std::ranges::count(poses, '\n'), 50 * 4);
+}
+
+TEST_F(Record, WritesPicturesThatTheDataSetReaderFinds) {
+  const Config config = recorded_config(1);
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+  RecordOptions wanted = options(config, 2.0);
+  wanted.pictures = true;
+
+  const auto recorded = record(wanted);
+
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  EXPECT_GT(recorded->progress.pictures, 0U);
+  const auto dataset = load_swarm(wanted.dir);
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  EXPECT_TRUE(dataset->faults.empty()) << dataset->faults.list().front();
+  const CameraRecording& camera = dataset->robots.at(0).cameras.at(0);
+  EXPECT_EQ(camera.images.size(), recorded->progress.pictures);
+  EXPECT_GT(camera.spots.size(), 20U);
+  EXPECT_GT(dataset->robots[0].imu.size(), 50U);
+}
+
+TEST_F(Record, StopsAtItsSizeAndRefusesToWriteOverADataSet) {
+  const Config config = recorded_config(1);
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+  RecordOptions wanted = options(config, 60.0);
+  wanted.max_bytes = 100'000;
+
+  const auto recorded = record(wanted);
+
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  EXPECT_EQ(recorded->why, "--max-size is reached");
+  EXPECT_LT(recorded->progress.bytes, 200'000U);
+  EXPECT_FALSE(record(wanted));
+}
+
+TEST_F(Record, FailsWithAFullDiskAndTheDaemonDoesNotNotice) {
+  const Config config = recorded_config(1);
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+  RecordOptions wanted = options(config, 60.0);
+  fs::create_directories(wanted.dir / "r1/imu0");
+  fs::create_symlink("/dev/full", wanted.dir / "r1/imu0/data.csv");
+
+  const auto recorded = record(wanted);
+
+  ASSERT_FALSE(recorded);
+  EXPECT_NE(recorded.error().message.find("No space left on device"), std::string::npos);
+  EXPECT_TRUE(Client(config).await_status([](const Json& status) {
+    return status["queues"].value("events", 0) == 0 && sensor_of(status, "imu").value("ok", false);
+  }));
+}
+
+TEST_F(Record, DropsTheNewestForAToolThatDoesNotReadAndTellsHowMany) {
+  const Config config = recorded_config(1);
+  RecordQueue events{100, Overflow::kDropNewest};
+  std::deque<PictureTap> pictures;
+  Counter turns;
+  SettingsQueue settings{1, Overflow::kDropOldest};
+  const StageContext context{machine_, [](SensorStatus) {}, turns, settings};
+  const Worker recorder("recorder", [&](const std::stop_token& stop) {
+    run_recorder({config, events, pictures}, context, stop);
+  });
+  await_socket(config);
+  UniqueFd lazy = connect_unix(config.recording.socket).value();
+  const std::string request = std::string(kRecordRequest) + "\n";
+  ASSERT_GT(::send(lazy.get(), request.data(), request.size(), 0), 0);
+  std::int64_t sent = 0;
+  const auto measure = [&] {
+    SpotFrame frame{Timestamp{Duration{++sent}}, 0, {}};
+    frame.spots.resize(100);
+    events.push(frame);
+  };
+
+  const Timestamp end = machine_.now() + kPatience;
+  while (machine_.now() < end && events.dropped() < 50) {
+    for (int i = 0; i < 50; ++i) measure();
+    wait_for(1ms, {});
+  }
+  EXPECT_GE(events.dropped(), 50U);  // while pushing went on all the time
+
+  std::string heard;
+  std::vector<char> chunk(1 << 20);
+  std::size_t gap = std::string::npos;
+  while (machine_.now() < end && gap == std::string::npos) {
+    const ssize_t count = ::recv(lazy.get(), chunk.data(), chunk.size(), 0);
+    ASSERT_GT(count, 0);
+    heard.append(chunk.data(), static_cast<std::size_t>(count));
+    gap = heard.find("\ngap ");
+  }
+  ASSERT_NE(gap, std::string::npos);
+  EXPECT_GT(std::stoi(heard.substr(heard.find('\n', gap + 1) + 1, 10)), 0);
+}
+
+TEST_F(Record, SaysWhenThereIsNoDaemonOrAnotherRecording) {
+  const Config config = recorded_config(1);
+  const auto nobody = record(options(config, 1.0));
+  ASSERT_FALSE(nobody);
+  EXPECT_NE(nobody.error().message.find("is crepesd running"), std::string::npos);
+
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+  const UniqueFd first = connect_unix(config.recording.socket).value();
+  const Timestamp end = machine_.now() + kPatience;
+  std::string message;
+  while (machine_.now() < end && message.find("under way") == std::string::npos) {
+    const auto second = record(options(config, 0.1));
+    message = second ? "" : second.error().message;
+    if (second) fs::remove_all(options(config, 1.0).dir);
+  }
+  EXPECT_NE(message.find("another recording is under way"), std::string::npos);
+}
+
+TEST_F(Record, SurvivesToolsThatTalkNonsense) {
+  const Config config = recorded_config(1);
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+  for (const std::string& request : {std::string("GET /\n"), std::string(5000, 'x'),
+                                     std::string("RECORD 1\nRECORD 1\n"), std::string()}) {
+    const UniqueFd tool = connect_unix(config.recording.socket).value();
+    ::send(tool.get(), request.data(), request.size(), MSG_NOSIGNAL);
+  }
+
+  const Timestamp end = machine_.now() + kPatience;
+  Result<RecordSummary> recorded = record(options(config, 0.3));
+  while (!recorded && machine_.now() < end) recorded = record(options(config, 0.3));
+
+  EXPECT_TRUE(recorded) << recorded.error().message;
+}
+
+}  // namespace
+}  // namespace crepes

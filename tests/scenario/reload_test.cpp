@@ -1,0 +1,209 @@
+/// Whole daemons whose settings change while they run.
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "daemon/ctl/child_process.hpp"
+#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/runtime.hpp"
+#include "tests/support/live_daemon.hpp"
+
+namespace crepes {
+namespace {
+
+using std::chrono::milliseconds;
+
+class Reload : public LiveDaemon {
+ protected:
+  /// The time between poses as they come, averaged over some.
+  static double seconds_between_poses(const Config& config) {
+    Client client(config);
+    std::vector<double> stamps;
+    client.await(R"({"class":"WATCH"})", "POSE", [&](const Json& pose) {
+      stamps.push_back(pose["timestamp"].get<double>());
+      return stamps.size() > 20;
+    });
+    return stamps.empty() ? 0.0 : (stamps.back() - stamps.front()) / 20.0;
+  }
+
+  static std::uint64_t fused_ranges(const Json& status) {
+    const Json neighbor = status["neighbors"].empty() ? Json::object() : status["neighbors"][0];
+    return neighbor.value("measurements", Json::object())
+        .value("range", Json::object())
+        .value("fused", 0U);
+  }
+};
+
+TEST_F(Reload, ChangesRatesNoiseAndLimitsWithoutLosingThePose) {
+  const Config first = pair_config(1, mesh_port_);
+  Runtime runtime(first, machine_);
+  const Runtime other(pair_config(2, mesh_port_), machine_);
+  expect_true_poses(first);
+  Client subscriber(first);
+  ASSERT_TRUE(subscriber.await(R"({"class":"WATCH"})", "POSE", [](const Json&) { return true; }));
+  Config wanted = first;
+  wanted.estimator.output_rate_hz = 10;
+  wanted.uwb.noise_m = 0.2;
+  wanted.imu.gyroscope_noise_density *= 2;
+  wanted.vision.gate_px = 10;
+  wanted.graph.rate_hz = 5;
+  wanted.net.report_rate_hz = 40;
+  wanted.subscription.lease_s = 42;
+
+  const Result<ConfigChange> change = runtime.reconfigure(wanted);
+
+  ASSERT_TRUE(change) << change.error().message;
+  EXPECT_EQ(change->live.size(), 7U);
+  EXPECT_TRUE(change->restart.empty());
+  EXPECT_TRUE(subscriber.await_status(
+      [](const Json& status) { return status["config"]["generation"] == 2; }));
+  EXPECT_TRUE(subscriber.await(R"({"class":"WATCH"})", "VERSION",
+                               [](const Json& version) { return version["lease_s"] == 42; }));
+  EXPECT_NEAR(seconds_between_poses(first), 0.1, 0.04);
+  EXPECT_TRUE(subscriber.await(R"({"class":"WATCH"})", "POSE", [](const Json& pose) {
+    EXPECT_EQ(pose["reset_counter"], 1);  // the filter went on
+    return true;
+  }));
+  expect_true_poses(first);
+}
+
+TEST_F(Reload, LetsMembersInAndOut) {
+  const Config both = pair_config(1, mesh_port_);
+  Config alone = both;
+  alone.swarm.members.resize(1);
+  Runtime runtime(alone, machine_);
+  const Runtime other(pair_config(2, mesh_port_), machine_);
+  Client client(both);
+  ASSERT_TRUE(client.await_status([](const Json& status) {
+    return status["neighbors"].empty() && status["network"].value("refused_unknown_sender", 0) > 0;
+  }));
+
+  ASSERT_TRUE(runtime.reconfigure(both));
+  expect_true_poses(both);
+  EXPECT_TRUE(client.await_status([](const Json& status) { return fused_ranges(status) > 0; }));
+
+  ASSERT_TRUE(runtime.reconfigure(alone));
+  EXPECT_TRUE(client.await_status([](const Json& status) { return status["neighbors"].empty(); }));
+}
+
+TEST_F(Reload, NamesWhatHasToWaitAndRefusesWhatCannotBe) {
+  const Config first = pair_config(1, mesh_port_);
+  Runtime runtime(first, machine_);
+  Client client(first);
+  Config wanted = first;
+  wanted.cameras[0].rate_hz = 100;
+  wanted.log.level = LogLevel::kWarning;
+  ASSERT_TRUE(runtime.reconfigure(wanted));
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    return status["config"].value("restart", "") == "cameras" &&
+           status["config"]["generation"] == 2;
+  }));
+
+  wanted.robot.id = RobotId{2};  // which waits, and robot 1 is not in this swarm
+  std::erase_if(wanted.swarm.members, [](const auto& member) { return member.id == RobotId{1}; });
+  const Result<ConfigChange> refused = runtime.reconfigure(wanted);
+  ASSERT_FALSE(refused);
+  runtime.tell_reload_refused(refused.error().message);
+
+  EXPECT_NE(refused.error().message.find("1 is not among swarm.members"), std::string::npos);
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    return status["config"].value("fault", "").find("not among") != std::string::npos &&
+           status["config"]["generation"] == 2;
+  }));
+}
+
+TEST_F(Reload, OpensOtherPortsOfMeshSubscriptionAndSensors) {
+  const Config first = without_devices(mesh_port_);
+  Runtime runtime(first, machine_);
+  Config wanted = first;
+  wanted.net.interface = "nosuch0";
+  wanted.subscription.port = free_port();
+  wanted.imu.port = "/nowhere/imu";
+  wanted.uwb.port = "/nowhere/uwb";
+
+  ASSERT_TRUE(runtime.reconfigure(wanted));
+
+  EXPECT_TRUE(Client(wanted).await_status([](const Json& status) {
+    return tells(sensor_of(status, "mesh"), "nosuch0") &&
+           tells(sensor_of(status, "imu"), "/nowhere/imu") &&
+           tells(sensor_of(status, "uwb"), "/nowhere/uwb");
+  }));
+}
+
+/// What systemd would hear.
+class NotifySocket {
+ public:
+  explicit NotifySocket(const std::string& path) : fd_(::socket(AF_UNIX, SOCK_DGRAM, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.copy(std::begin(address.sun_path), sizeof(address.sun_path) - 1);
+    const void* const raw = &address;
+    EXPECT_EQ(::bind(fd_.get(), static_cast<const sockaddr*>(raw), sizeof(address)), 0);
+  }
+
+  /// All that has come so far.
+  const std::string& heard() {
+    std::array<char, 4096> buffer{};
+    for (;;) {
+      const ssize_t count = ::recv(fd_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
+      if (count <= 0) return heard_;
+      heard_.append(buffer.data(), static_cast<std::size_t>(count)).append("\n");
+    }
+  }
+
+ private:
+  UniqueFd fd_;
+  std::string heard_;
+};
+
+TEST_F(Reload, HappensOnSighupAndSystemdIsTold) {
+  const ScratchDirectory folder = ScratchDirectory::create({}).value();
+  const auto file = folder.path() / "crepesd.yaml";
+  Config config = pair_config(1, mesh_port_);
+  const auto write = [&](const std::string& more) {
+    std::ofstream(file) << write_config(config) << more;
+  };
+  write("");
+  NotifySocket systemd(folder.path() / "notify");
+  ::setenv("NOTIFY_SOCKET", (folder.path() / "notify").c_str(),
+           1);  // NOLINT(concurrency-mt-unsafe)
+  const auto daemon =
+      ChildProcess::start(CREPES_DAEMON, {"--config", file.string()}, folder.path() / "log");
+  ::unsetenv("NOTIFY_SOCKET");  // NOLINT(concurrency-mt-unsafe)
+  ASSERT_TRUE(daemon) << daemon.error().message;
+  Client client(config);
+  const auto has_generation = [&](int generation) {
+    return [generation](const Json& status) {
+      return status["config"]["generation"] == generation && !status["config"].contains("fault");
+    };
+  };
+  ASSERT_TRUE(client.await_status(has_generation(1)));
+
+  config.estimator.output_rate_hz = 20;
+  write("");
+  daemon->send_signal(SIGHUP);
+  EXPECT_TRUE(client.await_status(has_generation(2)));
+  write("no such key: 1\n");
+  daemon->send_signal(SIGHUP);
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    return status["config"].value("fault", "").find("unknown key") != std::string::npos &&
+           status["config"]["generation"] == 2;
+  }));
+  write("");
+  daemon->send_signal(SIGHUP);
+  EXPECT_TRUE(client.await_status(has_generation(3)));
+
+  const std::string heard = systemd.heard();
+  EXPECT_NE(heard.find("RELOADING=1\nMONOTONIC_USEC="), std::string::npos) << heard;
+  EXPECT_GT(heard.rfind("READY=1"), heard.find("RELOADING=1"));
+}
+
+}  // namespace
+}  // namespace crepes
