@@ -35,8 +35,6 @@ int run(const std::string& file) {
   Watchdog watchdog(runtime.heartbeats());
   log_message(LogLevel::kInfo, "running with " + file);
   Watchdog::tell_ready();
-  Watchdog::tell_status("running with " + file +
-                        "; `crepesctl status` tells sensors and neighbors");
   for (Signal signal = signals.wait_a_second(); signal != Signal::kStop;
        signal = signals.wait_a_second()) {
     if (signal == Signal::kReload) {

@@ -11,7 +11,9 @@
 
 #include "daemon/logging.hpp"
 #include "daemon/process_load.hpp"
+#include "daemon/service_line.hpp"
 #include "daemon/subscription_server.hpp"
+#include "daemon/watchdog.hpp"
 #include "net/peer_link.hpp"
 #include "net/udp_socket.hpp"
 
@@ -106,9 +108,20 @@ class NetLoop {
     }
     if (auto status = stage_.config_status.try_pop()) config_status_ = std::move(*status);
     server_->serve(clock_.now());
+    tell_service(clock_.now());
   }
 
  private:
+  /// Once a second, if there is news.
+  void tell_service(Timestamp now) {
+    if (now < service_due_) return;
+    service_due_ = now + std::chrono::seconds{1};
+    std::string line = service_line(status());
+    if (line == service_line_) return;
+    Watchdog::tell_status(line);
+    service_line_ = std::move(line);
+  }
+
   /// Those who subscribed at other addresses are gone.
   void open_server() {
     server_.reset();
@@ -186,6 +199,8 @@ class NetLoop {
   std::optional<SubscriptionServer> server_;
   EstimatorStatus estimator_;
   std::map<std::string, SensorStatus> sensors_;
+  std::string service_line_;
+  Timestamp service_due_{};
 };
 
 }  // namespace

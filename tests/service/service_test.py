@@ -101,9 +101,10 @@ def start(subscriber):
     started = run("systemctl", "start", "crepesd")
     check("it starts and says that it is ready within 2 s", started.returncode == 0 and time.monotonic() - begin < 2.0,
           f"{time.monotonic() - begin:.2f} s")
-    check("it says in a few words how it is", shown("StatusText") != "", shown("StatusText"))
     _, came = subscriber.pose(NEIGHBOR)
     check("it finds its neighbor within 10 s", came is not None and came - begin < 10.0, f"{came - begin:.2f} s" if came else "")
+    told, _ = awaited(lambda: "1 of 3 neighbors located (r3: never heard" in shown("StatusText"), 5.0)
+    check("it says in one line how it is", told, shown("StatusText"))
     status = pathlib.Path(f"/proc/{pid()}/status").read_text()
     owner = run("id", "-u", "crepes").stdout.strip()
     check("it runs as user crepes without capabilities",
@@ -125,11 +126,17 @@ def reloading(subscriber):
     check("by the same process, which is ready again", awaited(lambda: shown("ActiveState") == "active")[0] and pid() == before)
     subscriber.drain()
     check("and it goes on with poses", subscriber.pose(NEIGHBOR, 2.0)[0] is not None)
+    CONFIG.write_text(FIRST.replace("seed: 1", "seed: 2"))
+    run("systemctl", "reload", "crepesd")
+    told, _ = awaited(lambda: "restart to apply: sim" in shown("StatusText"), 5.0)
+    check("what needs a restart is told", told, shown("StatusText"))
     CONFIG.write_text(FIRST.replace("noise_m: 0.05", "noise_m: -1"))
     check("a faulty file fails the reload", run("systemctl", "reload", "crepesd").returncode != 0)
     run("systemctl", "kill", "--signal=HUP", "crepesd")  # past the check of the unit
     subscriber.drain()
     check("and changes nothing", subscriber.pose(NEIGHBOR, 2.0)[0] is not None and pid() == before)
+    told, _ = awaited(lambda: "reload refused" in shown("StatusText") and "noise_m" in shown("StatusText"), 5.0)
+    check("but is told", told, shown("StatusText"))
     CONFIG.write_text(FIRST)
     run("systemctl", "reload", "crepesd")
 
