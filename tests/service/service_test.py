@@ -10,7 +10,8 @@ import time
 from subscriber import Subscriber
 
 CONFIG = pathlib.Path("/etc/crepes/crepesd.yaml")
-FIRST = pathlib.Path("/crepes/r1.yaml").read_text()
+# With the socket for recordings where it is by default.
+FIRST = re.sub(r"(?m)^recording:.*\n?", "", pathlib.Path("/crepes/r1.yaml").read_text())
 NEIGHBOR = 2
 
 failures = []
@@ -141,6 +142,12 @@ def reloading(subscriber):
     run("systemctl", "reload", "crepesd")
 
 
+def recording():
+    done = run("crepesctl", "record", "/tmp/recording", "--duration", "1")
+    rows = sum(path.read_text().count("\n") for path in pathlib.Path("/tmp/recording").rglob("*.csv"))
+    check("what it measures can be recorded", done.returncode == 0 and rows > 200, f"{rows} rows {done.stderr.strip()}")
+
+
 def stop():
     begin = time.monotonic()
     run("systemctl", "stop", "crepesd")
@@ -168,6 +175,7 @@ def main():
     comes_back(subscriber, "killed", lambda process: os.kill(process, signal.SIGKILL), 3.0)
     comes_back(subscriber, "hung", lambda process: os.kill(process, signal.SIGSTOP), 3.0 + 3.0)  # WatchdogSec and as above
     reloading(subscriber)
+    recording()
     stop()
     neighbor.terminate()
     neighbor.wait()
