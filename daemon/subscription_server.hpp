@@ -20,7 +20,8 @@ class SubscriptionServer {
   /// Addresses that cannot be served are left out and told by `faults`.
   SubscriptionServer(const Config& config, SubscriptionDesk::StatusSource status);
 
-  /// Names, limits and push targets from now on; subscribers stay. `listen` and `port` must be the same.
+  /// Names, limits and push targets from now on; subscribers stay. `listen` and `port` must be the
+  /// same.
   void reconfigure(const Config& config);
 
   /// Answers the requests that wait on all sockets, a bounded number of them.

@@ -37,8 +37,7 @@ std::string sensors_of(const StatusMessage& status) {
 }
 
 std::string neighbors_of(const StatusMessage& status) {
-  Rows rows{
-      {"neighbor", "state", "heard ms ago", "lost %", "clock s", "+- ms", "ppm", "why not"}};
+  Rows rows{{"neighbor", "state", "heard ms ago", "lost %", "clock s", "+- ms", "ppm", "why not"}};
   for (const auto& neighbor : status.neighbors) {
     std::vector<std::string> row{
         neighbor.name.empty() ? std::to_string(neighbor.neighbor.value) : neighbor.name,
