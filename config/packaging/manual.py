@@ -59,6 +59,10 @@ def configuration(file):
     return out + [".SH SEE ALSO", ".BR crepesd (8),", ".BR crepesctl (1)"]
 
 
+def commands_in(help):
+    return re.findall(r"^  ([a-z][\w-]*)  ", help.split("Subcommands:")[1], re.MULTILINE)
+
+
 def tool(program):
     def told(*arguments):
         return subprocess.run([program, *arguments, "--help"], check=True, capture_output=True, text=True).stdout.strip().replace(program, "crepesctl")
@@ -66,11 +70,16 @@ def tool(program):
     out = heading("crepesctl", 1, "User commands")
     out += ["crepesctl \\- watch, set up and replay robots that localize each other", ".SH SYNOPSIS", ".B crepesctl", ".I COMMAND",
             "[options]", ".SH DESCRIPTION", "The tool around", ".BR crepesd (8).", ".SH COMMANDS"]
-    commands = re.findall(r"^  ([a-z][\w-]*)  ", told().split("Subcommands:")[1], re.MULTILINE)
+    commands = commands_in(told())
     assert commands
     for command in commands:
         out += [f".SS {roff(command)}", ".EX", roff(told(command)), ".EE"]
+        if "Subcommands:" in told(command):
+            for inner in commands_in(told(command)):
+                out += [f".SS {roff(command)} {roff(inner)}", ".EX", roff(told(command, inner)), ".EE"]
     return out + [".SH EXIT STATUS", "0 done, 1 the input is wrong (what and where on stderr) or there was no answer, 2 wrong usage.",
+                  ".SH JSON", "With \\-\\-json, standard output has JSON objects, one a line, and nothing else. Progress, what is refused and",
+                  "errors go to standard error.",
                   ".SH SEE ALSO", ".BR crepesd (8),", ".BR crepesd.yaml (5)"]
 
 

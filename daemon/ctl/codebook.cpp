@@ -1,10 +1,15 @@
 #include "daemon/ctl/codebook.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <vector>
+
+#include "daemon/ctl/json_line.hpp"
 
 namespace crepes {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMinSlots = 8;
 constexpr std::size_t kMaxSlots = 32;
@@ -31,6 +36,15 @@ std::string library_text(const CodebookOptions& options, const Codebook& book) {
     text.append(", pattern: \"").append(book.patterns[i]).append("\"}\n");
   }
   return text;
+}
+
+std::string library_json(const Codebook& book) {
+  Json members = Json::array();
+  for (const std::string& pattern : book.patterns) {
+    const std::size_t id = members.size() + 1;
+    members.push_back({{"id", id}, {"name", "r" + text_of(id)}, {"pattern", pattern}});
+  }
+  return json_line({{"swarm", {{"members", std::move(members)}}}});
 }
 
 /// The least change of one rule with which there are enough patterns; empty if none is enough.
@@ -85,7 +99,7 @@ Result<std::string> codebook(const CodebookOptions& options) {
   const Codebook book = search_codebook(options.rules, options.ids, options.search);
   if (book.patterns.size() < options.ids)
     return tl::unexpected(shortfall(options, book.patterns.size()));
-  return library_text(options, book);
+  return options.json ? library_json(book) : library_text(options, book);
 }
 
 }  // namespace crepes

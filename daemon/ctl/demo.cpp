@@ -16,7 +16,6 @@
 #include "daemon/ctl/demo_swarm.hpp"
 #include "daemon/ctl/live_screen.hpp"
 #include "daemon/ctl/neighbor_view.hpp"
-#include "daemon/ctl/pair_score.hpp"
 #include "daemon/ctl/scratch_directory.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/monotonic_clock.hpp"
@@ -47,8 +46,6 @@ struct Pair {
   std::vector<NeighborPose> poses;
   std::optional<Duration> first_pose;  ///< after the daemons' start
 };
-
-std::string name_of_robot(RobotId id) { return "r" + std::to_string(id.value); }
 
 /// The last lines of a log.
 std::string tail_of(const fs::path& log) {
@@ -92,8 +89,10 @@ class Demo {
 
   /// Until the time is over, a daemon dies, or somebody says stop.
   Result<void> run(StopSignals& stop) {
-    LiveScreen screen;
-    const Duration redraw_period = screen.is_terminal() ? Duration{200ms} : Duration{5s};
+    std::optional<LiveScreen> screen;
+    if (options_.show_table) screen.emplace();
+    const Duration redraw_period =
+        screen && !screen->is_terminal() ? Duration{5s} : Duration{200ms};
     Timestamp redraw = start_;
     Timestamp renewal = start_;
     while (world_s() < options_.for_s && !stop.requested()) {
@@ -106,7 +105,8 @@ class Demo {
       if (auto done = listen(); !done) return done;
       if (clock_.now() < redraw) continue;
       redraw = clock_.now() + redraw_period;
-      screen.show(table());
+      if (screen) screen->show(table());
+      if (options_.on_progress) options_.on_progress(world_s() / options_.for_s);
     }
     return {};
   }
@@ -117,19 +117,20 @@ class Demo {
     daemons_.clear();
   }
 
-  /// Of each pair the whole run; an error names the pairs without a pose.
-  [[nodiscard]] Result<void> sum_up() const {
-    std::vector<Row> rows{{"pair", "first pose s", "avail %", "median m", "max m", "median deg",
-                           "max deg", "direct", "graph", "predicted"}};
-    std::string missing;
+  /// Of each pair the whole run.
+  [[nodiscard]] DemoSummary sum_up() const {
+    DemoSummary summary{.scenario = options_.scenario,
+                        .seed = options_.seed,
+                        .from_s = scored_from_s(),
+                        .to_s = end_s_,
+                        .pairs = {}};
     for (const Pair& pair : pairs_) {
-      rows.push_back(summary_row(pair));
-      if (!pair.first_pose) missing += " " + name_of(pair);
+      summary.pairs.push_back({.observer = robots_.at(pair.observer).robot.config.robot.id,
+                               .neighbor = pair.neighbor,
+                               .first_pose = pair.first_pose,
+                               .score = score_of(pair)});
     }
-    print(text_table(rows) + "availability and errors from second " + fixed(scored_from_s(), 1) +
-          " to " + fixed(end_s_, 1) + "\n");
-    if (missing.empty()) return {};
-    return fail(ErrorCode::kNotFound, "never a pose of:" + missing);
+    return summary;
   }
 
  private:
@@ -270,22 +271,11 @@ class Demo {
             ""};
   }
 
-  [[nodiscard]] Row summary_row(const Pair& pair) const {
+  [[nodiscard]] PairScore score_of(const Pair& pair) const {
     const RobotClock& clock = robots_.at(pair.observer).robot.clock;
-    const PairScore score =
-        score_pair(pair.poses, [&](Timestamp t) { return truth(pair, t); }, clock.local(0.0),
-                   {.begin = clock.local(scored_from_s()), .end = clock.local(end_s_ - kOnTheWay)});
-    const ErrorStatistics p = statistics_of(score.position_errors_m);
-    const ErrorStatistics r = statistics_of(score.rotation_errors_rad);
-    Row row{name_of(pair),
-            pair.first_pose ? fixed(to_seconds(*pair.first_pose), 2) : "never",
-            fixed(100.0 * score.availability, 1),
-            fixed(p.median, 3),
-            fixed(p.max, 3),
-            fixed(kDegPerRad * r.median, 2),
-            fixed(kDegPerRad * r.max, 2)};
-    for (const std::size_t count : score.modes) row.push_back(std::to_string(count));
-    return row;
+    return score_pair(
+        pair.poses, [&](Timestamp t) { return truth(pair, t); }, clock.local(0.0),
+        {.begin = clock.local(scored_from_s()), .end = clock.local(end_s_ - kOnTheWay)});
   }
 
   DemoOptions options_;
@@ -301,14 +291,14 @@ class Demo {
 
 }  // namespace
 
-Result<void> demo(const DemoOptions& options) {
+Result<DemoSummary> demo(const DemoOptions& options) {
   const Result<ScratchDirectory> directory = ScratchDirectory::create(options.keep);
   if (!directory) return tl::unexpected(directory.error());
   StopSignals stop;
   Demo demo(options);
-  Result<void> ran = demo.start(directory->path()).and_then([&] { return demo.run(stop); });
+  const Result<void> ran = demo.start(directory->path()).and_then([&] { return demo.run(stop); });
   demo.stop();
-  if (!ran) return ran;
+  if (!ran) return tl::unexpected(ran.error());
   return demo.sum_up();
 }
 

@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 
+#include "daemon/ctl/demo_summary.hpp"
 #include "estimator/core/config.hpp"
 #include "estimator/core/result.hpp"
 
@@ -15,10 +17,12 @@ struct DemoOptions {
   double for_s = 30.0;
   std::uint16_t port = 47481;  ///< of the first robot's subscription; the others follow
   std::filesystem::path keep;  ///< where configurations and logs stay; empty: nowhere
+  bool show_table = true;      ///< a live one on standard output
+  std::function<void(double)> on_progress{};  ///< share done, 0..1, now and then
 };
 
 /// Starts the daemons, shows every ordered pair against the simulated truth, sums up. An error if a
-/// pair never got a pose or a daemon died.
-[[nodiscard]] Result<void> demo(const DemoOptions& options);
+/// daemon died.
+[[nodiscard]] Result<DemoSummary> demo(const DemoOptions& options);
 
 }  // namespace crepes

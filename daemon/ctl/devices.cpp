@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "daemon/ctl/json_line.hpp"
 #include "drivers/camera/aravis_camera.hpp"
 #include "drivers/camera/v4l2_device.hpp"
 #include "drivers/monotonic_clock.hpp"
@@ -17,6 +18,7 @@ namespace crepes {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
 /// Fastest first: a slower line looks like noise to a fast port, and is then heard right.
 constexpr std::array kRates{921600, 460800, 115200};
@@ -79,14 +81,14 @@ std::string text_of(const SerialDevice& device) {
          ": port: \"" + device.port + "\", baud: " + std::to_string(device.baud) + "\n";
 }
 
-nlohmann::json json_of(const CameraDevice& camera) {
+Json json_of(const CameraDevice& camera) {
   return {{"driver", camera.driver},
           {"device", camera.found.device},
           {"description", camera.found.description}};
 }
 
-nlohmann::json json_of(const SerialDevice& device) {
-  nlohmann::json json{{"port", device.port}};
+Json json_of(const SerialDevice& device) {
+  Json json{{"port", device.port}};
   if (!device.fault.empty()) json["fault"] = device.fault;
   if (!device.speaks) return json;
   json["speaks"] = name_of(*device.speaks);
@@ -100,11 +102,10 @@ Result<std::string> list_devices(const DevicesOptions& options) {
   const std::vector<CameraDevice> cameras = find_cameras(options);
   const std::vector<SerialDevice> serial = find_serial_devices(options);
   if (options.json) {
-    nlohmann::json json{{"cameras", nlohmann::json::array()},
-                        {"serial_ports", nlohmann::json::array()}};
+    Json json{{"cameras", Json::array()}, {"serial_ports", Json::array()}};
     for (const auto& camera : cameras) json["cameras"].push_back(json_of(camera));
     for (const auto& device : serial) json["serial_ports"].push_back(json_of(device));
-    return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    return json_line(json);
   }
   std::string text = cameras.empty() ? "no camera\n" : "";
   for (const auto& camera : cameras) text += text_of(camera);

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/swarm_score.hpp"
 #include "daemon/ctl/text_table.hpp"
 
@@ -133,18 +134,13 @@ std::string comparison_table(const SwarmScore& a, const SwarmScore& b) {
   return text_table(rows);
 }
 
-/// Unknown values are left out.
-void put(Json& object, const std::string& key, double value) {
-  if (std::isfinite(value)) object[key] = value;
-}
-
 Json statistics_json(const std::vector<double>& errors, double scale) {
   const ErrorStatistics s = statistics_of(errors);
   Json json = Json::object();
-  put(json, "rmse", scale * s.rmse);
-  put(json, "mean", scale * s.mean);
-  put(json, "median", scale * s.median);
-  put(json, "max", scale * s.max);
+  put_finite(json, "rmse", scale * s.rmse);
+  put_finite(json, "mean", scale * s.mean);
+  put_finite(json, "median", scale * s.median);
+  put_finite(json, "max", scale * s.max);
   return json;
 }
 
@@ -159,8 +155,8 @@ Json pair_json(const ScoredPair& pair) {
   json["rotation_deg"] = statistics_json(score.rotation_errors_rad, kDegPerRad);
   for (const PoseMode mode : {PoseMode::kDirect, PoseMode::kGraph, PoseMode::kPredicted})
     json["modes"][std::string(name_of(mode))] = score.modes.at(static_cast<std::size_t>(mode));
-  put(json, "median_nees", median_of(score.nees));
-  put(json, "share_within_95", share_within(score.nees, kNees95));
+  put_finite(json, "median_nees", median_of(score.nees));
+  put_finite(json, "share_within_95", share_within(score.nees, kNees95));
   json["divergences"] = score.divergences;
   json["bad_covariances"] = score.bad_covariances;
   json["max_age_s"] = to_seconds(score.max_age);
@@ -173,12 +169,12 @@ Json swarm_json(const SwarmScore& swarm) {
   for (const ScoredPair& pair : swarm.pairs) json["pairs"].push_back(pair_json(pair));
   const Overall all = overall_of(swarm);
   Json& overall = json["overall"] = Json::object();
-  put(overall, "mean_availability", all.mean_availability);
-  put(overall, "mean_position_rmse_m", all.mean_position_rmse_m);
-  put(overall, "mean_rotation_rmse_deg", kDegPerRad * all.mean_rotation_rmse_rad);
-  put(overall, "median_position_m", all.pooled_median_position_m);
-  put(overall, "median_rotation_deg", kDegPerRad * all.pooled_median_rotation_rad);
-  put(overall, "max_age_s", to_seconds(all.max_age));
+  put_finite(overall, "mean_availability", all.mean_availability);
+  put_finite(overall, "mean_position_rmse_m", all.mean_position_rmse_m);
+  put_finite(overall, "mean_rotation_rmse_deg", kDegPerRad * all.mean_rotation_rmse_rad);
+  put_finite(overall, "median_position_m", all.pooled_median_position_m);
+  put_finite(overall, "median_rotation_deg", kDegPerRad * all.pooled_median_rotation_rad);
+  put_finite(overall, "max_age_s", to_seconds(all.max_age));
   json["clocks"] = Json::array();
   for (const ClockScore& clock : swarm.clocks) {
     json["clocks"].push_back({{"observer", clock.observer.value},
@@ -200,14 +196,14 @@ Result<std::string> evaluate(const EvaluateOptions& options) {
       score_swarm(options.results, *manifest, *truth, options.after_s, options.on_progress);
   if (!score) return tl::unexpected(score.error());
   if (options.against.empty())
-    return options.json ? swarm_json(*score).dump(2) + "\n" : table_of(*score, options.after_s);
+    return options.json ? json_line(swarm_json(*score)) : table_of(*score, options.after_s);
 
   Result<SwarmScore> against =
       score_swarm(options.against, *manifest, *truth, options.after_s, options.on_progress);
   if (!against) return tl::unexpected(against.error());
   score_common_rows(*score, *against, *manifest, *truth, options.after_s);
   if (!options.json) return comparison_table(*score, *against);
-  return Json{{"results", swarm_json(*score)}, {"against", swarm_json(*against)}}.dump(2) + "\n";
+  return json_line({{"results", swarm_json(*score)}, {"against", swarm_json(*against)}});
 }
 
 }  // namespace crepes

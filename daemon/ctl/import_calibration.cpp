@@ -1,13 +1,18 @@
 #include "daemon/ctl/import_calibration.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "daemon/config_file.hpp"
+#include "daemon/config_writer.hpp"
 #include "daemon/ctl/csv_file.hpp"
+#include "daemon/ctl/json_line.hpp"
 #include "daemon/imported_calibration.hpp"
 
 namespace crepes {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxFileBytes = 1 << 20;
 
@@ -30,6 +35,35 @@ void join(ImportedCalibration& all, ImportedCalibration more, const std::string&
   if (more.imu) all.imu = more.imu;
 }
 
+Json json_of(const CameraConfig& camera) {
+  const bool is_double_sphere = camera.camera_model == CameraModelKind::kDoubleSphere;
+  Json json{{"name", camera.name}, {"camera_model", is_double_sphere ? "ds" : "pinhole"}};
+  json["intrinsics"] = camera.intrinsics;
+  if (!is_double_sphere) {
+    json["distortion_model"] = "equidistant";
+    json["distortion_coeffs"] = camera.distortion_coeffs;
+  }
+  json["resolution"] = camera.resolution;
+  json["T_cam_imu"] = Json::parse(yaml_of(camera.T_cam_imu));  // rows of numbers are the same there
+  json["timeshift_cam_imu"] = camera.timeshift_cam_imu;
+  return json;
+}
+
+Json json_of(const ImuConfig& imu) {
+  return {{"update_rate", imu.update_rate},
+          {"accelerometer_noise_density", imu.accelerometer_noise_density},
+          {"gyroscope_noise_density", imu.gyroscope_noise_density},
+          {"accelerometer_random_walk", imu.accelerometer_random_walk},
+          {"gyroscope_random_walk", imu.gyroscope_random_walk}};
+}
+
+Json json_of(const ImportedCalibration& calibration) {
+  Json json = Json::object();
+  for (const CameraConfig& camera : calibration.cameras) json["cameras"].push_back(json_of(camera));
+  if (calibration.imu) json["imu"] = json_of(*calibration.imu);
+  return json;
+}
+
 /// What our own configuration says against these sections; the rest of it is not there.
 std::vector<ConfigFault> faults_here(const std::string& sections) {
   std::vector<ConfigFault> faults = check_config_text(sections, "as imported").faults;
@@ -41,7 +75,7 @@ std::vector<ConfigFault> faults_here(const std::string& sections) {
 
 }  // namespace
 
-Result<std::string> import_calibration(const std::vector<std::filesystem::path>& files) {
+Result<std::string> import_calibration(const std::vector<std::filesystem::path>& files, bool json) {
   ImportedCalibration all;
   std::vector<ConfigFault> faults;
   std::string names;
@@ -61,6 +95,7 @@ Result<std::string> import_calibration(const std::vector<std::filesystem::path>&
       message += (message.empty() ? "" : "\n") + to_string(fault);
     return fail(ErrorCode::kConfig, std::move(message));
   }
+  if (json) return json_line(json_of(all));
   return "# Imported by crepesctl import-calibration from " + names + "\n" + sections;
 }
 

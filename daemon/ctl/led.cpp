@@ -1,23 +1,22 @@
 #include "daemon/ctl/led.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
-#include <span>
+#include <nlohmann/json.hpp>
 #include <string_view>
 #include <vector>
 
 #include "daemon/config_file.hpp"
+#include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/led_line.hpp"
+#include "daemon/ctl/led_report.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/monotonic_clock.hpp"
 #include "estimator/vision/id_library.hpp"
 
 namespace crepes {
 namespace {
-
-constexpr double kTicksPerMs = 1000.0 / int{LED_TICK_US};
 
 /// The section `swarm`; a library has nothing else, and what else a configuration has is not ours.
 Result<SwarmConfig> load_swarm(const std::filesystem::path& path) {
@@ -53,44 +52,13 @@ led_settings with_duty(led_settings settings, double duty, std::uint16_t period)
   return settings;
 }
 
-std::string text_of(const led_settings& settings) {
-  if (settings.robot_id == 0) return "never set: dark\n";
-  const auto ms = [](int ticks) { return fixed(ticks / kTicksPerMs, 1) + " ms"; };
-  std::string text = "id " + std::to_string(settings.robot_id) + ": ";
-  if (settings.slots == 2) {
-    text += "lit " + ms(settings.lit_ticks) + " of " + ms(settings.lit_ticks + settings.dark_ticks);
-  } else {
-    text += "pattern ";
-    for (int i = 0; i < settings.slots; ++i) text += (settings.pattern >> i & 1U) != 0 ? '1' : '0';
-    text += ", slots of " + ms(settings.lit_ticks);
-  }
-  text += "\nbrightness";
-  for (const std::uint8_t percent : std::span(settings.brightness))
-    text += " " + std::to_string(percent);
-  return text + " %\n";
-}
-
-std::string text_of(const led_status& status) {
-  constexpr std::array<std::string_view, 3> kClocks{
-      "crystal", "internal oscillator: the crystal does not start",
-      "internal oscillator without PLL: the crystal does not start"};
-  std::string text = "firmware";
-  char separator = ' ';
-  for (const std::uint8_t part : std::span(status.version)) {
-    text += separator + std::to_string(part);
-    separator = '.';
-  }
-  text += ", clock: ";
-  text += status.clock < kClocks.size() ? kClocks.at(status.clock) : "unknown";
-  text += ", " + std::to_string(status.skipped) + " bytes skipped";
-  return text + (status.was_watchdog != 0 ? ", restarted by its watchdog\n" : "\n");
-}
-
-Result<std::string> text_of(LedLine& line) {
+/// What the board holds and how it is.
+Result<std::string> report_of(LedLine& line, bool json) {
   const Result<led_settings> settings = line.settings();
   if (!settings) return tl::unexpected(settings.error());
-  return line.status().map(
-      [&](const led_status& status) { return text_of(*settings) + text_of(status); });
+  return line.status().map([&](const led_status& status) {
+    return json ? board_json(*settings, status) : board_text(*settings, status);
+  });
 }
 
 }  // namespace
@@ -134,13 +102,13 @@ Result<std::string> led_set(const LedOptions& options) {
   if (!settings) return tl::unexpected(settings.error());
   Result<LedLine> line = LedLine::open(options.port, clock);
   if (!line) return tl::unexpected(line.error());
-  return line->set(*settings).and_then([&] { return text_of(*line); });
+  return line->set(*settings).and_then([&] { return report_of(*line, options.json); });
 }
 
 Result<std::string> led_get(const LedOptions& options) {
   const MonotonicClock clock;
   Result<LedLine> line = LedLine::open(options.port, clock);
-  return line.and_then([](LedLine& open) { return text_of(open); });
+  return line.and_then([&](LedLine& open) { return report_of(open, options.json); });
 }
 
 Result<std::string> led_test(const LedOptions& options) {
@@ -148,7 +116,10 @@ Result<std::string> led_test(const LedOptions& options) {
   Result<LedLine> line = LedLine::open(options.port, clock);
   if (!line) return tl::unexpected(line.error());
   const auto ms = std::chrono::milliseconds(std::llround(options.test_s * 1e3));
-  return line->test(ms).map([&] { return "lit for " + fixed(options.test_s, 1) + " s\n"; });
+  return line->test(ms).map([&] {
+    return options.json ? json_line({{"lit_s", options.test_s}})
+                        : "lit for " + fixed(options.test_s, 1) + " s\n";
+  });
 }
 
 }  // namespace crepes

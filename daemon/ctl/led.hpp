@@ -17,13 +17,14 @@ struct LedOptions {
   std::filesystem::path library{};   ///< any file with a section swarm
   std::vector<int> brightness{100};  ///< percent: of all LEDs, or of each of six
   double test_s = 5.0;
+  bool json = false;
 };
 
 /// How the board of swarm member `id` has to blink. Refuses times that are no multiples of a tick.
 [[nodiscard]] Result<led_settings> led_settings_of(const SwarmConfig& swarm, RobotId id,
                                                    const std::vector<int>& brightness);
 
-/// Each returns what to tell the user.
+/// Each returns what to tell the user, or in JSON a program.
 [[nodiscard]] Result<std::string> led_set(const LedOptions& options);
 [[nodiscard]] Result<std::string> led_get(const LedOptions& options);
 [[nodiscard]] Result<std::string> led_test(const LedOptions& options);

@@ -36,7 +36,7 @@ Result<double> measure_rate(SerialPort port, std::chrono::milliseconds duration)
 
 }  // namespace
 
-Result<std::string> set_up_witmotion(const WitMotionSetup& setup) {
+Result<double> set_up_witmotion(const WitMotionSetup& setup) {
   constexpr double kWithin = 0.25;  // the sensor's rates are at least a factor of two apart
   const auto commands = witmotion_setup(setup.rate_hz);
   if (!commands) return tl::unexpected(commands.error());
@@ -46,11 +46,9 @@ Result<std::string> set_up_witmotion(const WitMotionSetup& setup) {
     return tl::unexpected(sent.error());
   const Result<double> rate_hz = measure_rate(std::move(*port), setup.listen);
   if (!rate_hz) return tl::unexpected(rate_hz.error());
-  const std::string measured = std::to_string(std::lround(*rate_hz)) + " samples a second";
-  if (std::abs(*rate_hz - setup.rate_hz) > kWithin * setup.rate_hz)
-    return fail(ErrorCode::kIo, setup.port + ": " + measured + ", not as asked");
-  return setup.port + ": " + measured + "; set imu.update_rate to " +
-         std::to_string(setup.rate_hz) + ".0\n";
+  if (std::abs(*rate_hz - setup.rate_hz) <= kWithin * setup.rate_hz) return rate_hz;
+  return fail(ErrorCode::kIo, setup.port + ": " + std::to_string(std::lround(*rate_hz)) +
+                                  " samples a second, not as asked");
 }
 
 }  // namespace crepes

@@ -16,7 +16,8 @@ struct WitMotionSetup {
   std::chrono::milliseconds listen{2000};  ///< to the samples that must come then
 };
 
-/// Sets outputs and rate, saves both in the sensor, and listens whether it obeys: what to tell.
-[[nodiscard]] Result<std::string> set_up_witmotion(const WitMotionSetup& setup);
+/// Sets outputs and rate, saves both in the sensor, and listens whether it obeys: the samples a
+/// second that come. Another rate than was asked for is an error.
+[[nodiscard]] Result<double> set_up_witmotion(const WitMotionSetup& setup);
 
 }  // namespace crepes

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/ctl/full_status.hpp"
+#include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
 
 namespace crepes {
@@ -88,17 +89,17 @@ std::string table_of(const std::vector<Source>& sources) {
   return text_table(rows);
 }
 
-std::string json_of(const std::vector<Source>& sources) {
+std::string json_of(const std::vector<Source>& sources, double elapsed_s) {
   Json list = Json::array();
   for (const Source& source : sources) {
     Json json{{"peer", source.neighbor.value}, {"name", source.name}, {"source", source.kind}};
     json["rate_hz"] = source.rate_hz;
-    if (std::isfinite(source.age_s)) json["age_s"] = source.age_s;
+    put_finite(json, "age_s", source.age_s);
     json["used"] = source.used;
     json["refused"] = source.refused;
     list.push_back(std::move(json));
   }
-  return list.dump(2) + "\n";
+  return json_line({{"over_s", elapsed_s}, {"sources", std::move(list)}});
 }
 
 }  // namespace
@@ -136,7 +137,7 @@ Result<std::string> sources(const SourcesOptions& options) {
   const double elapsed_s = after->message.uptime_s - before->message.uptime_s;
   if (!(elapsed_s > 0.0)) return fail(ErrorCode::kIo, "the daemon was restarted meanwhile");
   const auto found = sources_of(before->message, after->message, elapsed_s);
-  return options.json ? json_of(found) : table_of(found);
+  return options.json ? json_of(found, elapsed_s) : table_of(found);
 }
 
 }  // namespace crepes

@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/spots.hpp"
 #include "daemon/ctl/text_table.hpp"
 
@@ -44,11 +45,6 @@ std::string to_text(const Rejected& rejected) {
 
 double mean_spots(const SpotsSummary& summary) {
   return static_cast<double>(summary.all_spots) / static_cast<double>(summary.pictures);
-}
-
-// A file's name need not be UTF-8; JSON must.
-std::string dump(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace
@@ -114,7 +110,7 @@ std::string picture_json(const PictureFindings& findings) {
     json["robots"].push_back(
         {{"id", robot.id.value}, {"name", robot.name}, {"u", robot.u_px}, {"v", robot.v_px}});
   }
-  return dump(json);
+  return json_line(json);
 }
 
 std::string summary_text(const SpotsSummary& summary) {
@@ -168,7 +164,7 @@ std::string summary_json(const SpotsSummary& summary) {
   }
   const std::string advice = exposure_advice(summary);
   if (!advice.empty()) json["advice"] = advice;
-  return dump(json);
+  return json_line(json);
 }
 
 }  // namespace crepes

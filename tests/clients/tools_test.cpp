@@ -1,36 +1,14 @@
 /// crepesctl as a user or a script runs it, with live daemons of a simulated pair.
 #include <gtest/gtest.h>
-#include <poll.h>
 
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/child_process.hpp"
-#include "daemon/ctl/csv_file.hpp"
-#include "daemon/ctl/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
-#include "tests/support/live_daemon.hpp"
+#include "tests/clients/tool_run.hpp"
 
 namespace crepes {
 namespace {
-
-struct Ending {
-  std::string how;
-  std::string output;  ///< standard output and error
-};
-
-Ending run(const std::string& program, const std::vector<std::string>& arguments) {
-  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
-  const auto log = scratch.path() / "log";
-  auto child = ChildProcess::start(program, arguments, log);
-  if (!child) return {child.error().message, ""};
-  const MonotonicClock clock;
-  const Timestamp end = clock.now() + kPatience;
-  while (!child->ending() && clock.now() < end) ::poll(nullptr, 0, 20);
-  return {child->ending().value_or("still running"), read_text_file(log).value_or("")};
-}
-
-Ending crepesctl(const std::vector<std::string>& arguments) { return run(CREPES_TOOL, arguments); }
 
 class Tools : public LiveDaemon {
  protected:
@@ -53,11 +31,11 @@ TEST_F(Tools, WaitForAPoseAndTellOfIt) {
 
   const Ending nobody = ask("waitpose", {"--peer", "9", "--timeout", "1"});
   EXPECT_EQ(nobody.how, "exit code 1");
-  EXPECT_NE(nobody.output.find("no other robot of this swarm"), std::string::npos) << nobody.output;
+  EXPECT_NE(nobody.errors.find("no other robot of this swarm"), std::string::npos) << nobody.errors;
 
   const Ending vague = ask("waitpose", {"--peer", "2", "--timeout", "1", "--max-sigma", "1e-9"});
   EXPECT_EQ(vague.how, "exit code 1");
-  EXPECT_NE(vague.output.find("is known to"), std::string::npos) << vague.output;
+  EXPECT_NE(vague.errors.find("is known to"), std::string::npos) << vague.errors;
 }
 
 TEST_F(Tools, ShowTheStatusOnOneScreenAndInJson) {
@@ -85,7 +63,7 @@ TEST_F(Tools, ShowTheStatusOnOneScreenAndInJson) {
 TEST_F(Tools, NameTheSourcesOfAPose) {
   expect_true_poses(first_);
 
-  const Json sources = Json::parse(ask("sources", {"--json"}).output);
+  const Json sources = Json::parse(ask("sources", {"--json"}).output)["sources"];
 
   for (const char* kind : {"bearing", "peer_bearing", "range", "reports"}) {
     const auto source =
@@ -115,7 +93,7 @@ TEST(ToolsAlone, SayThatNobodyAnswersAndEndWithOne) {
   for (const char* command : {"status", "watch", "sources"}) {
     const Ending ending = crepesctl({command, "--port", port});
     EXPECT_EQ(ending.how, "exit code 1") << command;
-    EXPECT_NE(ending.output.find("no answer from 127.0.0.1"), std::string::npos) << ending.output;
+    EXPECT_NE(ending.errors.find("no answer from 127.0.0.1"), std::string::npos) << ending.errors;
   }
   EXPECT_EQ(crepesctl({"waitpose", "--peer", "2", "--timeout", "0.3", "--port", port}).how,
             "exit code 1");

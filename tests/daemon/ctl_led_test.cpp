@@ -97,6 +97,13 @@ TEST(LedCommandLine, ProgramsABoardThatThenBlinksAsTheLibrarySays) {
             std::string::npos)
       << *told;
   EXPECT_EQ(led_get({.port = board.port()}).value_or(""), *told);
+  EXPECT_EQ(led_get({.port = board.port(), .json = true}).value_or(""),
+            R"({"id":3,"pattern":"00100100111100111111","slot_ms":10.0,)"
+            R"("brightness":[80,70,60,50,40,30],"firmware":"1.2.3","clock":"crystal",)"
+            R"("skipped_bytes":0,"restarted_by_watchdog":false})"
+            "\n");
+  EXPECT_EQ(led_test({.port = board.port(), .test_s = 0.5, .json = true}).value_or(""),
+            "{\"lit_s\":0.5}\n");
   const led_settings kept = board.stop();
   const BlinkCode code = *BlinkCode::from_pattern("00100100111100111111", 10ms);
   led_blink blink = led_blink_start(&kept);
@@ -120,6 +127,8 @@ TEST(LedCommandLine, TellsWhyTheBoardRefuses) {
 
   EXPECT_EQ(error_of(told), board.port() + ": refused: " + describe(LED_BAD_FLASH));
   EXPECT_NE(led_get({.port = board.port()}).value_or("").find("never set"), std::string::npos);
+  const std::string json = led_get({.port = board.port(), .json = true}).value_or("");
+  EXPECT_TRUE(json.starts_with(R"({"firmware":"1.2.3")")) << json;
 }
 
 TEST(LedCommandLine, TellsSilenceFromAnotherDevice) {

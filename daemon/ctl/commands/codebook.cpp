@@ -40,6 +40,7 @@ void add_codebook(CommandLine& line) {
       ->capture_default_str();
   sub->add_option("--seed", options.search.seed, "of the search")->capture_default_str();
   sub->add_option("--out", out, "file; left out: standard output");
+  add_json_flag(sub, options.json, "the section swarm, good for a configuration, too");
   line.run(sub, [&options, &out] { return run_codebook(options, out); });
 }
 

@@ -2,8 +2,10 @@
 
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <fstream>
+#include <system_error>
 
 #include "daemon/ctl/live_screen.hpp"
 
@@ -17,15 +19,18 @@ void add_daemon_options(CLI::App* sub, DaemonAddress& daemon) {
       ->check(CLI::Range(1, 65535));
 }
 
+void add_json_flag(CLI::App* sub, bool& json, const std::string& which) {
+  sub->add_flag("--json", json, "JSON on standard output instead of text: " + which);
+}
+
 Result<void> print_result(const Result<std::string>& text) {
-  return text.map([](const std::string& t) { print(t); });
+  if (!text) return tl::unexpected(text.error());
+  if (print(*text)) return {};
+  return fail(ErrorCode::kIo, "standard output: " + std::generic_category().message(errno));
 }
 
 Result<void> deliver(const std::string& text, const std::string& file) {
-  if (file.empty()) {
-    print(text);
-    return {};
-  }
+  if (file.empty()) return print_result(text);
   std::ofstream out(file, std::ios::binary);
   out << text;
   out.close();

@@ -64,7 +64,10 @@ void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<
 /// --address and --port of the daemon that is asked.
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon);
 
-/// Prints the text, or hands the error on.
+/// --json, which means the same everywhere: `daemon/ctl/json_line.hpp`. `which` says what objects.
+void add_json_flag(CLI::App* sub, bool& json, const std::string& which = "one object");
+
+/// Prints the text, or hands the error on; an error also when nobody takes the text.
 [[nodiscard]] Result<void> print_result(const Result<std::string>& text);
 
 /// To a file, or to standard output where none is named.

@@ -4,9 +4,23 @@
 #include "daemon/ctl/commands/commands.hpp"
 
 namespace crepes {
+namespace {
+
+Result<void> run_demo(DemoOptions options, bool json) {
+  options.show_table = !json;
+  if (json) options.on_progress = progress_on_terminal();
+  return demo(options).and_then([&](const DemoSummary& summary) {
+    return print_result(json ? demo_json(summary) : demo_text(summary)).and_then([&] {
+      return check_poses(summary);
+    });
+  });
+}
+
+}  // namespace
 
 void add_demo(CommandLine& line) {
   auto& options = line.keep<DemoOptions>();
+  auto& json = line.keep<bool>();
   CLI::App* sub = line.add(
       "demo", "Start real daemons in a simulated world and compare their poses with its truth");
   sub->add_option("--for", options.for_s, "seconds")
@@ -23,7 +37,8 @@ void add_demo(CommandLine& line) {
       ->capture_default_str()
       ->check(CLI::Range(1024, 65000));
   sub->add_option("--keep", options.keep, "directory in which configurations and logs stay");
-  line.run(sub, [&options] { return demo(options); });
+  add_json_flag(sub, json, "one object at the end");
+  line.run(sub, [&options, &json] { return run_demo(options, json); });
 }
 
 }  // namespace crepes

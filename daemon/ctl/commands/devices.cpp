@@ -9,7 +9,7 @@ void add_devices(CommandLine& line) {
   auto& options = line.keep<DevicesOptions>();
   CLI::App* sub = line.add(
       "devices", "List cameras and serial devices, and what to write into the configuration");
-  sub->add_flag("--json", options.json, "JSON instead of text");
+  add_json_flag(sub, options.json);
   line.run(sub, [&options] { return print_result(list_devices(options)); });
 }
 

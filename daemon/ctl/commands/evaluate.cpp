@@ -18,7 +18,7 @@ void add_evaluate(CommandLine& line) {
       ->check(CLI::NonNegativeNumber);
   sub->add_option("--against", options.against,
                   "other results of the same data set; both are scored over common rows");
-  sub->add_flag("--json", options.json, "JSON instead of a table");
+  add_json_flag(sub, options.json);
   line.run(sub, [&options] {
     options.on_progress = progress_on_terminal();
     return print_result(evaluate(options));

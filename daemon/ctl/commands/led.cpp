@@ -9,8 +9,9 @@ namespace {
 using LedCommand = Result<std::string> (*)(const LedOptions&);
 
 CLI::App* add_led_command(CommandLine& line, CLI::App* led, const std::string& name,
-                          const std::string& help, LedCommand run_led, const LedOptions& options) {
+                          const std::string& help, LedCommand run_led, LedOptions& options) {
   CLI::App* sub = led->add_subcommand(name, help);
+  add_json_flag(sub, options.json);
   line.run(sub, [&options, run_led] { return print_result(run_led(options)); });
   return sub;
 }

@@ -1,20 +1,26 @@
 #include "daemon/ctl/plot.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
-#include "daemon/ctl/live_screen.hpp"
+#include "daemon/ctl/json_line.hpp"
 
 namespace crepes {
 
 void add_plot(CommandLine& line) {
   auto& options = line.keep<PlotOptions>();
+  auto& json = line.keep<bool>();
   CLI::App* sub = line.add(
       "plot", "Draw a replay as one HTML page: errors, innovations, biases, modes, latency");
   sub->add_option("DIR", options.results, "what replay wrote")->required();
   sub->add_option("--truth", options.swarm, "the data set, with its truth/");
   sub->add_option("--out", options.out, "the page; plot.html in DIR if left out");
-  line.run(sub, [&options] {
-    return plot(options).map([](const auto& page) { print(page.string() + "\n"); });
+  add_json_flag(sub, json);
+  line.run(sub, [&options, &json] {
+    return plot(options).and_then([&](const std::filesystem::path& page) {
+      return print_result(json ? json_line({{"page", page.string()}}) : page.string() + "\n");
+    });
   });
 }
 

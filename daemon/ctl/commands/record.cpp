@@ -3,16 +3,42 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
-#include "daemon/ctl/live_screen.hpp"
+#include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
 
 namespace crepes {
 namespace {
 
-Result<void> run_record(RecordOptions options) {
+std::string text_of(const RecordSummary& summary) {
+  const RecordProgress& progress = summary.progress;
+  std::string text = summary.why + ": " + fixed(progress.seconds, 1) + " s, " +
+                     std::to_string(progress.rows) + " rows, " + std::to_string(progress.pictures) +
+                     " pictures, " + fixed(1e-6 * static_cast<double>(progress.bytes), 2) +
+                     " MB in " + summary.folder.string() + "\n";
+  if (progress.missing > 0)
+    text += std::to_string(progress.missing) + " events are missing: the disk was too slow\n";
+  if (progress.configurations > 1)
+    text += "the daemon was reloaded meanwhile; crepesd.yaml is what it ended with\n";
+  return text;
+}
+
+std::string json_of(const RecordSummary& summary) {
+  const RecordProgress& progress = summary.progress;
+  return json_line({{"folder", summary.folder.string()},
+                    {"ended", summary.why},
+                    {"duration_s", progress.seconds},
+                    {"rows", progress.rows},
+                    {"pictures", progress.pictures},
+                    {"bytes", progress.bytes},
+                    {"missing", progress.missing},
+                    {"configurations", progress.configurations}});
+}
+
+Result<void> run_record(RecordOptions options, bool json) {
   if (::isatty(STDERR_FILENO) == 1) {
     options.on_progress = [](const RecordProgress& progress) {
       std::fprintf(stderr, "\r%6.1f s  %8.2f MB  %llu rows ", progress.seconds,
@@ -23,23 +49,14 @@ Result<void> run_record(RecordOptions options) {
   const Result<RecordSummary> summary = record(options);
   if (options.on_progress) std::fputs("\r", stderr);
   if (!summary) return tl::unexpected(summary.error());
-  const RecordProgress& progress = summary->progress;
-  std::string text = summary->why + ": " + fixed(progress.seconds, 1) + " s, " +
-                     std::to_string(progress.rows) + " rows, " + std::to_string(progress.pictures) +
-                     " pictures, " + fixed(1e-6 * static_cast<double>(progress.bytes), 2) +
-                     " MB in " + summary->folder.string() + "\n";
-  if (progress.missing > 0)
-    text += std::to_string(progress.missing) + " events are missing: the disk was too slow\n";
-  if (progress.configurations > 1)
-    text += "the daemon was reloaded meanwhile; crepesd.yaml is what it ended with\n";
-  print(text);
-  return {};
+  return print_result(json ? json_of(*summary) : text_of(*summary));
 }
 
 }  // namespace
 
 void add_record(CommandLine& line) {
   auto& options = line.keep<RecordOptions>();
+  auto& json = line.keep<bool>();
   CLI::App* sub = line.add(
       "record", "Write what a running daemon's sensors measure as a data set that replays");
   sub->add_option("DIR", options.dir, "for swarm.yaml and the robot's folder; has no data set yet")
@@ -58,7 +75,8 @@ void add_record(CommandLine& line) {
       ->check(CLI::Range(0.1, 1e7));
   sub->add_option("--socket", options.socket, "the daemon's recording.socket")
       ->capture_default_str();
-  line.run(sub, [&options] { return run_record(options); });
+  add_json_flag(sub, json, "one object at the end");
+  line.run(sub, [&options, &json] { return run_record(options, json); });
 }
 
 }  // namespace crepes

@@ -1,12 +1,33 @@
 #include "daemon/ctl/setup_witmotion.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
+#include "daemon/ctl/json_line.hpp"
+#include "daemon/ctl/text_table.hpp"
 
 namespace crepes {
 
+namespace {
+
+Result<void> run_setup(const WitMotionSetup& setup, bool json) {
+  return set_up_witmotion(setup).and_then([&](double measured_hz) {
+    if (json) {
+      return print_result(json_line(
+          {{"port", setup.port}, {"update_rate", setup.rate_hz}, {"measured_hz", measured_hz}}));
+    }
+    return print_result(setup.port + ": " + fixed(measured_hz, 0) +
+                        " samples a second; set imu.update_rate to " +
+                        std::to_string(setup.rate_hz) + ".0\n");
+  });
+}
+
+}  // namespace
+
 void add_setup_witmotion(CommandLine& line) {
   auto& setup = line.keep<WitMotionSetup>();
+  auto& json = line.keep<bool>();
   CLI::App* sub = line.add(
       "setup-witmotion",
       "Have a WitMotion IMU send acceleration and rate alone, fast enough, and keep it so");
@@ -14,7 +35,8 @@ void add_setup_witmotion(CommandLine& line) {
   sub->add_option("--baud", setup.baud, "its rate now")->capture_default_str();
   sub->add_option("--rate", setup.rate_hz, "samples a second: 10, 20, 50, 100 or 200")
       ->capture_default_str();
-  line.run(sub, [&setup] { return print_result(set_up_witmotion(setup)); });
+  add_json_flag(sub, json);
+  line.run(sub, [&setup, &json] { return run_setup(setup, json); });
 }
 
 }  // namespace crepes

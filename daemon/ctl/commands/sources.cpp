@@ -15,7 +15,7 @@ void add_sources(CommandLine& line) {
   sub->add_option("--over", options.over_s, "seconds over which rates are counted")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 60.0));
-  sub->add_flag("--json", options.json, "JSON instead of a table");
+  add_json_flag(sub, options.json);
   line.run(sub, [&options] { return print_result(sources(options)); });
 }
 

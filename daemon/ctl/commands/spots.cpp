@@ -37,7 +37,7 @@ void add_spots(CommandLine& line) {
       ->check(CLI::Range(1, 1000000));
   sub->add_option("--camera", options.camera,
                   "its name in the configuration; left out: that of cam0, cam1, ... in the path");
-  sub->add_flag("--json", options.json, "one JSON object a picture, and one for all");
+  add_json_flag(sub, options.json, "an object a picture, and one for all");
   line.run(sub, [&options] { return run_spots(options); });
 }
 

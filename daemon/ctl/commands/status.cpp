@@ -10,7 +10,7 @@ void add_status(CommandLine& line) {
   CLI::App* sub =
       line.add("status", "One look at a daemon: sensors, neighbors, clocks, mesh, load");
   add_daemon_options(sub, options.daemon);
-  sub->add_flag("--json", options.json, "the daemon's own words, as one object");
+  add_json_flag(sub, options.json, "the daemon's own words, as one object");
   line.run(sub, [&options] { return print_result(status(options)); });
 }
 

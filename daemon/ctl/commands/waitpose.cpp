@@ -22,7 +22,7 @@ void add_waitpose(CommandLine& line) {
          "--max-sigma", [&options](double sigma_m) { options.max_sigma_m = sigma_m; },
          "wait until its position is known so well [m]")
       ->check(CLI::PositiveNumber);
-  sub->add_flag("--json", options.json, "the daemon's own POSE");
+  add_json_flag(sub, options.json, "the daemon's own POSE");
   line.run(sub, [&options] { return print_result(wait_for_pose(options)); });
 }
 

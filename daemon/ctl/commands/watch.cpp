@@ -10,7 +10,7 @@ void add_watch(CommandLine& line) {
   CLI::App* sub = line.add(
       "watch", "A live table of the neighbors' poses, and why there is none where there is none");
   add_daemon_options(sub, options.daemon);
-  sub->add_flag("--json", options.json, "the daemon's own objects, one a line");
+  add_json_flag(sub, options.json, "the daemon's own objects as they come");
   sub->add_option_function<double>(
          "--for", [&options](double seconds) { options.for_s = seconds; },
          "stop after so many seconds")

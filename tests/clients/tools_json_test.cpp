@@ -1,0 +1,206 @@
+/// What crepesctl --json tells: objects in lines, nothing else, and the same as the text.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "daemon/runtime.hpp"
+#include "daemon/worker.hpp"
+#include "tests/clients/tool_run.hpp"
+#include "tests/daemon/ctl_tiny_swarm.hpp"
+#include "tests/support/witmotion_sensor.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kSource = CREPES_SOURCE_DIR;
+
+TEST(ToolsInJson, AreAllButTheOneThatPrintsAScript) {
+  std::istringstream script(crepesctl({"completion", "bash"}).output);
+  std::set<std::string> without;
+  std::set<std::string> inner{""};  // those that have commands of their own
+  for (std::string line; std::getline(script, line);) {
+    const auto words = line.find("\") words=\"");
+    if (words == std::string::npos) continue;
+    const std::string path = line.substr(5, words - 5);
+    if (const auto space = path.rfind(' '); space != std::string::npos)
+      inner.insert(path.substr(0, space));
+    if (line.find("--json") == std::string::npos) without.insert(path);
+  }
+
+  for (const std::string& path : inner) without.erase(path);
+  EXPECT_EQ(inner, (std::set<std::string>{"", "led"}));
+  EXPECT_EQ(without, (std::set<std::string>{"completion"}));
+}
+
+TEST(ToolsInJson, WriteSectionsThatAConfigurationTakes) {
+  const Json library = object_of({"codebook", "--ids", "5", "--json"});
+  const std::string calibration = kSource + "/tests/daemon/calibration/";
+  const Json sections = object_of({"import-calibration", calibration + "camchain-imucam.yaml",
+                                   calibration + "imu.yaml", "--json"});
+  ASSERT_TRUE(library.is_object() && sections.is_object());
+
+  Json whole = sections;
+  whole["robot"]["id"] = 1;
+  whole["swarm"] = library["swarm"];
+  const CheckedConfig checked = check_config_text(whole.dump(), "f");
+
+  ASSERT_TRUE(checked.faults.empty()) << to_string(checked.faults.front());
+  EXPECT_EQ(checked.config.swarm.members.size(), 5U);
+  EXPECT_EQ(checked.config.cameras.size(), sections["cameras"].size());
+  EXPECT_EQ(checked.config.imu.update_rate, sections["imu"]["update_rate"]);
+}
+
+TEST(ToolsInJson, TellWhatAReplayGaveAndWhatItRefused) {
+  const TinySwarm swarm;
+  swarm.replace_line("r1/imu0/data.csv", 5, "what,is,this");
+  const std::string out = swarm.dir() / "out";
+
+  const Ending replayed = crepesctl({"replay", swarm.dir(), "--out", out, "--json"});
+
+  EXPECT_EQ(replayed.how, "exit code 0");
+  EXPECT_NE(replayed.errors.find("r1/imu0/data.csv:5"), std::string::npos) << replayed.errors;
+  const std::vector<Json> told = objects_in(replayed);
+  ASSERT_EQ(told.size(), 1U) << replayed.output;
+  EXPECT_EQ(told[0]["out"], out);
+  EXPECT_EQ(told[0]["robots"], 2);
+  EXPECT_NEAR(told[0]["duration_s"], 0.2, 1e-9);
+  EXPECT_EQ(told[0]["poses"], 0);
+  EXPECT_EQ(told[0]["refused"].size(), 1U);
+  EXPECT_EQ(object_of({"plot", out, "--json"})["page"], out + "/plot.html");
+}
+
+TEST(ToolsInJson, TellWhereAKeyIs) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const std::string file = scratch.path() / "mesh.key";
+
+  EXPECT_EQ(object_of({"keygen", file, "--json"})["file"], file);
+
+  const Ending again = crepesctl({"keygen", file, "--json"});
+  EXPECT_EQ(again.how, "exit code 1");
+  EXPECT_EQ(again.output, "");
+  EXPECT_NE(again.errors.find("not overwritten"), std::string::npos) << again.errors;
+}
+
+TEST(ToolsInJson, ListDevices) {
+  const Json devices = object_of({"devices", "--json"});
+
+  EXPECT_TRUE(devices["cameras"].is_array());
+  EXPECT_TRUE(devices["serial_ports"].is_array());
+}
+
+TEST(ToolsInJson, TellWhatASensorWasSetTo) {
+  PseudoTerminal line = PseudoTerminal::open().value();
+  const Worker sensor("sensor",
+                      [&](const std::stop_token& stop) { run_witmotion_at_20_hz(line, stop); });
+
+  const Json told = object_of({"setup-witmotion", "--port", line.path(), "--rate", "20", "--json"});
+
+  EXPECT_EQ(told["update_rate"], 20);
+  EXPECT_NEAR(told["measured_hz"], 20.0, 4.0);
+}
+
+TEST(ToolsInJson, SayAnErrorInWordsAndNothingOnStandardOutput) {
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"replay", "/not/there", "--out", "/not/there/either"},
+        {"evaluate", "/not/there", "--truth", "/not/there"},
+        {"plot", "/not/there"},
+        {"spots", "/not/there", "--config", "/not/there"},
+        {"record", "/not/there", "--socket", "/not/there"},
+        {"import-calibration", "/not/there"},
+        {"setup-witmotion", "--port", "/not/there"}}) {
+    std::vector<std::string> asked = words;
+    asked.emplace_back("--json");
+    const Ending ending = crepesctl(asked);
+    EXPECT_EQ(ending.how, "exit code 1") << words.front();
+    EXPECT_EQ(ending.output, "") << words.front();
+    EXPECT_TRUE(ending.errors.starts_with("crepesctl: ")) << words.front() << ending.errors;
+  }
+}
+
+TEST(ToolsInJson, SayThatNobodyTakesTheAnswer) {
+  const Ending ending =
+      run("/bin/sh", {"-c", std::string(CREPES_TOOL) + " completion bash >/dev/full"});
+
+  EXPECT_EQ(ending.how, "exit code 1");
+  EXPECT_NE(ending.errors.find("standard output"), std::string::npos) << ending.errors;
+}
+
+TEST(ToolsInJson, SumUpADemo) {
+  Ending demo;
+  do {  // it needs two ports in a row
+    demo = crepesctl({"demo", "--scenario", "two", "--for", "5", "--port",
+                      std::to_string(free_port()), "--json"});
+  } while (demo.errors.find("choose another --port") != std::string::npos);
+
+  // A laden machine may give no pose in five seconds; that is said then, beside the summary.
+  const std::vector<Json> told = objects_in(demo);
+  ASSERT_EQ(told.size(), 1U) << demo.output << demo.errors;
+  EXPECT_EQ(told[0]["scenario"], "two");
+  EXPECT_GE(told[0]["to_s"], 5.0);
+  ASSERT_EQ(told[0]["pairs"].size(), 2U);
+  bool has_all = true;
+  for (const Json& pair : told[0]["pairs"]) {
+    has_all = has_all && pair.contains("first_pose_s");
+    EXPECT_LT(pair["position_m"].value("median", 0.0), 1.0);
+  }
+  EXPECT_EQ(demo.how, has_all ? "exit code 0" : "exit code 1") << demo.errors;
+}
+
+class LiveToolsInJson : public LiveDaemon {
+ protected:
+  LiveToolsInJson() {
+    first_.recording.socket = folder_.path() / "socket";
+    one_.emplace(first_, machine_);
+  }
+
+  std::vector<std::string> to_first(std::vector<std::string> words) const {
+    words.insert(words.end(), {"--port", std::to_string(first_.subscription.port), "--json"});
+    return words;
+  }
+
+  ScratchDirectory folder_ = ScratchDirectory::create({}).value();
+  Config first_ = pair_config(1, mesh_port_);
+  std::optional<Runtime> one_;
+  Runtime two_{pair_config(2, mesh_port_), machine_};
+};
+
+TEST_F(LiveToolsInJson, AreTheDaemonsOwnObjects) {
+  const Json pose = object_of(to_first({"waitpose", "--peer", "2", "--timeout", "50"}));
+  const Json status = object_of(to_first({"status"}));
+  const Json sources = object_of(to_first({"sources"}));
+  const Ending watched = crepesctl(to_first({"watch", "--for", "1"}));
+
+  EXPECT_EQ(pose["class"], "POSE");
+  EXPECT_EQ(status["class"], "STATUS");
+  EXPECT_GT(sources["over_s"], 0.5);
+  EXPECT_EQ(sources["sources"][0]["peer"], 2);
+  std::set<std::string> classes;
+  for (const Json& object : objects_in(watched)) classes.insert(object["class"]);
+  EXPECT_EQ(classes, (std::set<std::string>{"VERSION", "POSE", "STATUS"}));
+}
+
+TEST_F(LiveToolsInJson, SumUpARecording) {
+  object_of(to_first({"waitpose", "--peer", "2", "--timeout", "50"}));
+  const std::string dir = folder_.path() / "recording";
+
+  const Json told =
+      object_of({"record", dir, "--duration", "1", "--socket", first_.recording.socket, "--json"});
+
+  EXPECT_EQ(told["folder"], dir + "/r1");
+  EXPECT_EQ(told["ended"], "--duration is over");
+  EXPECT_GE(told["duration_s"], 1.0);
+  EXPECT_GT(told["rows"], 50);
+  EXPECT_GT(told["bytes"], 1000);
+  EXPECT_EQ(told["pictures"], 0);
+  EXPECT_EQ(told["configurations"], 1);
+}
+
+}  // namespace
+}  // namespace crepes
