@@ -17,6 +17,8 @@ constexpr double kLateMemory = 1.0 / 16.0;  // of ranges
 constexpr double kHiddenShare = 0.25;       // in line of sight reflections are rarer
 constexpr Duration kHiddenAfter = std::chrono::milliseconds{150};
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
+// A robot's bearings come so much later than its IMU samples: a frame and a half.
+constexpr Duration kBearingDelay = std::chrono::milliseconds{10};
 
 double calibration_sigma_rad(const FilterSettings& settings) {
   return settings.profile == Profile::kTight ? kLooseBearing : settings.priors.misalignment_rad;
@@ -48,6 +50,7 @@ void Neighbor::reconfigure(const FilterSettings& settings) {
   sightings_.set_sigmas(calibration_sigma_rad(settings), single_range_sigma_m(settings));
   sequencer_.set_lag(settings.lag);
   hypotheses_.reconfigure(settings);
+  ahead_.reset();
 }
 
 void Neighbor::add_bearing(const Bearing& bearing) {
@@ -78,7 +81,9 @@ void Neighbor::take_range(const UwbRange& range, MeasurementKind kind) {
 void Neighbor::add_report(const ReceivedReport& received, const RobotState& self) {
   const Report& report = received.report;
   last_heard_ = std::max(last_heard_, report.stamp);
-  for (const ImuSample& sample : report.imu) body_.add(sample);
+  for (const ImuSample& sample : report.imu) {
+    if (body_.add(sample)) look_again_from(sample.stamp);
+  }
   if (!body_.tilt || report.tilt.stamp > body_.tilt->stamp) body_.tilt = report.tilt;
   for (const UwbRange& range : report.ranges) {
     if (range.neighbor == self_id_) take_range(range, MeasurementKind::kPeerRange);
@@ -143,7 +148,11 @@ void Neighbor::enqueue(Measurement measurement) {
   const bool poses_only = settings_.profile == Profile::kPaper;
   if (poses_only && kind != MeasurementKind::kRawPose && kind != MeasurementKind::kGraphPose)
     return;
-  if (!sequencer_.push(std::move(measurement))) note(stamp, kind, {.verdict = Verdict::kLate});
+  if (!sequencer_.push(std::move(measurement))) {
+    note(stamp, kind, {.verdict = Verdict::kLate});
+  } else {
+    look_again_from(stamp);
+  }
 }
 
 void Neighbor::note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion) {
@@ -230,21 +239,49 @@ void Neighbor::start(const Measurement& measurement) {
   if (started) note(measurement.stamp, measurement.kind, {.verdict = Verdict::kFused});
 }
 
+// From where the last tick got to, as far as nothing has come in between: most readings are taken
+// twice or thrice, and not at every tick until the lag has passed.
+NeighborTrack Neighbor::track_at(Timestamp t, const RobotState& self) {
+  const GaussianSum& leader = hypotheses_.leader();
+  NeighborTrack track = leader.heaviest();
+  const std::uint32_t generation = hypotheses_.generation();
+  if (ahead_ && ahead_->generation == generation && ahead_->track.stamp() > track.stamp() &&
+      ahead_->track.stamp() <= t) {
+    track = ahead_->track;
+  }
+  const Timestamp sure =
+      std::min({self.imu.newest().stamp, body_.imu.newest().stamp, t}) - kBearingDelay;
+  if (leader.size() == 1 && sure > track.stamp()) {
+    run_to(sure, self, track);
+    ahead_ = Ahead{track, generation};
+  }
+  run_to(t, self, track);
+  return track;
+}
+
+void Neighbor::look_again_from(Timestamp stamp) {
+  if (ahead_ && stamp <= ahead_->track.stamp()) ahead_.reset();
+}
+
+void Neighbor::run_to(Timestamp t, const RobotState& self, NeighborTrack& track) const {
+  const std::vector<Measurement>& pending = sequencer_.pending();
+  const auto next = std::find_if(pending.begin(), pending.end(),
+                                 [&](const Measurement& m) { return m.stamp > track.stamp(); });
+  for (std::span rest(next, pending.end()); !rest.empty() && rest.front().stamp <= t;) {
+    const auto group = leading_group(rest);
+    rest = rest.subspan(group.size());
+    track.advance_to(group.front().stamp, self.imu, body_.imu);
+    static_cast<void>(
+        track.fuse(group[track.likeliest(group, mounting_)], mounting_, settings_.gates));
+  }
+  track.advance_to(t, self.imu, body_.imu);
+}
+
 void Neighbor::look_ahead(Timestamp now, const RobotState& self) {
   if (!hypotheses_.is_settled() || self.imu.empty() || body_.imu.empty()) return;
   const Timestamp state_time = std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
   if (hypotheses_.stamp() > state_time) return;
-  NeighborTrack head = hypotheses_.leader().heaviest();
-  for (std::span rest(sequencer_.pending()); !rest.empty() && rest.front().stamp <= state_time;) {
-    const auto group = leading_group(rest);
-    rest = rest.subspan(group.size());
-    const Timestamp stamp = group.front().stamp;
-    if (stamp < head.stamp()) continue;
-    head.advance_to(stamp, self.imu, body_.imu);
-    static_cast<void>(
-        head.fuse(group[head.likeliest(group, mounting_)], mounting_, settings_.gates));
-  }
-  head.advance_to(state_time, self.imu, body_.imu);
+  const NeighborTrack head = track_at(state_time, self);
   const GaussianPose T_B_N = hypotheses_.leader().mean(head.pose());
   if (!is_certain(T_B_N.covariance)) return;
   if (hypotheses_.generation() != std::exchange(generation_, hypotheses_.generation())) {

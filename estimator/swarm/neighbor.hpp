@@ -58,6 +58,10 @@ class Neighbor {
   void note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion);
   void release(Timestamp now, const RobotState& self);
   void look_ahead(Timestamp now, const RobotState& self);
+  /// The leading filter at `t`, corrected with what waits.
+  [[nodiscard]] NeighborTrack track_at(Timestamp t, const RobotState& self);
+  void look_again_from(Timestamp stamp);
+  void run_to(Timestamp t, const RobotState& self, NeighborTrack& track) const;
   void start(const Measurement& measurement);
   void try_one_way(Timestamp now, const RobotState& self);
   [[nodiscard]] bool is_a_start(const Measurement& measurement) const;
@@ -74,6 +78,14 @@ class Neighbor {
   Hypotheses hypotheses_;
   std::uint32_t generation_ = 0;  ///< of the hypothesis that was published last
   std::uint32_t starts_ = 0;
+
+  // The leading filter, corrected with what waited at the last tick, up to where nothing was
+  // expected any more.
+  struct Ahead {
+    NeighborTrack track;
+    std::uint32_t generation;
+  };
+  std::optional<Ahead> ahead_;
 
   // What the last tick found.
   std::optional<NeighborPose> pose_;
