@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <random>
 
 #include "tests/support/simulated_pair.hpp"
 
@@ -34,8 +35,15 @@ struct Ingredients {
   bool bearings = true;
   bool peer_bearings = true;
   bool ranges = true;
+  Duration imu_memory = 160ms;  ///< how much of the past a report tells
   double heading_rad = 0.0;  ///< own bearings turned so far about the vertical: a mirror in a wall
 };
+
+FilterSettings settings(Profile profile) {
+  EstimatorConfig estimator;
+  estimator.profile = profile;
+  return filter_settings(estimator, ImuConfig{}, UwbConfig{});
+}
 
 /// Robot 1's view of robot 2, fed from a simulated pair every 10 ms.
 class View {
@@ -88,6 +96,7 @@ class View {
         .measurements[static_cast<std::size_t>(kind)][static_cast<std::size_t>(verdict)];
   }
   [[nodiscard]] RobotState& self() { return self_; }
+  void set_report_delay(Duration delay) { report_delay_ = delay; }
 
   [[nodiscard]] ReceivedReport report(const Ingredients& with) {
     const Timestamp stamp = now_ - report_delay_;
@@ -97,7 +106,7 @@ class View {
     if (with.peer_tilt) received.report.tilt = tilt(false, stamp);
     for (std::size_t i = 0; with.peer_imu && i < pair_.imu_N.size(); ++i) {
       const ImuSample& sample = pair_.imu_N[i];
-      if (sample.stamp <= stamp && sample.stamp > stamp - 160ms) {
+      if (sample.stamp <= stamp && sample.stamp > stamp - with.imu_memory) {
         received.report.imu.push_back(sample);
       }
     }
@@ -109,11 +118,6 @@ class View {
   }
 
  private:
-  static FilterSettings settings(Profile profile) {
-    EstimatorConfig estimator;
-    estimator.profile = profile;
-    return filter_settings(estimator, ImuConfig{}, UwbConfig{});
-  }
   [[nodiscard]] Tilt tilt(bool own, Timestamp stamp) {
     const MutualSighting z = pair_.sighting(stamp);
     return {stamp, own ? z.B.up : z.N.up, 0.01};
@@ -324,6 +328,31 @@ TEST(Neighbor, IsReachedByTheGraphWhenItIsNotSeen) {
   EXPECT_EQ(view.neighbor().pose()->mode, PoseMode::kGraph);
   EXPECT_TRUE(view.neighbor().pose()->sources.graph);
   EXPECT_FALSE(view.neighbor().estimate());  // the graph does not hear its own echo
+}
+
+// New settings forget what the last look ahead found, equal ones as well.
+TEST(Neighbor, LooksAheadFromTheLastLookAsFromTheStart) {
+  for (const Profile profile : {Profile::kTight, Profile::kPaper}) {
+    View view(profile);
+    View fresh(profile);
+    std::mt19937 random(1);
+    double most = 0.0;
+    for (Timestamp t{10ms}; t <= Timestamp{4s}; t += 10ms) {
+      // One packet in three is lost, the others overtake each other.
+      const Duration delay = 10ms * std::uniform_int_distribution(1, 7)(random);
+      const Ingredients with{
+          .reports = random() % 3 != 0, .peer_bearings = random() % 2 == 0, .imu_memory = 30ms};
+      for (View* each : {&view, &fresh}) each->set_report_delay(delay);
+      fresh.neighbor().reconfigure(settings(profile));
+      for (View* each : {&view, &fresh}) each->run_until(t, with);
+
+      const auto& pose = view.neighbor().pose();
+      ASSERT_EQ(pose.has_value(), fresh.neighbor().pose().has_value());
+      if (pose) most = std::max(most, (view.error() - fresh.error()).norm());
+    }
+    ASSERT_TRUE(view.neighbor().pose());
+    EXPECT_LT(most, 1e-4);
+  }
 }
 
 }  // namespace
