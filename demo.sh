@@ -5,5 +5,5 @@ cd "$(dirname "$0")"
 . .ci/setup.sh
 
 install_packages
-build release
+build release crepesd crepesctl
 exec build/release/daemon/crepesctl demo "$@"

@@ -18,10 +18,10 @@ install_packages() {
     apt-get install -y -qq --no-install-recommends "${missing[@]}"
 }
 
-# build PRESET: configures and builds all targets.
+# build PRESET [TARGET...]: configures, and builds these targets or all.
 build() {
   step "build $1"
   mkdir -p build
   cmake --preset "$1" >build/"$1".log 2>&1 || { cat build/"$1".log; return 1; }
-  cmake --build --preset "$1"
+  cmake --build --preset "$1" ${2:+--target "${@:2}"}
 }
