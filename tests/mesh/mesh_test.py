@@ -92,6 +92,9 @@ def main():
             for peer, pair in sorted(found["peers"].items()):
                 failures += not judge(robot, int(peer), pair)
             failures += ROBOTS - 1 - len(found["peers"])
+            if found["exit"] != 0:
+                print(f"FAILED crepesd of robot {robot} ended with {found['exit']}")
+                failures += 1
     finally:
         for robot in robots:
             robot.kill()

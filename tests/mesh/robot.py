@@ -53,8 +53,7 @@ for pose, came in subscriber.poses(begin + seconds):
     pair["ranges"].append(sum(pose["position"][axis] ** 2 for axis in "xyz") ** 0.5)
 for pair in peers.values():
     pair["median_range_m"] = round(statistics.median(pair.pop("ranges")), 2)
-status = subscriber.status()
 daemon.terminate()
 found = {"originators": len(others()), "loss": [lost(f"wlan{link}") for link in range(links)], "peers": peers,
-         "exit": daemon.wait(), "network": status["network"]}
+         "exit": daemon.wait()}
 (here / f"r{robot}.json").write_text(json.dumps(found))

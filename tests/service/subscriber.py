@@ -1,4 +1,4 @@
-"""Poses and statuses of a crepesd on this machine, as any program on a robot would get them."""
+"""Poses of a crepesd on this machine, as any program on a robot would get them."""
 import json
 import socket
 import time
@@ -50,6 +50,3 @@ class Subscriber:
                                     end - time.monotonic())
             if pose:
                 yield pose, came
-
-    def status(self, wanted=lambda status: True, seconds=30.0):
-        return self._next({"class": "POLL"}, lambda m: m["class"] == "STATUS" and wanted(m), seconds)[0]
