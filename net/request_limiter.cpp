@@ -6,6 +6,10 @@ namespace crepes {
 namespace {
 
 constexpr std::size_t kBuckets = 1024;
+constexpr TokenBucket::Rate kHalfRate{.per_s = kClientRate.per_s / 2,
+                                      .burst = kClientRate.burst / 2};
+
+bool is_full_enough(const TokenBucket& bucket) { return bucket.fill() >= 0.5; }
 
 }  // namespace
 
@@ -18,14 +22,27 @@ bool TokenBucket::take(Timestamp now, double reserve) {
   return true;
 }
 
-RequestLimiter::RequestLimiter(const HashKey& key)
-    : key_(key), clients_(kBuckets, TokenBucket(kClientRate)) {}
+RequestLimiter::RequestLimiter(const HashKey& key) : key_(key) {
+  halves_.fill(std::vector(kBuckets, TokenBucket(kHalfRate)));
+}
+
+std::size_t RequestLimiter::bucket_of(const Endpoint& stranger, std::size_t half) const {
+  return keyed_hash(key_, stranger, half) % kBuckets;
+}
+
+bool RequestLimiter::asks_little(const Endpoint& stranger) const {
+  return is_full_enough(halves_[0][bucket_of(stranger, 0)]) ||
+         is_full_enough(halves_[1][bucket_of(stranger, 1)]);
+}
 
 bool RequestLimiter::admits(const Endpoint& stranger, Timestamp now) {
-  TokenBucket& client = clients_[keyed_hash(key_, stranger, 0) % kBuckets];
-  if (!client.take(now)) return false;
-  const double reserve = client.fill() < 0.5 ? kStrangersRate.burst / 2 : 0.0;
-  return (stranger.is_loopback() ? local_ : remote_).take(now, reserve);
+  for (std::size_t half = 0; half < halves_.size(); ++half) {
+    TokenBucket& client = halves_.at(half)[bucket_of(stranger, half)];
+    if (!client.take(now)) continue;
+    const double reserve = is_full_enough(client) ? 0.0 : kStrangersRate.burst / 2;
+    return (stranger.is_loopback() ? local_ : remote_).take(now, reserve);
+  }
+  return false;
 }
 
 }  // namespace crepes

@@ -16,14 +16,14 @@ bool wants(const WatchRequest& wish, RobotId neighbor) {
 }  // namespace
 
 Result<void> SubscriberTable::watch(const Endpoint& client, const WatchRequest& request,
-                                    Timestamp now, std::size_t via) {
+                                    Timestamp now, std::size_t via, bool asks_little) {
   expire(now);
   if (!request.enable) {
     subscribers_.erase(client);
     return {};
   }
   if (!subscribers_.contains(client)) {
-    if (Result<void> room = check_room(client); !room) return room;
+    if (Result<void> room = make_room(client, now, asks_little); !room) return room;
   }
   Subscriber& subscriber = subscribers_[client];
   if (subscriber.rate.rate_hz() != request.rate_hz) subscriber.rate = PoseRate(request.rate_hz);
@@ -33,23 +33,30 @@ Result<void> SubscriberTable::watch(const Endpoint& client, const WatchRequest& 
   return {};
 }
 
-Result<void> SubscriberTable::check_room(const Endpoint& client) const {
+Result<void> SubscriberTable::make_room(const Endpoint& client, Timestamp now, bool asks_little) {
   const auto limit = static_cast<std::size_t>(config_.max_subscribers);
   if (subscribers_.size() >= limit)
     return fail(ErrorCode::kUsage, "too many subscribers, at most " + std::to_string(limit));
-  const auto neighbors = std::ranges::count_if(
-      subscribers_, [&](const auto& entry) { return entry.first.address == client.address; });
-  if (neighbors >= config_.max_per_address) {
+  const auto is_beside = [&](const auto& entry) { return entry.first.address == client.address; };
+  if (std::ranges::count_if(subscribers_, is_beside) < config_.max_per_address) return {};
+  const auto floods = std::ranges::find_if(subscribers_, [&](const auto& entry) {
+    return asks_little && is_beside(entry) &&
+           entry.second.last_excess >= now - from_seconds(config_.lease_s);
+  });
+  if (floods == subscribers_.end()) {
     return fail(ErrorCode::kUsage, "too many subscribers at this address, at most " +
                                        std::to_string(config_.max_per_address));
   }
+  subscribers_.erase(floods);
   return {};
 }
 
 std::optional<bool> SubscriberTable::admits(const Endpoint& client, Timestamp now) {
   const auto subscriber = subscribers_.find(client);
   if (subscriber == subscribers_.end()) return std::nullopt;
-  return subscriber->second.requests.take(now);
+  const bool is_admitted = subscriber->second.requests.take(now);
+  if (!is_admitted) subscriber->second.last_excess = now;
+  return is_admitted;
 }
 
 std::vector<PoseDelivery> SubscriberTable::deliveries(RobotId neighbor, Timestamp stamp) {

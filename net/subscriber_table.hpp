@@ -30,9 +30,10 @@ class SubscriberTable {
   void set_limits(const SubscriptionConfig& config) { config_ = config; }
 
   /// Begins, renews, changes or ends a subscription; refused when the table is full or the address
-  /// has its share. `via` says over which socket to answer.
+  /// has its share. Of that share, who lately asked for more than he may gives way to a newcomer
+  /// who `asks_little`. `via` says over which socket to answer.
   [[nodiscard]] Result<void> watch(const Endpoint& client, const WatchRequest& request,
-                                   Timestamp now, std::size_t via = 0);
+                                   Timestamp now, std::size_t via = 0, bool asks_little = false);
 
   /// Whether a subscriber may ask now; empty for others.
   [[nodiscard]] std::optional<bool> admits(const Endpoint& client, Timestamp now);
@@ -58,9 +59,10 @@ class SubscriberTable {
     std::uint64_t sequence = 0;
     PoseRate rate;
     TokenBucket requests{kClientRate};
+    Timestamp last_excess = Timestamp::min();  ///< when a request found no token
   };
 
-  [[nodiscard]] Result<void> check_room(const Endpoint& client) const;
+  [[nodiscard]] Result<void> make_room(const Endpoint& client, Timestamp now, bool asks_little);
 
   SubscriptionConfig config_;
   std::map<Endpoint, Subscriber> subscribers_;

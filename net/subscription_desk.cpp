@@ -55,7 +55,8 @@ std::optional<std::string> SubscriptionDesk::serve(const Endpoint& client,
     if (auto told = peer_status_json(status_(), *poll->peer)) return told;
     return refuse(client, {ErrorCode::kNotFound, "\"peer\" is no other robot of this swarm"}, now);
   }
-  const auto watched = table_.watch(client, std::get<WatchRequest>(request.what), now, via);
+  const auto watched = table_.watch(client, std::get<WatchRequest>(request.what), now, via,
+                                    limiter_.asks_little(client));
   if (!watched) return refuse(client, watched.error(), now);
   return version_json(release_, lease_s_);
 }

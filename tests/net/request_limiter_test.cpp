@@ -78,6 +78,23 @@ TEST(RequestLimiter, LetsSomebodyNewInWhileOthersAskForAllTheyCan) {
   EXPECT_EQ(newcomers, 10);
 }
 
+TEST(RequestLimiter, StarvesHardlyAnyNewcomerBySharedBuckets) {
+  // Sixty-four floods empty one bucket in sixteen. Both of a newcomer's are among them once in 256.
+  RequestLimiter limiter(HashKey{});
+  int admitted = 0;
+  int newcomers = 0;
+  for (int ms = 0; ms < 10'000; ++ms) {
+    const Timestamp now = kStart + milliseconds{ms};
+    for (int i = 0; i < 128; ++i) (void)limiter.admits(local(1000 + i % 64), now);
+    if (ms < 1000 || ms % 3 != 0) continue;
+    ++newcomers;
+    admitted += limiter.admits(local(2000 + ms), now) ? 1 : 0;
+  }
+
+  EXPECT_EQ(newcomers, 3000);
+  EXPECT_GT(admitted, 3000 * 0.98);
+}
+
 TEST(RequestLimiter, KeepsRoomForThisMachineWhateverComesFromElsewhere) {
   RequestLimiter limiter(HashKey{});
   for (int i = 0; i < 60'000; ++i) (void)limiter.admits(remote(i), kStart);

@@ -142,6 +142,40 @@ TEST(SubscriberTable, GivesAnAddressItsShareAndLeavesRoomForOthers) {
   EXPECT_TRUE(elsewhere);
 }
 
+TEST(SubscriberTable, HasWhoAsksTooMuchGiveWayToWhoDoesNot) {
+  SubscriberTable table{SubscriptionConfig{}};
+  for (std::uint16_t port = 1; port <= 4; ++port)
+    ASSERT_TRUE(table.watch(client(port), {}, kStart));
+  for (int i = 0; i < 1000; ++i) (void)table.admits(client(3), kStart);
+
+  const auto elsewhere = Endpoint::ipv4({127, 0, 0, 2}, 1);
+  ASSERT_TRUE(table.watch(elsewhere, {}, kStart));
+  const auto greedy = table.watch(client(7), {}, kStart + seconds{1}, 0, /*asks_little=*/false);
+  const auto newcomer = table.watch(client(5), {}, kStart + seconds{1}, 0, /*asks_little=*/true);
+  const auto another = table.watch(client(6), {}, kStart + seconds{1}, 0, /*asks_little=*/true);
+
+  EXPECT_FALSE(greedy);
+  EXPECT_TRUE(newcomer);
+  EXPECT_FALSE(another);
+  EXPECT_FALSE(table.admits(client(3), kStart + seconds{1}).has_value());
+  for (const Endpoint& kept : {client(1), client(2), client(4), client(5), elsewhere})
+    EXPECT_EQ(table.admits(kept, kStart + seconds{1}), true) << kept.to_string();
+}
+
+TEST(SubscriberTable, ForgivesAfterALease) {
+  SubscriberTable table{SubscriptionConfig{}};
+  const auto renew = [&](Timestamp now) {
+    for (std::uint16_t port = 1; port <= 4; ++port) ASSERT_TRUE(table.watch(client(port), {}, now));
+  };
+  renew(kStart);
+  for (int i = 0; i < 1000; ++i) (void)table.admits(client(3), kStart);
+
+  renew(kStart + seconds{6});
+  renew(kStart + seconds{12});
+
+  EXPECT_FALSE(table.watch(client(5), {}, kStart + seconds{12}, 0, /*asks_little=*/true));
+}
+
 TEST(SubscriberTable, HasRoomForThirtyTwo) {
   SubscriberTable table{SubscriptionConfig{}};
   for (std::uint8_t host = 1; host <= 8; ++host)

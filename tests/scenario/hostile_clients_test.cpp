@@ -188,6 +188,26 @@ TEST_F(HostileClients, DoNotDelayThePosesOfOthersByAHundredThousandRequestsASeco
   EXPECT_LT(static_cast<double>(flood.answered()), 1200.0 * (400 + (500 + 4 * 100) * elapsed_s));
 }
 
+TEST_F(HostileClients, KeepNoPoliteProgramOfTheirAddressFromItsPoses) {
+  Flood flood(first_.subscription.port);
+  // All places of the address are taken, by programs that renew their leases again and again.
+  EXPECT_TRUE(Client(first_).await(
+      R"({"class":"POLL","about":"network"})", "STATUS", [](const Json& status) {
+        return status["network"].value("subscribers", 0) == SubscriptionConfig{}.max_per_address;
+      }));
+
+  const Timestamp begin = machine_.now();
+  Client newcomer(first_);
+  EXPECT_TRUE(newcomer.await(R"({"class":"WATCH"})", "POSE", [](const Json&) { return true; }));
+  std::printf("a newcomer's first pose after %.2f s\n", to_seconds(machine_.now() - begin));
+
+  // Its place is its own, as long as it keeps the lease.
+  GoodClient client(first_);
+  Service stormy = client.served_for(seconds{2});
+  EXPECT_GT(stormy.delays_s.size(), 10U);
+  EXPECT_EQ(stormy.lost, 0);
+}
+
 TEST_F(HostileClients, AreCounted) {
   Flood flood(first_.subscription.port);
 
