@@ -38,7 +38,7 @@ class HealthReport {
   }
 
   /// `message` is empty when all is well.
-  void tell(const std::string& message, Totals counters) {
+  void tell(const std::string& message, SensorTotals totals) {
     const Timestamp now = context_.clock.now();
     const double elapsed_s = std::max(to_seconds(now - period_start_), 1e-3);
     SensorStatus status;
@@ -46,7 +46,7 @@ class HealthReport {
     status.rate_hz = static_cast<double>(measurements_) / elapsed_s;
     status.ok = message.empty();
     status.message = message;
-    status.counters = std::move(counters);
+    status.totals = std::move(totals);
     context_.tell(std::move(status));
     period_start_ = now;
     measurements_ = 0;
@@ -125,7 +125,7 @@ class CameraDevice final : public Device {
     return 1;
   }
 
-  [[nodiscard]] Totals counters() const override { return camera_->counters(); }
+  [[nodiscard]] SensorTotals counters() const override { return camera_->counters(); }
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     return camera_->diagnosis();
   }
@@ -182,17 +182,17 @@ class Delays {
   std::vector<Duration> delays_;
 };
 
-Totals counters_of(const Detection& found, const Rejected& rejected, std::uint64_t failures,
-                   Delays& delays) {
+SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::uint64_t failures,
+                       Delays& delays) {
   const auto [median_us, p99_us] = delays.take();
-  return {{"delay_p50_us", median_us},
-          {"delay_p99_us", p99_us},
-          {"threshold", static_cast<std::uint64_t>(found.threshold)},
-          {"hot", rejected.hot},
-          {"huge", rejected.huge},
-          {"faint", rejected.faint},
-          {"surplus", rejected.surplus},
-          {"failures", failures}};
+  return {.faults = {{"failures", failures}},
+          .counts = {{"delay_p50_us", median_us},
+                     {"delay_p99_us", p99_us},
+                     {"threshold", static_cast<std::uint64_t>(found.threshold)},
+                     {"hot", rejected.hot},
+                     {"huge", rejected.huge},
+                     {"faint", rejected.faint},
+                     {"surplus", rejected.surplus}}};
 }
 
 }  // namespace
@@ -260,7 +260,7 @@ void run_vision(const VisionStage& stage, const StageContext& context,
     rejected += found.rejected;
     failures += found.failure.empty() ? 0 : 1;
     if (health.is_due())
-      health.tell(std::string(diagnosis_of(found)), counters_of(found, rejected, failures, delays));
+      health.tell(std::string(diagnosis_of(found)), totals_of(found, rejected, failures, delays));
     if (stage.tap.wanted.try_pop()) stage.tap.taken.push(copy_of(*frame));
     stage.used.push(std::move(*frame));
   }

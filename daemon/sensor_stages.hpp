@@ -25,8 +25,6 @@ namespace crepes {
 using EventSink = std::function<void(Event)>;
 using StatusSink = std::function<void(SensorStatus)>;
 
-using Totals = std::vector<std::pair<std::string, std::uint64_t>>;
-
 /// A device that is open.
 class Device {
  public:
@@ -40,8 +38,8 @@ class Device {
   /// Waits at most so long and hands on what comes; how many measurements those were. An error
   /// means that the device is gone.
   [[nodiscard]] virtual Result<std::size_t> read_once(std::chrono::milliseconds timeout) = 0;
-  /// Faults by reason, totals since it was opened.
-  [[nodiscard]] virtual Totals counters() const = 0;
+  /// Since it was opened.
+  [[nodiscard]] virtual SensorTotals counters() const = 0;
   /// One sentence on what is wrong with what comes in, if anything.
   [[nodiscard]] virtual std::optional<std::string> diagnosis() const = 0;
 };

@@ -18,19 +18,21 @@ namespace {
 
 using std::chrono::milliseconds;
 
-Totals faults_of(const NlinkCounts& counts) {
-  return {{"unknown_modules", counts.unknown_modules},
-          {"implausible", counts.implausible},
-          {"without_ranges", counts.without_ranges},
-          {"clock_restarts", counts.clock_restarts}};
+/// A module may send other frames beside those with ranges.
+SensorTotals totals_of(const NlinkCounts& counts) {
+  return {.faults = {{"unknown_modules", counts.unknown_modules},
+                     {"implausible", counts.implausible},
+                     {"clock_restarts", counts.clock_restarts}},
+          .counts = {{"ranges", counts.ranges}, {"without_ranges", counts.without_ranges}}};
 }
 
-Totals faults_of(const ImuCounts& counts) {
-  return {{"partial", counts.partial},
-          {"unscaled", counts.unscaled},
-          {"saturated", counts.saturated},
-          {"implausible", counts.implausible},
-          {"clock_restarts", counts.clock_restarts}};
+/// An autopilot may send numbers without a unit beside samples.
+SensorTotals totals_of(const ImuCounts& counts) {
+  return {.faults = {{"partial", counts.partial},
+                     {"saturated", counts.saturated},
+                     {"implausible", counts.implausible},
+                     {"clock_restarts", counts.clock_restarts}},
+          .counts = {{"samples", counts.samples}, {"unscaled", counts.unscaled}}};
 }
 
 /// Ranges are handed on as they are.
@@ -83,11 +85,11 @@ class SerialDevice final : public Device {
     return heard_.size();
   }
 
-  [[nodiscard]] Totals counters() const override {
-    Totals totals = faults_of(reader_.parser().counts());
-    for (auto& total : intake_.faults()) totals.push_back(std::move(total));
-    totals.emplace_back("skipped_bytes", reader_.counts().skipped_bytes);
-    totals.emplace_back("checksum_failures", reader_.counts().checksum_failures);
+  [[nodiscard]] SensorTotals counters() const override {
+    SensorTotals totals = totals_of(reader_.parser().counts());
+    for (auto& fault : intake_.faults()) totals.faults.push_back(std::move(fault));
+    totals.faults.emplace_back("skipped_bytes", reader_.counts().skipped_bytes);
+    totals.faults.emplace_back("checksum_failures", reader_.counts().checksum_failures);
     return totals;
   }
 
@@ -150,7 +152,9 @@ class UnknownImu final : public Device {
     return 0;
   }
 
-  [[nodiscard]] Totals counters() const override { return known_ ? known_->counters() : Totals{}; }
+  [[nodiscard]] SensorTotals counters() const override {
+    return known_ ? known_->counters() : SensorTotals{};
+  }
 
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     constexpr Duration kPatience = std::chrono::seconds(1);

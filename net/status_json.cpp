@@ -18,7 +18,7 @@ void put_total(Json& object, const std::string& name, std::uint64_t total) {
   if (total > 0) object[shortened(name, kMaxName)] = total;
 }
 
-Json totals_json(const std::vector<std::pair<std::string, std::uint64_t>>& totals) {
+Json totals_json(const Totals& totals) {
   Json json = Json::object();
   for (const auto& [name, total] : totals) put_total(json, name, total);
   return json;
@@ -29,8 +29,10 @@ Json sensor_json(const SensorStatus& sensor) {
   put(json, "rate_hz", sensor.rate_hz, 4);
   json["ok"] = sensor.ok;
   if (!sensor.message.empty()) json["message"] = shortened(sensor.message, kMaxText);
-  if (Json faults = totals_json(sensor.counters); !faults.empty())
+  if (Json faults = totals_json(sensor.totals.faults); !faults.empty())
     json["faults"] = std::move(faults);
+  if (Json counts = totals_json(sensor.totals.counts); !counts.empty())
+    json["counts"] = std::move(counts);
   return json;
 }
 
@@ -159,7 +161,8 @@ bool drop_last_neighbor(Json& status) {
 /// The least important parts first; each is dropped only if what is left is still too long.
 std::string fitted(Json status) {
   using Cut = void (*)(Json&);
-  constexpr std::array<Cut, 12> kCuts{
+  constexpr std::array<Cut, 13> kCuts{
+      [](Json& s) { erase_in_each(s, "sensors", "counts"); },
       [](Json& s) { erase_in_each(s, "neighbors", "measurements"); },
       [](Json& s) { s.erase("network"); },
       [](Json& s) { erase_in_each(s, "neighbors", "id_decodes"); },

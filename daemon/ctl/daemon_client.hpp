@@ -52,6 +52,7 @@ struct StatusMessage {
     bool ok = false;
     std::string message;
     Totals faults;
+    Totals counts;
   };
   struct Clock {
     RobotId peer{};

@@ -92,7 +92,8 @@ StatusMessage status_from(const Json& json) {
                               .rate_hz = sensor.value("rate_hz", 0.0),
                               .ok = sensor.value("ok", false),
                               .message = sensor.value("message", ""),
-                              .faults = totals_from(sensor, "faults")});
+                              .faults = totals_from(sensor, "faults"),
+                              .counts = totals_from(sensor, "counts")});
   }
   for (const Json& clock : json.value("clocks", Json::array())) {
     status.clocks.push_back({.peer = id_from(clock.at("peer")),

@@ -27,11 +27,11 @@ std::string head_of(const StatusMessage& status) {
 }
 
 std::string sensors_of(const StatusMessage& status) {
-  Rows rows{{"sensor", "rate Hz", "state", "faults"}};
+  Rows rows{{"sensor", "rate Hz", "state", "faults", "counts"}};
   for (const auto& sensor : status.sensors) {
     const std::string what = sensor.message.empty() ? "fault" : sensor.message;
     rows.push_back({sensor.name, sensor.rate_hz > 0 ? fixed(sensor.rate_hz, 1) : "-",
-                    sensor.ok ? "ok" : what, text_of(sensor.faults)});
+                    sensor.ok ? "ok" : what, text_of(sensor.faults), text_of(sensor.counts)});
   }
   return text_table(rows);
 }

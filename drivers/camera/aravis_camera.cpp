@@ -276,21 +276,19 @@ class AravisCamera final : public Camera {
     return std::optional<Frame>{};
   }
 
-  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const override {
-    std::vector<std::pair<std::string, std::uint64_t>> totals{
-        {"frames", frames_},
-        {"missed", sequence_.missed()},
-        {"incomplete", incomplete_},
-        {"superseded", superseded_},
-        {"clock_restarts", device_clock_.restarts()}};
+  [[nodiscard]] SensorTotals counters() const override {
     ArvStream* stream = session_->stream();
-    const auto add = [&](const char* name, const char* of_aravis) {
-      totals.emplace_back(name, arv_stream_get_info_uint64_by_name(stream, of_aravis));
+    const auto of_aravis = [&](const char* name) {
+      return std::uint64_t{arv_stream_get_info_uint64_by_name(stream, name)};
     };
-    add("underruns", "n_underruns");
+    SensorTotals totals{.faults = {{"missed", sequence_.missed()},
+                                   {"incomplete", incomplete_},
+                                   {"clock_restarts", device_clock_.restarts()},
+                                   {"underruns", of_aravis("n_underruns")}},
+                        .counts = {{"frames", frames_}, {"superseded", superseded_}}};
     if (!is_network_stream(stream)) return totals;
-    add("missing_packets", "n_missing_packets");
-    add("resent_packets", "n_resent_packets");
+    totals.faults.emplace_back("missing_packets", of_aravis("n_missing_packets"));
+    totals.counts.emplace_back("resent_packets", of_aravis("n_resent_packets"));
     return totals;
   }
 

@@ -8,10 +8,10 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "estimator/core/result.hpp"
+#include "estimator/core/sensor_totals.hpp"
 #include "estimator/core/time.hpp"
 
 namespace crepes {
@@ -56,8 +56,8 @@ class Camera {
   // NOLINTNEXTLINE(performance-unnecessary-value-param): overrides move from it.
   virtual void recycle(Frame /*frame*/) {}
 
-  /// Totals by reason: frames missed, late, broken.
-  [[nodiscard]] virtual std::vector<std::pair<std::string, std::uint64_t>> counters() const = 0;
+  /// Frames missed, late, broken, and what else there is to count.
+  [[nodiscard]] virtual SensorTotals counters() const = 0;
 
   /// One sentence on what is wrong with a camera that delivers nonetheless, if anything.
   [[nodiscard]] virtual std::optional<std::string> diagnosis() const { return std::nullopt; }

@@ -102,8 +102,8 @@ Result<std::optional<Frame>> FolderCamera::read_once(std::chrono::milliseconds t
   });
 }
 
-std::vector<std::pair<std::string, std::uint64_t>> FolderCamera::counters() const {
-  return {{"frames", next_}};
+SensorTotals FolderCamera::counters() const {
+  return {.faults = {}, .counts = {{"frames", next_}}};
 }
 
 }  // namespace crepes

@@ -33,7 +33,7 @@ class FolderCamera final : public Camera {
                                                             const Clock& clock);
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override;
-  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const override;
+  [[nodiscard]] SensorTotals counters() const override;
 
  private:
   FolderCamera(std::vector<RecordedPicture> pictures, std::uint8_t camera, const Clock& clock)

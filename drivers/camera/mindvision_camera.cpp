@@ -118,11 +118,9 @@ class MindVisionCamera final : public Camera {
     }
   }
 
-  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const override {
-    return {{"frames", frames_},
-            {"incomplete", incomplete_},
-            {"superseded", superseded_},
-            {"clock_restarts", device_clock_.restarts()}};
+  [[nodiscard]] SensorTotals counters() const override {
+    return {.faults = {{"incomplete", incomplete_}, {"clock_restarts", device_clock_.restarts()}},
+            .counts = {{"frames", frames_}, {"superseded", superseded_}}};
   }
 
   [[nodiscard]] std::optional<std::string> diagnosis() const override {

@@ -251,11 +251,9 @@ class V4l2Camera final : public Camera {
     if (spare_.empty()) spare_ = std::move(frame.pixels);
   }
 
-  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const override {
-    return {{"frames", frames_},
-            {"missed", sequence_.missed()},
-            {"incomplete", incomplete_},
-            {"superseded", superseded_}};
+  [[nodiscard]] SensorTotals counters() const override {
+    return {.faults = {{"missed", sequence_.missed()}, {"incomplete", incomplete_}},
+            .counts = {{"frames", frames_}, {"superseded", superseded_}}};
   }
 
   [[nodiscard]] std::optional<std::string> diagnosis() const override {

@@ -36,9 +36,7 @@ class WatchedCamera final : public Camera {
     return frame;
   }
   void recycle(Frame frame) override { camera_->recycle(std::move(frame)); }
-  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const override {
-    return camera_->counters();
-  }
+  [[nodiscard]] SensorTotals counters() const override { return camera_->counters(); }
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     std::optional<std::string> fault = camera_->diagnosis();
     return fault ? fault : health_.diagnosis();

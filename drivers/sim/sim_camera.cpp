@@ -20,7 +20,7 @@ Result<std::optional<Frame>> SimCamera::read_once(std::chrono::milliseconds time
   const auto latest = static_cast<std::int64_t>(std::floor(clock_.world_s() * rate_hz_));
   if (latest < next_) return std::optional<Frame>{};
 
-  missed_ += static_cast<std::uint64_t>(latest - next_);
+  superseded_ += static_cast<std::uint64_t>(latest - next_);
   ++frames_;
   next_ = latest + 1;
   const double shutter_s = static_cast<double>(latest) / rate_hz_;
@@ -29,8 +29,8 @@ Result<std::optional<Frame>> SimCamera::read_once(std::chrono::milliseconds time
   return std::optional(std::move(frame));
 }
 
-std::vector<std::pair<std::string, std::uint64_t>> SimCamera::counters() const {
-  return {{"frames", frames_}, {"missed", missed_}};
+SensorTotals SimCamera::counters() const {
+  return {.faults = {}, .counts = {{"frames", frames_}, {"superseded", superseded_}}};
 }
 
 }  // namespace crepes

@@ -18,7 +18,7 @@ class SimCamera final : public Camera {
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override;
   void recycle(Frame frame) override { renderer_.recycle(std::move(frame)); }
-  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const override;
+  [[nodiscard]] SensorTotals counters() const override;
 
  private:
   RingRenderer renderer_;
@@ -27,7 +27,7 @@ class SimCamera final : public Camera {
   Duration timeshift_;
   std::int64_t next_;  ///< counts frames since the world's epoch
   std::uint64_t frames_ = 0;
-  std::uint64_t missed_ = 0;
+  std::uint64_t superseded_ = 0;
 };
 
 }  // namespace crepes

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/sensor_totals.hpp"
 
 namespace crepes {
 
@@ -181,8 +182,8 @@ struct SensorStatus {
   std::string name;
   double rate_hz = 0.0;
   bool ok = false;
-  std::string message;                                          ///< what is wrong and what to do
-  std::vector<std::pair<std::string, std::uint64_t>> counters;  ///< faults by reason, totals
+  std::string message;  ///< what is wrong and what to do
+  SensorTotals totals{};
 };
 
 struct ClockStatus {

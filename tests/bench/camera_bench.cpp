@@ -86,8 +86,10 @@ int measure(const CameraConfig& config, double duration_s) {
               static_cast<double>(spots) / static_cast<double>(frames), 100.0 * cpu / duration_s);
   std::printf("behind the fastest arrivals: median %.2f ms, 99 %% %.2f ms, worst %.2f ms\n",
               late(0.5), late(0.99), late(1.0));
-  for (const auto& [name, count] : (*camera)->counters())
-    std::printf("%s %llu\n", name.c_str(), static_cast<unsigned long long>(count));
+  const auto [faults, counts] = (*camera)->counters();
+  for (const Totals& totals : {counts, faults})
+    for (const auto& [name, count] : totals)
+      std::printf("%s %llu\n", name.c_str(), static_cast<unsigned long long>(count));
   return 0;
 }
 

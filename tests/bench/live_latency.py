@@ -73,10 +73,10 @@ class Robot:
     def take_status(self, status):
         self.loads.append((status["uptime_s"], status["cpu_s"], status["rss_mb"]))
         for sensor in status["sensors"]:
-            faults = sensor.get("faults", {})
-            if sensor["name"].endswith(" spots") and "delay_p99_us" in faults:
-                self.spot_p50_ms.append(faults["delay_p50_us"] / 1e3)
-                self.spot_p99_ms.append(faults["delay_p99_us"] / 1e3)
+            counts = sensor.get("counts", {})
+            if sensor["name"].endswith(" spots") and "delay_p99_us" in counts:
+                self.spot_p50_ms.append(counts["delay_p50_us"] / 1e3)
+                self.spot_p99_ms.append(counts["delay_p99_us"] / 1e3)
 
 
 class Threads:

@@ -58,6 +58,13 @@ TEST_F(Tools, ShowTheStatusOnOneScreenAndInJson) {
   EXPECT_TRUE(json["neighbors"][0].contains("measurements"));
   EXPECT_GT(json["cpu_s"], 0.0);
   EXPECT_FALSE(json.contains("truncated"));
+  // What is no fault is not told as one: a camera that works well has none.
+  for (const char* name : {"cam0", "cam0 spots"}) {
+    EXPECT_FALSE(sensor_of(json, name).contains("faults")) << sensor_of(json, name);
+    EXPECT_FALSE(sensor_of(json, name)["counts"].empty()) << name;
+  }
+  EXPECT_GT(sensor_of(json, "cam0")["counts"]["frames"], 0);
+  EXPECT_GT(sensor_of(json, "cam0 spots")["counts"]["delay_p99_us"], 0);
 }
 
 TEST_F(Tools, NameTheSourcesOfAPose) {

@@ -45,8 +45,11 @@ TEST(DaemonMessages, ReadTheReasonWhereThereIsNoPose) {
   SystemStatus status;
   status.self = RobotId{1};
   status.name = "r1";
-  status.sensors = {
-      {.name = "imu", .rate_hz = 99.5, .ok = false, .message = "unplugged", .counters = {}}};
+  status.sensors = {{.name = "imu",
+                     .rate_hz = 99.5,
+                     .ok = false,
+                     .message = "unplugged",
+                     .totals = {.faults = {{"stuck", 3}}, .counts = {{"samples", 500}}}}};
   status.clocks = {{.peer = RobotId{2}, .offset_s = -17.5, .skew_ppm = 3.0, .sigma_s = 1e-4}};
   NeighborStatus neighbor;
   neighbor.neighbor = RobotId{2};
@@ -62,6 +65,8 @@ TEST(DaemonMessages, ReadTheReasonWhereThereIsNoPose) {
   ASSERT_EQ(read.sensors.size(), 1U);
   EXPECT_EQ(read.sensors[0].message, "unplugged");
   EXPECT_FALSE(read.sensors[0].ok);
+  EXPECT_EQ(read.sensors[0].faults, (StatusMessage::Totals{{"stuck", 3}}));
+  EXPECT_EQ(read.sensors[0].counts, (StatusMessage::Totals{{"samples", 500}}));
   ASSERT_EQ(read.clocks.size(), 1U);
   EXPECT_EQ(read.clocks[0].offset_s, -17.5);
 }

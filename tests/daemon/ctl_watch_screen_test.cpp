@@ -27,8 +27,12 @@ StatusMessage status_of(double uptime_s, double cpu_s) {
   status.name = "r1";
   status.uptime_s = uptime_s;
   status.cpu_s = cpu_s;
-  status.sensors = {
-      {.name = "uwb", .rate_hz = 0.0, .ok = false, .message = "unplugged", .faults = {}}};
+  status.sensors = {{.name = "uwb",
+                     .rate_hz = 0.0,
+                     .ok = false,
+                     .message = "unplugged",
+                     .faults = {},
+                     .counts = {}}};
   StatusMessage::Neighbor hidden;
   hidden.neighbor = RobotId{4};
   hidden.name = "r4";

@@ -159,8 +159,8 @@ TEST_F(SerialSensors, TellASensorThatRepeatsItself) {
   send_for(*device, recorded_file("imu/hipnuc_hi91_official").bytes, 1s);
 
   EXPECT_NE(device->diagnosis().value_or("").find("repeats"), std::string::npos);
-  const Totals totals = device->counters();
-  EXPECT_NE(std::find(totals.begin(), totals.end(), Totals::value_type{"stuck", 5}), totals.end());
+  const Totals faults = device->counters().faults;
+  EXPECT_NE(std::find(faults.begin(), faults.end(), Totals::value_type{"stuck", 5}), faults.end());
 }
 
 /// Gives nothing, or has something wrong; each read takes its full time.
@@ -171,7 +171,7 @@ class FakeDevice final : public Device {
     clock_.set(clock_.now() + timeout);
     return 0;
   }
-  [[nodiscard]] Totals counters() const override { return {}; }
+  [[nodiscard]] SensorTotals counters() const override { return {}; }
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     if (clock_.now() < Timestamp{1s} || fault_.empty()) return std::nullopt;
     return fault_;

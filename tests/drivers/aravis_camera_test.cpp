@@ -7,6 +7,7 @@
 
 #include "drivers/camera/watched_camera.hpp"
 #include "drivers/monotonic_clock.hpp"
+#include "tests/support/counted.hpp"
 #include "tests/support/gige_camera.hpp"
 
 namespace crepes {
@@ -55,13 +56,6 @@ class AravisCameraTest : public testing::Test {
     return frames;
   }
 
-  static std::uint64_t counted(const Camera& camera, const std::string& name) {
-    for (const auto& [reason, count] : camera.counters())
-      if (reason == name) return count;
-    ADD_FAILURE() << "nobody counts " << name;
-    return 0;
-  }
-
   CameraConfig config_;
   MonotonicClock clock_;
   std::string last_error_;
@@ -104,7 +98,7 @@ TEST_F(AravisCameraTest, GetsItsBuffersBackWhenFramesEnd) {
   }
 
   EXPECT_EQ(seen, 60);
-  EXPECT_EQ(counted(**camera, "underruns"), 0U);
+  EXPECT_EQ(faults_of(**camera, "underruns"), 0U);
 }
 
 TEST_F(AravisCameraTest, KeepsAFramesMemoryThoughTheCameraIsClosed) {
@@ -134,7 +128,7 @@ TEST_F(AravisCameraTest, HandsOnTheNewestWhenItFellBehind) {
   const auto next = read_until(**camera, [](const auto& f) { return f.size() == 1; });
 
   ASSERT_EQ(next.size(), 1U) << last_error_;
-  EXPECT_GT(counted(**camera, "superseded"), 0U);
+  EXPECT_GT(counts_of(**camera, "superseded"), 0U);
   EXPECT_GT(*next[0].data(), *first[0].data() + 2);
 }
 
@@ -144,11 +138,11 @@ TEST_F(AravisCameraTest, CountsAndTellsLostPackets) {
   ASSERT_TRUE(camera) << camera.error().message;
 
   read_until(**camera, [&](const auto&) {
-    return (*camera)->diagnosis().has_value() && counted(**camera, "incomplete") > 5;
+    return (*camera)->diagnosis().has_value() && faults_of(**camera, "incomplete") > 5;
   });
 
   EXPECT_NE((*camera)->diagnosis().value_or("").find("incomplete"), std::string::npos);
-  EXPECT_GT(counted(**camera, "missing_packets"), 0U);
+  EXPECT_GT(faults_of(**camera, "missing_packets"), 0U);
   device.lose_packets(0.0);
   read_until(**camera, [&](const auto&) { return !(*camera)->diagnosis(); });
   EXPECT_EQ((*camera)->diagnosis(), std::nullopt);

@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/counted.hpp"
 #include "tests/support/manual_clock.hpp"
 
 extern "C" {
@@ -114,7 +115,7 @@ TEST_F(MindVisionCameraTest, HandsOnTheNewestAndGivesBackTheOthers) {
   ASSERT_TRUE(frame && *frame);
   EXPECT_EQ(*(*frame)->data(), 100);
   EXPECT_EQ(stub_->lent_buffers, 1);
-  EXPECT_EQ((*camera)->counters()[2], (std::pair<std::string, std::uint64_t>("superseded", 2)));
+  EXPECT_EQ(counts_of(**camera, "superseded"), 2U);
 }
 
 TEST_F(MindVisionCameraTest, KeepsTheCameraOpenForAsLongAsAFrameIsAway) {
@@ -153,7 +154,7 @@ TEST_F(MindVisionCameraTest, CountsFramesThatComeInPart) {
   const auto nothing = (*camera)->read_once(10ms);
 
   EXPECT_TRUE(nothing && !*nothing);
-  EXPECT_EQ((*camera)->counters()[1], (std::pair<std::string, std::uint64_t>("incomplete", 1)));
+  EXPECT_EQ(faults_of(**camera, "incomplete"), 1U);
 }
 
 TEST_F(MindVisionCameraTest, RefusesFramesThatAreNotGreyOrShorterThanTheyClaim) {

@@ -202,8 +202,8 @@ TEST(SimCamera, KeepsItsBeatAndMissesFramesRatherThanFallBehind) {
   EXPECT_TRUE(too_early && !*too_early);
   ASSERT_TRUE(late && *late);
   EXPECT_NEAR(to_seconds((*late)->stamp.time_since_epoch()), 11.019, 1e-8);
-  EXPECT_EQ(camera.counters(),
-            (std::vector<std::pair<std::string, std::uint64_t>>{{"frames", 2}, {"missed", 3}}));
+  EXPECT_EQ(camera.counters().counts, (Totals{{"frames", 2}, {"superseded", 3}}));
+  EXPECT_TRUE(camera.counters().faults.empty());
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "drivers/camera/grey_conversion.hpp"
+#include "tests/support/counted.hpp"
 #include "tests/support/manual_clock.hpp"
 
 namespace crepes {
@@ -157,12 +158,6 @@ class V4l2CameraTest : public testing::Test {
     const auto camera = open();
     return camera ? "" : camera.error().message;
   }
-  static std::uint64_t counted(const Camera& camera, const std::string& name) {
-    for (const auto& [reason, count] : camera.counters())
-      if (reason == name) return count;
-    ADD_FAILURE() << "nobody counts " << name;
-    return 0;
-  }
 
   FakeKernel kernel_;
   CameraConfig config_;
@@ -188,7 +183,7 @@ TEST_F(V4l2CameraTest, LendsGreyFramesWithTheirStrideAndTakesTheBuffersBack) {
     EXPECT_EQ(kernel_.free.size(), 3U);
   }
   EXPECT_EQ(kernel_.free.size(), 4U);
-  EXPECT_EQ(counted(**camera, "missed"), 0U);
+  EXPECT_EQ(faults_of(**camera, "missed"), 0U);
 }
 
 TEST_F(V4l2CameraTest, NarrowsWiderLevelsAndUsesTheirMemoryAgain) {
@@ -219,10 +214,10 @@ TEST_F(V4l2CameraTest, HandsOnTheNewestAndCountsWhatItSkippedAndWhatTheDeviceDid
 
   ASSERT_TRUE(frame && *frame);
   EXPECT_EQ(*(*frame)->data(), 4);
-  EXPECT_EQ(counted(**camera, "superseded"), 3U);
+  EXPECT_EQ(counts_of(**camera, "superseded"), 3U);
   ASSERT_TRUE(kernel_.shoot(7));
   ASSERT_TRUE((*camera)->read_once(10ms));
-  EXPECT_EQ(counted(**camera, "missed"), 2U);
+  EXPECT_EQ(faults_of(**camera, "missed"), 2U);
 }
 
 TEST_F(V4l2CameraTest, GivesBrokenFramesBack) {
@@ -235,7 +230,7 @@ TEST_F(V4l2CameraTest, GivesBrokenFramesBack) {
   const auto frame = (*camera)->read_once(10ms);
 
   EXPECT_TRUE(frame && !*frame);
-  EXPECT_EQ(counted(**camera, "incomplete"), 2U);
+  EXPECT_EQ(faults_of(**camera, "incomplete"), 2U);
   EXPECT_EQ(kernel_.free.size(), 4U);
 }
 

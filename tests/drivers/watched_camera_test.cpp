@@ -23,9 +23,7 @@ class FakeCamera final : public Camera {
     frames_.pop_front();
     return std::optional(std::move(frame));
   }
-  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const override {
-    return {};
-  }
+  [[nodiscard]] SensorTotals counters() const override { return {}; }
 
  private:
   std::deque<Frame>& frames_;

@@ -32,8 +32,11 @@ SystemStatus big_status(int neighbors) {
   status.name = "r1";
   status.uptime_s = 1.5;
   for (const char* name : {"imu0", "uwb0", "cam0", "cam1"})
-    status.sensors.push_back(
-        {name, 199.98765, false, std::string(300, 'x'), {{"bad_checksum", 12345}}});
+    status.sensors.push_back({name,
+                              199.98765,
+                              false,
+                              std::string(300, 'x'),
+                              {{{"bad_checksum", 12345}}, {{"frames", 77}}}});
   for (int i = 0; i < neighbors; ++i) {
     NeighborStatus neighbor;
     neighbor.neighbor = RobotId{static_cast<std::uint16_t>(i + 2)};
@@ -180,7 +183,8 @@ TEST(SubscriptionJson, TellsAllOfASmallStatus) {
   const Json json = Json::parse(status_json(status));
 
   EXPECT_FALSE(json.contains("truncated"));
-  EXPECT_EQ(json["sensors"][0]["faults"]["bad_checksum"], 12345);
+  EXPECT_EQ(json["sensors"][0]["faults"], Json({{"bad_checksum", 12345}}));
+  EXPECT_EQ(json["sensors"][0]["counts"], Json({{"frames", 77}}));
   EXPECT_EQ(json["neighbors"][0]["state"], "direct");
   EXPECT_NEAR(json["clocks"][0]["offset_s"].get<double>(), 993.638158694, 1e-8);
   EXPECT_EQ(json["queues"]["events"], 42);
