@@ -94,7 +94,9 @@ class Reader {
         continue;
       }
       const std::string& key = entry.first.Scalar();
-      const std::string key_path = path.empty() ? key : path + '.' + key;
+      std::string key_path = path;
+      if (!key_path.empty()) key_path += '.';
+      key_path += key;
       const auto [first, is_new] = lines.emplace(key, line);
       if (!is_new) {
         fault(first->second, key_path, "is given again in line " + std::to_string(line));

@@ -15,6 +15,7 @@ struct Endpoint {
   std::uint32_t scope = 0;  ///< interface of a link-local IPv6 address, 0 for others
   std::uint16_t port = 0;
 
+  // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the 0 behind <=> for a pointer
   auto operator<=>(const Endpoint&) const = default;
 
   [[nodiscard]] bool is_ipv4() const;

@@ -148,6 +148,9 @@ Result<UdpSocket> UdpSocket::open(const Endpoint& address, std::string name, boo
   const int family = address.is_ipv4() ? AF_INET : AF_INET6;
   UdpSocket socket(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), std::move(name));
   if (socket.fd_ < 0) return fail_errno(socket.name_, errno);
+  // As much as the kernel allows, twice its default: a burst waits there while others compute.
+  constexpr int kBuffer = 1 << 20;
+  (void)::setsockopt(socket.fd_, SOL_SOCKET, SO_RCVBUF, &kBuffer, sizeof(kBuffer));
   const bool ready =
       (!broadcast || (set_option(socket.fd_, SOL_SOCKET, SO_REUSEADDR) == 0 &&
                       set_option(socket.fd_, SOL_SOCKET, SO_BROADCAST) == 0)) &&

@@ -46,7 +46,7 @@ Result<double> set_up_witmotion(const WitMotionSetup& setup) {
     return tl::unexpected(sent.error());
   const Result<double> rate_hz = measure_rate(std::move(*port), setup.listen);
   if (!rate_hz) return tl::unexpected(rate_hz.error());
-  if (std::abs(*rate_hz - setup.rate_hz) <= kWithin * setup.rate_hz) return rate_hz;
+  if (std::abs(*rate_hz - setup.rate_hz) <= kWithin * setup.rate_hz) return *rate_hz;
   return fail(ErrorCode::kIo, setup.port + ": " + std::to_string(std::lround(*rate_hz)) +
                                   " samples a second, not as asked");
 }

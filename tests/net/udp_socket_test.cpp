@@ -62,6 +62,19 @@ TEST(UdpSocket, GivesNothingWhenNothingComes) {
   EXPECT_FALSE(datagram->has_value());
 }
 
+TEST(UdpSocket, KeepsABurstUntilItIsRead) {
+  constexpr int kBurst = 400;  // the kernel's default buffer holds 277 small ones
+  auto server = UdpSocket::bind("127.0.0.1", 0);
+  auto guest = UdpSocket::bind("127.0.0.1", 0);
+  ASSERT_TRUE(server && guest);
+
+  for (int i = 0; i < kBurst; ++i) ASSERT_TRUE(guest->send_to(kBytes, server->local()));
+
+  int received = 0;
+  for (int i = 0; i < kBurst; ++i) received += received_by(*server).empty() ? 0 : 1;
+  EXPECT_EQ(received, kBurst);
+}
+
 TEST(UdpSocket, CutsHugeDatagrams) {
   auto socket = UdpSocket::bind("127.0.0.1", 0);
   ASSERT_TRUE(socket);
