@@ -51,6 +51,7 @@ int run(const std::string& file) {
 }  // namespace
 }  // namespace crepes
 
+// NOLINTNEXTLINE(bugprone-exception-escape): out of memory it aborts, and systemd starts it again
 int main(int argc, char** argv) {
   CLI::App app{"Relative localization of a robot swarm", "crepesd"};
   std::string file = "/etc/crepes/crepesd.yaml";

@@ -79,10 +79,9 @@ Result<std::unique_ptr<Camera>> FolderCamera::open(const std::filesystem::path& 
                                                    std::uint8_t camera, const Clock& clock) {
   // "cam0/data/" and "cam0/data" are the same folder, beside "cam0/data.csv".
   const std::filesystem::path pictures = (folder / "").lexically_normal().parent_path();
-  return read_picture_list(pictures.parent_path() / "data.csv", pictures)
-      .map([&](std::vector<RecordedPicture> list) {
-        return std::unique_ptr<Camera>(new FolderCamera(std::move(list), camera, clock));
-      });
+  auto list = read_picture_list(pictures.parent_path() / "data.csv", pictures);
+  if (!list) return tl::unexpected(std::move(list.error()));
+  return std::unique_ptr<Camera>(new FolderCamera(std::move(*list), camera, clock));
 }
 
 Result<std::optional<Frame>> FolderCamera::read_once(std::chrono::milliseconds timeout) {
