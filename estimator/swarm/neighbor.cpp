@@ -17,8 +17,6 @@ constexpr double kLateMemory = 1.0 / 16.0;  // of ranges
 constexpr double kHiddenShare = 0.25;       // in line of sight reflections are rarer
 constexpr Duration kHiddenAfter = std::chrono::milliseconds{150};
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
-// A robot's bearings come so much later than its IMU samples: a frame and a half.
-constexpr Duration kBearingDelay = std::chrono::milliseconds{10};
 
 double calibration_sigma_rad(const FilterSettings& settings) {
   return settings.profile == Profile::kTight ? kLooseBearing : settings.priors.misalignment_rad;
@@ -38,7 +36,8 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
       settings_(settings),
       sightings_(self, neighbor, calibration_sigma_rad(settings), single_range_sigma_m(settings)),
       sequencer_(settings.lag),
-      hypotheses_(settings, mounting_) {
+      hypotheses_(settings, mounting_),
+      look_ahead_(mounting_, settings.gates) {
   status_.neighbor = neighbor.id;
   status_.name = neighbor.name;
 }
@@ -50,7 +49,7 @@ void Neighbor::reconfigure(const FilterSettings& settings) {
   sightings_.set_sigmas(calibration_sigma_rad(settings), single_range_sigma_m(settings));
   sequencer_.set_lag(settings.lag);
   hypotheses_.reconfigure(settings);
-  ahead_.reset();
+  look_ahead_ = LookAhead(mounting_, settings_.gates);
 }
 
 void Neighbor::add_bearing(const Bearing& bearing) {
@@ -82,7 +81,7 @@ void Neighbor::add_report(const ReceivedReport& received, const RobotState& self
   const Report& report = received.report;
   last_heard_ = std::max(last_heard_, report.stamp);
   for (const ImuSample& sample : report.imu) {
-    if (body_.add(sample)) look_again_from(sample.stamp);
+    if (body_.add(sample)) look_ahead_.look_again_from(sample.stamp);
   }
   if (!body_.tilt || report.tilt.stamp > body_.tilt->stamp) body_.tilt = report.tilt;
   for (const UwbRange& range : report.ranges) {
@@ -151,7 +150,7 @@ void Neighbor::enqueue(Measurement measurement) {
   if (!sequencer_.push(std::move(measurement))) {
     note(stamp, kind, {.verdict = Verdict::kLate});
   } else {
-    look_again_from(stamp);
+    look_ahead_.look_again_from(stamp);
   }
 }
 
@@ -171,7 +170,7 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
   }
   try_one_way(now, self);
   release(now, self);
-  look_ahead(now, self);
+  find_pose(now, self);
   if (keeps_records_ && !hypotheses_.empty()) {
     if (const auto calibration = hypotheses_.leader().heaviest().calibration()) {
       records_.calibrations.push_back(*calibration);
@@ -239,49 +238,12 @@ void Neighbor::start(const Measurement& measurement) {
   if (started) note(measurement.stamp, measurement.kind, {.verdict = Verdict::kFused});
 }
 
-// From where the last tick got to, as far as nothing has come in between: most readings are taken
-// twice or thrice, and not at every tick until the lag has passed.
-NeighborTrack Neighbor::track_at(Timestamp t, const RobotState& self) {
-  const GaussianSum& leader = hypotheses_.leader();
-  NeighborTrack track = leader.heaviest();
-  const std::uint32_t generation = hypotheses_.generation();
-  if (ahead_ && ahead_->generation == generation && ahead_->track.stamp() > track.stamp() &&
-      ahead_->track.stamp() <= t) {
-    track = ahead_->track;
-  }
-  const Timestamp sure =
-      std::min({self.imu.newest().stamp, body_.imu.newest().stamp, t}) - kBearingDelay;
-  if (leader.size() == 1 && sure > track.stamp()) {
-    run_to(sure, self, track);
-    ahead_ = Ahead{track, generation};
-  }
-  run_to(t, self, track);
-  return track;
-}
-
-void Neighbor::look_again_from(Timestamp stamp) {
-  if (ahead_ && stamp <= ahead_->track.stamp()) ahead_.reset();
-}
-
-void Neighbor::run_to(Timestamp t, const RobotState& self, NeighborTrack& track) const {
-  const std::vector<Measurement>& pending = sequencer_.pending();
-  const auto next = std::find_if(pending.begin(), pending.end(),
-                                 [&](const Measurement& m) { return m.stamp > track.stamp(); });
-  for (std::span rest(next, pending.end()); !rest.empty() && rest.front().stamp <= t;) {
-    const auto group = leading_group(rest);
-    rest = rest.subspan(group.size());
-    track.advance_to(group.front().stamp, self.imu, body_.imu);
-    static_cast<void>(
-        track.fuse(group[track.likeliest(group, mounting_)], mounting_, settings_.gates));
-  }
-  track.advance_to(t, self.imu, body_.imu);
-}
-
-void Neighbor::look_ahead(Timestamp now, const RobotState& self) {
+void Neighbor::find_pose(Timestamp now, const RobotState& self) {
   if (!hypotheses_.is_settled() || self.imu.empty() || body_.imu.empty()) return;
   const Timestamp state_time = std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
   if (hypotheses_.stamp() > state_time) return;
-  const NeighborTrack head = track_at(state_time, self);
+  const NeighborTrack head =
+      look_ahead_.at(state_time, hypotheses_, {sequencer_.pending(), self.imu, body_.imu});
   const GaussianPose T_B_N = hypotheses_.leader().mean(head.pose());
   if (!is_certain(T_B_N.covariance)) return;
   if (hypotheses_.generation() != std::exchange(generation_, hypotheses_.generation())) {

@@ -10,6 +10,7 @@
 #include "estimator/swarm/event_sequencer.hpp"
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/hypotheses.hpp"
+#include "estimator/swarm/look_ahead.hpp"
 #include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/sighting_log.hpp"
 
@@ -57,11 +58,7 @@ class Neighbor {
   void enqueue(Measurement measurement);
   void note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion);
   void release(Timestamp now, const RobotState& self);
-  void look_ahead(Timestamp now, const RobotState& self);
-  /// The leading filter at `t`, corrected with what waits.
-  [[nodiscard]] NeighborTrack track_at(Timestamp t, const RobotState& self);
-  void look_again_from(Timestamp stamp);
-  void run_to(Timestamp t, const RobotState& self, NeighborTrack& track) const;
+  void find_pose(Timestamp now, const RobotState& self);
   void start(const Measurement& measurement);
   void try_one_way(Timestamp now, const RobotState& self);
   [[nodiscard]] bool is_a_start(const Measurement& measurement) const;
@@ -76,16 +73,9 @@ class Neighbor {
   SightingLog sightings_;
   EventSequencer sequencer_;
   Hypotheses hypotheses_;
+  LookAhead look_ahead_;
   std::uint32_t generation_ = 0;  ///< of the hypothesis that was published last
   std::uint32_t starts_ = 0;
-
-  // The leading filter, corrected with what waited at the last tick, up to where nothing was
-  // expected any more.
-  struct Ahead {
-    NeighborTrack track;
-    std::uint32_t generation;
-  };
-  std::optional<Ahead> ahead_;
 
   // What the last tick found.
   std::optional<NeighborPose> pose_;
