@@ -33,4 +33,10 @@ bool CookieMint::accepts(std::string_view cookie, const Endpoint& client, Timest
          cookie == text_of(keyed_hash(key_, client, slot - 1));
 }
 
+bool CookieMint::is_in(std::string_view text, const Endpoint& client, Timestamp now) const {
+  const std::uint64_t slot = slot_of(now);
+  return text.find(text_of(keyed_hash(key_, client, slot))) != std::string_view::npos ||
+         text.find(text_of(keyed_hash(key_, client, slot - 1))) != std::string_view::npos;
+}
+
 }  // namespace crepes

@@ -17,6 +17,8 @@ class CookieMint {
   /// Good for this address and port, for one to two minutes.
   [[nodiscard]] std::string cookie_for(const Endpoint& client, Timestamp now) const;
   [[nodiscard]] bool accepts(std::string_view cookie, const Endpoint& client, Timestamp now) const;
+  /// Whether it stands anywhere in a text that nobody has parsed yet.
+  [[nodiscard]] bool is_in(std::string_view text, const Endpoint& client, Timestamp now) const;
 
  private:
   HashKey key_;

@@ -26,7 +26,7 @@ std::optional<std::string> SubscriptionDesk::answer(const Endpoint& client,
     ++unanswerable_;
     return std::nullopt;
   }
-  if (!admits(client, now)) {
+  if (!admits(client, request, now)) {
     ++excess_;
     return std::nullopt;
   }
@@ -41,9 +41,13 @@ std::optional<std::string> SubscriptionDesk::answer(const Endpoint& client,
   return answer && answer->size() <= request.size() ? std::move(answer) : std::nullopt;
 }
 
-bool SubscriptionDesk::admits(const Endpoint& client, Timestamp now) {
+// Who forges a subscriber's address does not have its cookie, and uses up strangers' tokens.
+bool SubscriptionDesk::admits(const Endpoint& client, std::string_view request, Timestamp now) {
   table_.expire(now);
-  const std::optional<bool> subscriber = table_.admits(client, now);
+  const bool is_proven = client.is_loopback() || (request.size() <= kMaxSubscriptionDatagram &&
+                                                  cookies_.is_in(request, client, now));
+  const std::optional<bool> subscriber =
+      is_proven ? table_.admits(client, now) : std::optional<bool>{};
   return subscriber ? *subscriber : limiter_.admits(client, now);
 }
 

@@ -42,7 +42,7 @@ class SubscriptionDesk {
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
 
  private:
-  [[nodiscard]] bool admits(const Endpoint& client, Timestamp now);
+  [[nodiscard]] bool admits(const Endpoint& client, std::string_view request, Timestamp now);
   [[nodiscard]] std::optional<std::string> serve(const Endpoint& client,
                                                  const SubscriptionRequest& request, Timestamp now,
                                                  std::size_t via);

@@ -173,6 +173,21 @@ TEST_F(Desk, RenewsASubscriptionInTheMiddleOfAFlood) {
   EXPECT_EQ(subscribers(kStart + seconds{30}), 1U);
 }
 
+TEST_F(Desk, RenewsASubscriptionWhileOthersForgeItsAddress) {
+  const std::string cookie = cookie_of(kRemote);
+  const auto renew = [&](Timestamp now) {
+    return json_answer(kRemote, padded("WATCH", cookie), now)["class"];
+  };
+  ASSERT_EQ(renew(kStart), "VERSION");
+
+  for (int second = 1; second <= 30; ++second) {
+    const Timestamp now = kStart + seconds{second};
+    for (int i = 0; i < 1000; ++i) (void)answer(kRemote, padded("WATCH", "0123456789abcdef"), now);
+    EXPECT_EQ(renew(now), "VERSION");
+  }
+  EXPECT_EQ(subscribers(kStart + seconds{30}), 1U);
+}
+
 TEST_F(Desk, ServesAPoliteProgramAmongFloodsOfItsAddress) {
   const auto local = [](int port) {
     return Endpoint::ipv4({127, 0, 0, 1}, static_cast<std::uint16_t>(port));
