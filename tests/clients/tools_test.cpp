@@ -33,7 +33,11 @@ TEST_F(Tools, WaitForAPoseAndTellOfIt) {
   EXPECT_EQ(nobody.how, "exit code 1");
   EXPECT_NE(nobody.errors.find("no other robot of this swarm"), std::string::npos) << nobody.errors;
 
-  const Ending vague = ask("waitpose", {"--peer", "2", "--timeout", "1", "--max-sigma", "1e-9"});
+  // A machine that is overloaded takes the pose away for a moment.
+  constexpr int kAttempts = 10;
+  Ending vague;
+  for (int i = 0; i < kAttempts && vague.errors.find("is known to") == std::string::npos; ++i)
+    vague = ask("waitpose", {"--peer", "2", "--timeout", "1", "--max-sigma", "1e-9"});
   EXPECT_EQ(vague.how, "exit code 1");
   EXPECT_NE(vague.errors.find("is known to"), std::string::npos) << vague.errors;
 }
