@@ -162,8 +162,11 @@ class NetLoop {
   void broadcast(const Report& report, Timestamp now) {
     UdpSocket* socket = mesh_.get(now);
     if (socket == nullptr) return;
-    if (const Result<void> sent = socket->broadcast(link_.compose(report, now)); !sent)
-      mesh_.failed(sent.error(), now);
+    const Result<void> sent = socket->broadcast(link_.compose(report, now));
+    if (sent) return;
+    ++unsent_;
+    // A congested mesh is no reason to close the socket, with all that waits in it to be read.
+    if (sent.error().code != ErrorCode::kBusy) mesh_.failed(sent.error(), now);
   }
 
   [[nodiscard]] SystemStatus status() const {
@@ -185,6 +188,7 @@ class NetLoop {
     status.traffic = link_.traffic(status.stamp);
     status.queues = stage_.queues();
     status.network = link_.counters();
+    status.network.emplace_back("reports_unsent", unsent_);
     for (auto& counter : server_->counters()) status.network.push_back(std::move(counter));
     return status;
   }
@@ -196,6 +200,7 @@ class NetLoop {
   Timestamp start_;
   PeerLink link_;
   MeshSocket mesh_;
+  std::uint64_t unsent_ = 0;
   std::optional<SubscriptionServer> server_;
   EstimatorStatus estimator_;
   std::map<std::string, SensorStatus> sensors_;

@@ -190,8 +190,11 @@ Result<void> UdpSocket::send_to(std::span<const std::uint8_t> bytes, const Endpo
   const ssize_t sent = with_sockaddr(to, [&](const sockaddr* address, socklen_t length) {
     return ::sendto(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL, address, length);
   });
-  if (sent < 0) return fail_errno(name_ + ": send to " + to.to_string(), errno);
-  return {};
+  if (sent >= 0) return {};
+  const int error = errno;
+  auto failed = fail_errno(name_ + ": send to " + to.to_string(), error);
+  if (error == EAGAIN || error == ENOBUFS) failed.value().code = ErrorCode::kBusy;
+  return failed;
 }
 
 Result<std::optional<Datagram>> UdpSocket::receive(std::chrono::milliseconds timeout) {

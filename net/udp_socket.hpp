@@ -38,10 +38,10 @@ class UdpSocket {
   UdpSocket& operator=(const UdpSocket&) = delete;
   ~UdpSocket();
 
-  /// To everyone on the interface; only for sockets of open_broadcast. After an error that tells
-  /// of the interface, open again.
+  /// To everyone on the interface; only for sockets of open_broadcast. kBusy when it is congested:
+  /// lost, as any datagram may be. After other errors, open again.
   [[nodiscard]] Result<void> broadcast(std::span<const std::uint8_t> bytes);
-  /// Never waits: what the system cannot take now is an Error.
+  /// Never waits: what the system cannot take now is an Error, kBusy.
   [[nodiscard]] Result<void> send_to(std::span<const std::uint8_t> bytes, const Endpoint& to);
   /// The next datagram, or nothing within `timeout`.
   [[nodiscard]] Result<std::optional<Datagram>> receive(std::chrono::milliseconds timeout);

@@ -14,6 +14,7 @@ enum class ErrorCode {
   kConfig,    ///< a setting is missing, unknown or out of bounds
   kUsage,     ///< the caller of a program asked for something that does not exist
   kNotFound,  ///< a file, device or robot that is not there
+  kBusy,      ///< the system cannot take more just now; what it was given before is not in doubt
 };
 
 struct Error {

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/support/places.hpp"
+
 namespace crepes {
 namespace {
 
@@ -92,7 +94,7 @@ TEST(IncludeRules, SayWhereAndWhy) {
 }
 
 TEST(IncludeRules, HoldInEverySourceFile) {
-  const fs::path root = CREPES_SOURCE_DIR;
+  const fs::path root = source_dir();
   std::size_t files = 0;
   std::vector<std::string> violations;
   for (const char* folder : {"estimator", "drivers", "net", "daemon", "firmware", "tests"}) {

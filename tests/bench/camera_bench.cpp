@@ -16,6 +16,7 @@
 #include "drivers/sim/ring_renderer.hpp"
 #include "estimator/vision/spot_detector.hpp"
 #include "tests/support/gige_camera.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -104,7 +105,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   crepes::Config config =
-      crepes::load_config(CREPES_SOURCE_DIR "/config/examples/four-simulated/r1.yaml").value();
+      crepes::load_config(crepes::source_dir() + "/config/examples/four-simulated/r1.yaml").value();
   const ::pid_t camera = ::fork();
   if (camera == 0) crepes::be_the_camera(config, lost_packets);
   crepes::CameraConfig& settings = config.cameras.at(0);

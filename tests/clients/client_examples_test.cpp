@@ -15,11 +15,12 @@
 #include "daemon/ctl/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
 #include "tests/support/live_daemon.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
 
-const std::string kClients = std::string(CREPES_SOURCE_DIR) + "/config/examples/clients";
+const std::string kClients = source_dir() + "/config/examples/clients";
 
 /// Where a program of this name is; empty if it is not installed.
 std::string path_of(const std::string& program) {
@@ -122,9 +123,9 @@ TEST_F(Clients, InRosGetPosesWithCovarianceAndTransforms) {
 
   const auto lines =
       lines_of("/usr/bin/env",
-               {"PYTHONPATH=" + std::string(CREPES_SOURCE_DIR) + "/tests/clients/fake_ros",
-                "FAKE_ROS_COUNT=20", "/usr/bin/python3", kClients + "/ros2/crepes_bridge.py",
-                "--ros-args", "-p", "port:=" + port_, "-p", "publish_tf:=true"},
+               {"PYTHONPATH=" + source_dir() + "/tests/clients/fake_ros", "FAKE_ROS_COUNT=20",
+                "/usr/bin/python3", kClients + "/ros2/crepes_bridge.py", "--ros-args", "-p",
+                "port:=" + port_, "-p", "publish_tf:=true"},
                20);
 
   int poses = 0;

@@ -11,6 +11,7 @@
 #include "daemon/ctl/csv_file.hpp"
 #include "daemon/ctl/scratch_directory.hpp"
 #include "tests/support/live_daemon.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 
@@ -36,7 +37,7 @@ inline Ending run(const std::string& program, const std::vector<std::string>& ar
 }
 
 inline Ending crepesctl(const std::vector<std::string>& arguments) {
-  return run(CREPES_TOOL, arguments);
+  return run(crepesctl_path(), arguments);
 }
 
 /// Standard output as --json has it: every line an object. A failure where it is anything else.

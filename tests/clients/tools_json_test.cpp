@@ -12,6 +12,7 @@
 #include "daemon/worker.hpp"
 #include "tests/clients/tool_run.hpp"
 #include "tests/daemon/ctl_tiny_swarm.hpp"
+#include "tests/support/places.hpp"
 #include "tests/support/witmotion_sensor.hpp"
 
 namespace crepes {
@@ -19,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kSource = CREPES_SOURCE_DIR;
+const std::string kSource = source_dir();
 
 TEST(ToolsInJson, AreAllButTheOneThatPrintsAScript) {
   std::istringstream script(crepesctl({"completion", "bash"}).output);
@@ -125,8 +126,7 @@ TEST(ToolsInJson, SayAnErrorInWordsAndNothingOnStandardOutput) {
 }
 
 TEST(ToolsInJson, SayThatNobodyTakesTheAnswer) {
-  const Ending ending =
-      run("/bin/sh", {"-c", std::string(CREPES_TOOL) + " completion bash >/dev/full"});
+  const Ending ending = run("/bin/sh", {"-c", crepesctl_path() + " completion bash >/dev/full"});
 
   EXPECT_EQ(ending.how, "exit code 1");
   EXPECT_NE(ending.errors.find("standard output"), std::string::npos) << ending.errors;
@@ -175,7 +175,7 @@ TEST_F(LiveToolsInJson, AreTheDaemonsOwnObjects) {
   const Json pose = object_of(to_first({"waitpose", "--peer", "2", "--timeout", "50"}));
   const Json status = object_of(to_first({"status"}));
   const Json sources = object_of(to_first({"sources"}));
-  const Ending watched = crepesctl(to_first({"watch", "--for", "1"}));
+  const Ending watched = crepesctl(to_first({"watch", "--for", "5"}));
 
   EXPECT_EQ(pose["class"], "POSE");
   EXPECT_EQ(status["class"], "STATUS");

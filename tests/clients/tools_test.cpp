@@ -6,6 +6,7 @@
 
 #include "daemon/runtime.hpp"
 #include "tests/clients/tool_run.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -133,7 +134,7 @@ TEST(ToolsAlone, MakeAKeyOnceOnly) {
 
 TEST(ToolsAlone, CompleteTheirWordsInBash) {
   const std::string script =
-      std::string("eval \"$(") + CREPES_TOOL +
+      std::string("eval \"$(") + crepesctl_path() +
       " completion bash)\"; "
       "try() { COMP_WORDS=(crepesctl \"$@\"); COMP_CWORD=$#; _crepesctl; echo \"${COMPREPLY[*]}\"; "
       "}; try wait; try waitpose --t; try led s; try led set --bri";

@@ -9,12 +9,14 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/places.hpp"
+
 namespace crepes {
 namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kRoot = CREPES_SOURCE_DIR;
+const fs::path kRoot = source_dir();
 
 /// A small good file; each test breaks one thing in it.
 constexpr const char* kGood = R"(robot: {id: 1}

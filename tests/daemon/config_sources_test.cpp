@@ -10,13 +10,14 @@
 
 #include "daemon/config_file.hpp"
 #include "daemon/ctl/scratch_directory.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kCalibrations = fs::path(CREPES_SOURCE_DIR) / "tests/daemon/calibration";
+const fs::path kCalibrations = fs::path(source_dir()) / "tests/daemon/calibration";
 
 constexpr const char* kBase = R"(robot: {id: 1}
 swarm:
@@ -155,7 +156,7 @@ TEST_F(ConfigSources, FindsAMembersFileBesideTheFragmentThatNamesIt) {
 }
 
 TEST_F(ConfigSources, TakesALibraryOfPatternsForAMembersFile) {
-  const std::string library = std::string(CREPES_SOURCE_DIR) + "/config/libraries/library64.yaml";
+  const std::string library = source_dir() + "/config/libraries/library64.yaml";
   write("crepesd.yaml",
         replaced(kBase, "swarm:", "cameras:", "swarm: {members_file: " + library + "}\n"));
 

@@ -6,6 +6,7 @@
 #include "daemon/ctl/codebook.hpp"
 #include "daemon/ctl/csv_file.hpp"
 #include "estimator/vision/id_library.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -38,14 +39,14 @@ TEST(CodebookCommand, WritesTheSwarmSectionOfAConfiguration) {
 
 TEST(CodebookCommand, WroteTheLibraryOfSixtyFour) {
   const auto kept =
-      read_text_file(CREPES_SOURCE_DIR "/config/libraries/library64.yaml").value_or("none");
+      read_text_file(source_dir() + "/config/libraries/library64.yaml").value_or("none");
 
   EXPECT_EQ(codebook({.ids = 64}), kept)
       << "renew it: crepesctl codebook --out config/libraries/library64.yaml";
 }
 
 TEST(CodebookCommand, TheLibraryOfSixtyFourIsGoodForTheDaemon) {
-  const auto kept = read_text_file(CREPES_SOURCE_DIR "/config/libraries/library64.yaml");
+  const auto kept = read_text_file(source_dir() + "/config/libraries/library64.yaml");
   ASSERT_TRUE(kept.has_value());
 
   const CheckedConfig checked = check_config_text(kTheRest + *kept, "f");

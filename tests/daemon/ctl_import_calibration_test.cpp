@@ -6,13 +6,14 @@
 #include "daemon/ctl/csv_file.hpp"
 #include "daemon/ctl/import_calibration.hpp"
 #include "daemon/ctl/scratch_directory.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kFiles = fs::path(CREPES_SOURCE_DIR) / "tests/daemon/calibration";
+const fs::path kFiles = fs::path(source_dir()) / "tests/daemon/calibration";
 
 constexpr const char* kTheRest = R"(robot: {id: 1}
 swarm:

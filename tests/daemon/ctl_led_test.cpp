@@ -13,6 +13,7 @@
 #include "firmware/led_board/command.h"
 #include "firmware/led_board/settings_store.h"
 #include "tests/support/led_settings.hpp"
+#include "tests/support/places.hpp"
 #include "tests/support/ram_flash.hpp"
 
 namespace crepes {
@@ -20,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const std::filesystem::path kLibrary = CREPES_SOURCE_DIR "/config/libraries/library64.yaml";
+const std::filesystem::path kLibrary = source_dir() + "/config/libraries/library64.yaml";
 
 /// The firmware's own code at the other end of a serial line.
 class HostBoard {

@@ -11,6 +11,7 @@
 #include "daemon/logging.hpp"
 #include "drivers/monotonic_clock.hpp"
 #include "net/udp_socket.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -27,9 +28,8 @@ int free_port() {
 
 /// One of two simulated robots that hear each other on `mesh_port`.
 Config robot_config(std::uint16_t id, int mesh_port) {
-  Result<Config> loaded =
-      load_config(std::string(CREPES_SOURCE_DIR) + "/config/examples/four-simulated/r" +
-                  std::to_string(id) + ".yaml");
+  Result<Config> loaded = load_config(source_dir() + "/config/examples/four-simulated/r" +
+                                      std::to_string(id) + ".yaml");
   EXPECT_TRUE(loaded.has_value());
   Config config = *loaded;
   config.net.port = mesh_port;

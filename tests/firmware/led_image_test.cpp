@@ -12,6 +12,7 @@
 #include "firmware/led_board/settings_store.h"
 #include "tests/firmware/qemu_board.hpp"
 #include "tests/support/led_settings.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -33,7 +34,7 @@ RamFlash holding(const led_settings& settings) {
 
 SwarmConfig swarm_of_64() {
   const CheckedConfig checked =
-      check_config(CREPES_SOURCE_DIR "/config/libraries/library64.yaml");  // a part of a config
+      check_config(source_dir() + "/config/libraries/library64.yaml");  // a part of a config
   EXPECT_EQ(checked.config.swarm.members.size(), 64U);
   return checked.config.swarm;
 }

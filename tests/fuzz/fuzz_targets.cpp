@@ -20,6 +20,7 @@
 #include "net/peer_message.hpp"
 #include "net/subscription_desk.hpp"
 #include "tests/support/frame_damage.hpp"
+#include "tests/support/places.hpp"
 #include "tests/support/recorded_files.hpp"
 
 namespace crepes {
@@ -247,7 +248,7 @@ constexpr std::array kTargets{
     FuzzTarget{"led", &run_led, &led_seeds}};
 
 std::string corpus_file(std::string_view target) {
-  return std::string(CREPES_SOURCE_DIR) + "/tests/fuzz/corpus/" + std::string(target) + ".hex";
+  return source_dir() + "/tests/fuzz/corpus/" + std::string(target) + ".hex";
 }
 
 }  // namespace

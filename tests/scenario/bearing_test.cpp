@@ -4,6 +4,7 @@
 #include "daemon/ctl/scratch_directory.hpp"
 #include "tests/scenario/recorded_swarm.hpp"
 #include "tests/support/bearing_truth.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -51,7 +52,7 @@ TEST(Bearings, PointAtTheNeighborsThatWereThere) {
 class RecordedBearings : public testing::TestWithParam<const char*> {
  protected:
   [[nodiscard]] static fs::path dataset() {
-    return fs::path(CREPES_SOURCE_DIR) / "../shared/datasets" / GetParam();
+    return fs::path(source_dir()) / "../shared/datasets" / GetParam();
   }
   void SetUp() override {
     if (!fs::exists(dataset())) GTEST_SKIP() << "no recording at " << dataset();

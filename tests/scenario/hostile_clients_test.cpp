@@ -18,6 +18,7 @@
 #include "daemon/runtime.hpp"
 #include "drivers/unique_fd.hpp"
 #include "tests/support/live_daemon.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -229,12 +230,11 @@ TEST_F(HostileClients, AreCounted) {
 TEST_F(HostileClients, GetNothingAmplifiedWhoeverTheyPretendToBe) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
   const auto log = scratch.path() / "log";
-  auto child =
-      ChildProcess::start("/usr/bin/env",
-                          {"unshare", "-rn", "/usr/bin/python3", "-B",
-                           std::string(CREPES_SOURCE_DIR) + "/tests/scenario/forged_requests.py",
-                           CREPES_DAEMON, std::string(CREPES_SOURCE_DIR) + "/config/examples"},
-                          log);
+  auto child = ChildProcess::start("/usr/bin/env",
+                                   {"unshare", "-rn", "/usr/bin/python3", "-B",
+                                    source_dir() + "/tests/scenario/forged_requests.py",
+                                    crepesd_path(), source_dir() + "/config/examples"},
+                                   log);
   ASSERT_TRUE(child) << child.error().message;
   const Timestamp end = machine_.now() + kPatience;
   while (!child->ending() && machine_.now() < end) ::poll(nullptr, 0, 50);

@@ -14,6 +14,7 @@
 #include "daemon/ctl/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
 #include "tests/support/live_daemon.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -179,7 +180,7 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsTold) {
   ::setenv("NOTIFY_SOCKET", (folder.path() / "notify").c_str(),
            1);  // NOLINT(concurrency-mt-unsafe)
   const auto daemon =
-      ChildProcess::start(CREPES_DAEMON, {"--config", file.string()}, folder.path() / "log");
+      ChildProcess::start(crepesd_path(), {"--config", file.string()}, folder.path() / "log");
   ::unsetenv("NOTIFY_SOCKET");  // NOLINT(concurrency-mt-unsafe)
   ASSERT_TRUE(daemon) << daemon.error().message;
   Client client(config);

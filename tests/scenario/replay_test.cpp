@@ -12,6 +12,7 @@
 #include "daemon/ctl/swarm_replay.hpp"
 #include "daemon/ctl/swarm_score.hpp"
 #include "tests/scenario/recorded_swarm.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -194,7 +195,7 @@ TEST_F(Replay, TheNetworksSeedChangesWhatArrivesAndNothingBreaks) {
 class RecordedSwarm : public Replay, public testing::WithParamInterface<const char*> {
  protected:
   [[nodiscard]] static fs::path dataset() {
-    return fs::path(CREPES_SOURCE_DIR) / "../shared/datasets" / GetParam();
+    return fs::path(source_dir()) / "../shared/datasets" / GetParam();
   }
   void SetUp() override {
     if (!fs::exists(dataset())) GTEST_SKIP() << "no recording at " << dataset();

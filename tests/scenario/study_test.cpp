@@ -10,6 +10,7 @@
 #include "tests/study/imu_noise.hpp"
 #include "tests/study/simulated_swarm.hpp"
 #include "tests/study/swarm_writer.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes::study {
 namespace {
@@ -42,7 +43,7 @@ void PrintTo(const Published& published, std::ostream* out) { *out << published.
 class PublishedBound : public testing::TestWithParam<Published> {};
 
 TEST_P(PublishedBound, IsReproduced) {
-  const fs::path dir = fs::path(CREPES_SOURCE_DIR) / "../shared/datasets" / GetParam().set;
+  const fs::path dir = fs::path(source_dir()) / "../shared/datasets" / GetParam().set;
   if (!fs::exists(dir)) GTEST_SKIP() << "no recording at " << dir;
   const Swarm swarm = load(dir);
   const RobotId r1 = swarm.dataset.manifest.robots.front().id;

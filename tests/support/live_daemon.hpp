@@ -17,6 +17,7 @@
 #include "drivers/sim/sim_clock.hpp"
 #include "drivers/sim/world.hpp"
 #include "net/udp_socket.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 
@@ -29,7 +30,7 @@ inline int free_port() { return UdpSocket::bind("127.0.0.1", 0)->local().port; }
 /// Robot `id` of the simulated pair, alone on its subscription port.
 inline Config pair_config(std::uint16_t id, int mesh_port) {
   const std::string file = "/config/examples/four-simulated/r" + std::to_string(id) + ".yaml";
-  Config config = load_config(CREPES_SOURCE_DIR + file).value();
+  Config config = load_config(source_dir() + file).value();
   config.swarm.members.resize(2);
   config.sim.scenario = SimScenario::kTwo;
   // Half the resolution: a sanitizer makes each pixel ten times as dear.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/support/hex.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 
@@ -21,7 +22,7 @@ struct RecordedFrame {
 
 /// `name` as in "imu/hipnuc_hi91_official".
 inline RecordedFrame recorded_file(const std::string& name) {
-  const auto path = std::string(CREPES_SOURCE_DIR) + "/tests/drivers/recorded/" + name;
+  const auto path = source_dir() + "/tests/drivers/recorded/" + name;
   std::ostringstream hex;
   hex << std::ifstream(path + ".hex").rdbuf();
   const auto json = nlohmann::json::parse(std::ifstream(path + ".json"));
@@ -31,8 +32,8 @@ inline RecordedFrame recorded_file(const std::string& name) {
 /// All of a folder, "imu" or "nlink", in the order of their names.
 inline std::vector<RecordedFrame> recorded_files(const std::string& folder) {
   std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(
-           std::string(CREPES_SOURCE_DIR) + "/tests/drivers/recorded/" + folder)) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(source_dir() + "/tests/drivers/recorded/" + folder)) {
     if (entry.path().extension() == ".hex")
       names.push_back(folder + "/" + entry.path().stem().string());
   }
