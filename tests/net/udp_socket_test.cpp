@@ -1,10 +1,14 @@
 #include "net/udp_socket.hpp"
 
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <unistd.h>
 
 #include <array>
 #include <chrono>
+#include <cstdlib>
+#include <optional>
+#include <thread>
 
 namespace crepes {
 namespace {
@@ -109,6 +113,30 @@ TEST(UdpSocket, ReportsWhatItCannotSend) {
 
   ASSERT_FALSE(sent);
   EXPECT_NE(sent.error().message.find("send to 127.0.0.1:"), std::string::npos);
+  EXPECT_EQ(sent.error().code, ErrorCode::kIo);
+}
+
+// On a link of its own that passes a kilobyte a second.
+TEST(UdpSocket, TellsACongestedLinkFromABrokenOne) {
+  bool is_permitted = false;
+  std::optional<Error> refusal;
+  std::thread([&] {
+    is_permitted = ::unshare(CLONE_NEWNET) == 0 &&
+                   std::system(
+                       "ip link set lo up && "  // NOLINT(concurrency-mt-unsafe)
+                       "tc qdisc add dev lo root tbf rate 8kbit burst 3000 limit 9999999") == 0;
+    if (!is_permitted) return;
+    auto socket = UdpSocket::open_broadcast("lo", some_port());
+    ASSERT_TRUE(socket);
+    for (int i = 0; i < 10000 && !refusal; ++i) {
+      const auto sent = socket->broadcast(std::vector<std::uint8_t>(1000));
+      if (!sent) refusal = sent.error();
+    }
+  }).join();
+  if (!is_permitted) GTEST_SKIP() << "needs root and tc(8) for a network of its own";
+
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->code, ErrorCode::kBusy) << refusal->message;
 }
 
 }  // namespace
