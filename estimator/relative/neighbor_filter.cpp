@@ -87,10 +87,32 @@ double intersection_weight(const Matrix6d& first, const Matrix6d& second) {
   return best;
 }
 
+/// P once three errors are J times what they were.
+void map_errors(int index, const Eigen::Matrix3d& J, E::Covariance& P) {
+  P.middleRows<3>(index) = (J * P.middleRows<3>(index)).eval();
+  P.middleCols<3>(index) = (P.middleCols<3>(index) * J.transpose()).eval();
+}
+
 // P of the error at the corrected state: theta_new = J_r(theta) (theta - theta_hat).
-void reset(const Eigen::Matrix3d& J_r, E::Covariance& P) {
-  P.middleRows<3>(E::kTheta) = (J_r * P.middleRows<3>(E::kTheta)).eval();
-  P.middleCols<3>(E::kTheta) = (P.middleCols<3>(E::kTheta) * J_r.transpose()).eval();
+void reset(const Eigen::Matrix3d& J_r, E::Covariance& P) { map_errors(E::kTheta, J_r, P); }
+
+// What a bearing cannot see must stay unseen. Distance and range bias are known only together, so P
+// is long along the line of sight; each bearing turns that line by microradians and, P lying as
+// before, the next innovation would pass for news of the distance: robots at rest drift apart. So P
+// is turned until this bearing says nothing of the range's bias, as far as the estimate's unrest
+// explains it; what shows because robots moved, a parallax, is much more and stays. Compare Huang,
+// Mourikis and Roumeliotis 2010: an unobservable direction has to be one at every linearization.
+void turn_to_sight(const BearingInnovation& z, E::Covariance& P) {
+  constexpr double kUnrest = 3e-4;  // rad
+  const Eigen::Vector3d along = P.block<3, 1>(E::kP, E::kRangeBias);
+  const Eigen::Matrix<double, 2, 3> by_p = z.H.middleCols<3>(E::kP);
+  const Eigen::Vector2d seen = z.H.lazyProduct(P.col(E::kRangeBias));
+  const Eigen::Matrix2d across = by_p * by_p.transpose();
+  const Eigen::Vector3d aside = -by_p.transpose() * across.inverse() * seen;
+  const double length2 = along.squaredNorm();
+  if (!(aside.squaredNorm() < 0.01 * length2)) return;  // no such correlation yet
+  const double share = kUnrest * kUnrest / (kUnrest * kUnrest + aside.squaredNorm() / length2);
+  map_errors(E::kP, so3_exp(share / length2 * along.cross(aside)).toRotationMatrix(), P);
 }
 
 }  // namespace
@@ -142,6 +164,10 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
   auto outcome = kalman_gain(*z, gate_nis, P_);
   const Fusion fusion = fusion_of(*z, outcome);
   if (outcome.verdict != Verdict::kFused) return fusion;
+  if constexpr (std::is_same_v<std::decay_t<decltype(*z)>, BearingInnovation>) {
+    turn_to_sight(*z, P_);
+    outcome = kalman_gain(*z, std::numeric_limits<double>::infinity(), P_);
+  }
 
   Eigen::Vector3d theta = outcome.correction.template segment<3>(E::kTheta);
   const double shift = outcome.correction.template segment<3>(E::kP).norm();

@@ -50,7 +50,12 @@ Eigen::Matrix<double, kMotion, kColumns> moved_errors(
   return moved;
 }
 
-// P <- F P F^T + Q, where F leaves all but the motion as it is.
+/// Share of the range's bias that is left after a step.
+double range_bias_kept(const ProcessNoise& noise, double dt) {
+  return std::exp(-noise.range_bias_return * dt);
+}
+
+// P <- F P F^T + Q, where F leaves all but the motion and the range's bias as it is.
 void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
                           const BodyRates& neighbor, const Eigen::Matrix<double, 12, 1>& variance,
                           const ProcessNoise& noise, double dt, ErrorState::Covariance& P) {
@@ -72,6 +77,9 @@ void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
   P.diagonal().segment<3>(E::kAccelB).array() += accel_walk;
   P.diagonal().segment<3>(E::kGyroN).array() += gyro_walk;
   P.diagonal().segment<3>(E::kAccelN).array() += accel_walk;
+  const double kept = range_bias_kept(noise, dt);
+  P.row(E::kRangeBias) *= kept;
+  P.col(E::kRangeBias) *= kept;
   P(E::kRangeBias, E::kRangeBias) += noise.range_bias_walk * noise.range_bias_walk * dt;
 }
 
@@ -166,6 +174,7 @@ void propagate(const ImuHistory& imu_B, const ImuHistory& imu_N, Timestamp from,
     const BodyRates neighbor = rates(mean_N, state.bias_N);
     const RelativeMotion before = state.motion;
     state.motion = propagated(before, body, neighbor, dt);
+    state.range_bias_m *= range_bias_kept(noise, dt);
     propagate_covariance(propagation_jacobian(before, state.motion, body, neighbor, dt), body,
                          neighbor, rate_variance(mean_B, mean_N, noise, dt), noise, dt, P);
     t = next;

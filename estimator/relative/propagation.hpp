@@ -26,6 +26,7 @@ struct ProcessNoise {
   double gyro_guess_change = 0.5;   ///< [rad/s/sqrt(s)]
   double accel_guess_change = 5.0;  ///< [m/s^2/sqrt(s)]
   double range_bias_walk = 0.0;     ///< [m/sqrt(s)]
+  double range_bias_return = 0.0;   ///< to zero, so that a walk stays within bounds [1/s]
 };
 
 /// The step of paper eq. 9 with the forces turned to the middle of the step:

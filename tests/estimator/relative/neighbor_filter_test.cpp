@@ -137,6 +137,57 @@ TEST(NeighborFilter, EstimatesWhatTheSensorsHideBetterThanItsPriors) {
   EXPECT_LT(std::sqrt(squared / kRuns), 0.5 * std::sqrt(6.0) * 0.005);
 }
 
+/// What the filter takes the range's bias, zero in truth, for after two robots stood still.
+double range_bias_learned_at_rest(std::uint64_t seed, Duration duration) {
+  constexpr double kBearing = 3.5e-4;  // rad
+  constexpr double kRange = 0.05;      // m
+  test::RandomGeometry random(seed);
+  const Eigen::Vector3d p_B_N(4.0, 1.0, 0.3);
+  const ProcessNoise noise{.gyro_density = 4e-4, .accel_density = 2e-3};
+  ImuHistory imu_B;
+  ImuHistory imu_N;
+  const auto sample = [&](Timestamp t) {
+    for (ImuHistory* imu : {&imu_B, &imu_N}) {
+      imu->push(
+          {t, random.normal_vector<3>(10.0 * noise.gyro_density),
+           Eigen::Vector3d(0, 0, 9.81) + random.normal_vector<3>(10.0 * noise.accel_density)});
+    }
+  };
+  const auto seen = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector3d u = p.normalized();
+    return DirectionReading{(u + tangent_basis(u) * random.normal_vector<2>(kBearing)).normalized(),
+                            Eigen::Vector3d::Zero(), kBearing};
+  };
+
+  sample(Timestamp{0ms});
+  Matrix6d start = Matrix6d::Identity() * 1e-4;
+  start.topLeftCorner<3, 3>().diagonal().setConstant(0.01);
+  NeighborFilter filter(Timestamp{0ms},
+                        GaussianPose{{p_B_N, Eigen::Quaterniond::Identity()}, start}, noise,
+                        {.speed_mps = 0.1,
+                         .gyro_bias_radps = 0.005,
+                         .accel_bias_mps2 = 0.03,
+                         .range_bias_m = 0.05,
+                         .misalignment_rad = 0.0026});
+  for (Timestamp t{10ms}; t <= Timestamp{duration}; t += 10ms) {
+    sample(t);
+    filter.advance_to(t, imu_B, imu_N);
+    static_cast<void>(filter.fuse_bearing(seen(p_B_N), Eigen::Vector3d::Zero(), kNoGate));
+    static_cast<void>(filter.fuse_peer_bearing(seen(-p_B_N), Eigen::Vector3d::Zero(), kNoGate));
+    static_cast<void>(filter.fuse_range({p_B_N.norm() + random.normal(kRange), kRange},
+                                        Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), kNoGate));
+  }
+  return filter.state().range_bias_m;
+}
+
+TEST(NeighborFilter, AtRestBearingsSayNothingOfTheDistance) {
+  constexpr int kRuns = 10;
+  double sum = 0.0;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) sum += range_bias_learned_at_rest(seed, 60s);
+
+  EXPECT_NEAR(sum / kRuns, 0.0, 0.02);
+}
+
 TEST(NeighborFilter, UncertaintyGrowsWhileNothingIsMeasured) {
   SimulatedPair pair(1);
   NeighborFilter filter = tight_filter(pair, 2s);

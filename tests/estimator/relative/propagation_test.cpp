@@ -208,6 +208,30 @@ TEST(Propagation, CovarianceOfTheStateFollowsAMonteCarloOfItsErrors) {
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(sampled(i, i) / P(i, i), 1.0, 0.18) << i;
 }
 
+TEST(Propagation, TheRangesBiasWandersWithinItsPrior) {
+  using E = ErrorState;
+  RandomGeometry random(6);
+  const ImuHistory imu_B = shaken(random);
+  const ImuHistory imu_N = shaken(random);
+  // Stationary: what is forgotten in a second, 2 / 50 of the variance, comes anew.
+  constexpr double kSigma = 0.05;
+  const ProcessNoise noise{.range_bias_walk = kSigma * std::sqrt(2.0 / 50.0),
+                           .range_bias_return = 1.0 / 50.0};
+  NominalState state;
+  state.range_bias_m = 0.2;
+  E::Covariance P = E::Covariance::Identity();
+  P(E::kRangeBias, E::kRangeBias) = kSigma * kSigma;
+  P(E::kMisalignB, E::kRangeBias) = P(E::kRangeBias, E::kMisalignB) = 0.01;
+
+  for (int i = 0; i < 50; ++i)
+    propagate(imu_B, imu_N, Timestamp{100ms}, Timestamp{1100ms}, noise, state, P);
+
+  EXPECT_NEAR(P(E::kRangeBias, E::kRangeBias), kSigma * kSigma, 1e-3 * kSigma * kSigma);
+  EXPECT_NEAR(state.range_bias_m, 0.2 * std::exp(-1.0), 1e-9);
+  EXPECT_NEAR(P(E::kMisalignB, E::kRangeBias), 0.01 * std::exp(-1.0), 1e-9);
+  EXPECT_EQ(P(E::kMisalignB, E::kRangeBias), P(E::kRangeBias, E::kMisalignB));
+}
+
 TEST(Propagation, WhiteNoiseGivesTheSameVarianceInManyStepsAsInFew) {
   ImuHistory imu;
   for (int i = 0; i <= 200; ++i)
