@@ -25,8 +25,8 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig
   s.noise.gyro_walk = imu.gyroscope_random_walk;
   s.noise.accel_walk = imu.accelerometer_random_walk;
   s.noise.scale_sigma = imu.scale_sigma;
-  // A random walk that reaches bias_drift_m within bias_time_s, drawn back so that in the long run it
-  // stays within bias_sigma_m (a Gauss-Markov process).
+  // A random walk that reaches bias_drift_m within bias_time_s, drawn back so that in the long run
+  // it stays within bias_sigma_m (a Gauss-Markov process).
   s.noise.range_bias_walk = uwb.bias_drift_m / std::sqrt(uwb.bias_time_s);
   if (uwb.bias_sigma_m > 0.0)
     s.noise.range_bias_return = 0.5 * std::pow(s.noise.range_bias_walk / uwb.bias_sigma_m, 2);
