@@ -27,12 +27,6 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr bool kIsSanitized = true;
-#else
-constexpr bool kIsSanitized = false;
-#endif
-
 /// A hundred thousand requests a second from as many ports as there are sockets, until destruction:
 /// 65 kB of nested JSON, garbage, and requests that would be answered at length.
 class Flood {
