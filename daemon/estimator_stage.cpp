@@ -3,12 +3,20 @@
 #include <algorithm>
 #include <chrono>
 #include <utility>
+#include <variant>
 
 namespace crepes {
 namespace {
 
 constexpr Duration kStatusPeriod = std::chrono::milliseconds{250};
 constexpr Duration kLongestWait = std::chrono::milliseconds{100};
+
+Duration patience(const Config& config) { return from_seconds(2e-3 * config.estimator.lag_ms); }
+
+bool is_late(const Event& event, Timestamp oldest) {
+  const auto* const frame = std::get_if<SpotFrame>(&event);
+  return frame != nullptr && frame->stamp < oldest;
+}
 
 void hand_on(Outputs outputs, const EstimatorSinks& sinks) {
   if (outputs.graph_problem) sinks.solve(std::move(*std::exchange(outputs.graph_problem, {})));
@@ -21,6 +29,7 @@ void run_estimator(const Config& config, EventQueue& events, const EstimatorSink
                    const StageContext& context, const std::stop_token& stop) {
   const Clock& clock = context.clock;
   Duration period = from_seconds(1.0 / config.estimator.output_rate_hz);
+  Duration wait_for_frames = patience(config);
   Estimator estimator(config);
   Timestamp next_tick = clock.now() + period;
   Timestamp next_status = next_tick;
@@ -29,12 +38,17 @@ void run_estimator(const Config& config, EventQueue& events, const EstimatorSink
     if (const auto wanted = context.settings.try_pop()) {
       estimator.reconfigure(*wanted);
       period = from_seconds(1.0 / wanted->estimator.output_rate_hz);
+      wait_for_frames = patience(*wanted);
     }
     // Waiting events go first: a Tick says that what came before it is known.
     std::optional<Event> event = events.try_pop();
     if (const Duration wait = next_tick - clock.now(); !event && wait > Duration::zero())
       event = events.pop_for(std::min(wait, kLongestWait), stop);
-    if (event) hand_on(estimator.step(*event), sinks);
+    if (event && is_late(*event, clock.now() - wait_for_frames)) {
+      sinks.late_frames.add();
+    } else if (event) {
+      hand_on(estimator.step(*event), sinks);
+    }
     if (clock.now() < next_tick) continue;
     const Timestamp tick = clock.now();
     hand_on(estimator.step(Tick{tick}), sinks);

@@ -45,7 +45,8 @@ Runtime::Runtime(Config config, const Clock& machine)
           const EstimatorSinks sinks{
               .publish = [this](Outputs outputs) { outputs_.push(std::move(outputs)); },
               .solve = [this](GraphProblem problem) { problems_.push(std::move(problem)); },
-              .inform = [this](EstimatorStatus status) { outputs_.push(std::move(status)); }};
+              .inform = [this](EstimatorStatus status) { outputs_.push(std::move(status)); },
+              .late_frames = late_frames_};
           run_estimator(config_, events_, sinks, context, stop);
         });
   start("graph", {"graph."},
@@ -174,6 +175,7 @@ void Runtime::start_camera(std::size_t index, const EventSink& sense) {
 
 std::vector<QueueStatus> Runtime::queue_status() const {
   std::vector<QueueStatus> status{{"events", events_.dropped()},
+                                  {"late frames", late_frames_.value()},
                                   {"graph problems", problems_.dropped()},
                                   {"outputs", outputs_.dropped()},
                                   {"recording", recorded_.dropped()}};

@@ -72,6 +72,7 @@ class Runtime {
   const Clock& clock_;
 
   EventQueue events_{1024, Overflow::kDropOldest};  // about one second of everything
+  Counter late_frames_;
   GraphQueue problems_{256, Overflow::kDropOldest};
   NetInbox outputs_{64};
   RecordQueue recorded_{4096, Overflow::kDropNewest};

@@ -10,9 +10,6 @@ namespace {
 constexpr double kFalseBearings = 0.1;
 constexpr double kFalseRanges = 0.05;
 
-constexpr std::size_t kCrowd = 20;
-constexpr Duration kCrowdPeriod = std::chrono::milliseconds{15};
-
 // A pose in the metric of another's own covariance.
 double distance2(const GaussianPose& from, const Pose& to) {
   const Vector6d step = pose_difference(from.pose, to);
@@ -47,10 +44,6 @@ void GaussianSum::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHis
 
 Association GaussianSum::fuse(std::span<const Measurement> candidates, const PairMounting& mounting,
                               const Gates& gates) {
-  if (parts_.size() > kCrowd) {
-    if (candidates.front().stamp - fused_ < kCrowdPeriod) return {};
-    fused_ = candidates.front().stamp;
-  }
   const std::size_t chosen = heaviest().likeliest(candidates, mounting);
   const Measurement& reading = candidates[chosen];
   Association association{.chosen = chosen, .fusion{}};

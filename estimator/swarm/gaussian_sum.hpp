@@ -29,8 +29,7 @@ class GaussianSum {
 
   void set_noise(const ProcessNoise& noise);
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
-  /// Corrects every part with the candidate that is likeliest to the heaviest part. A crowd takes
-  /// only so many readings a second, and calls the others degenerate: it may last for long.
+  /// Corrects every part with the candidate that is likeliest to the heaviest part.
   Association fuse(std::span<const Measurement> candidates, const PairMounting& mounting,
                    const Gates& gates);
   void prune();
@@ -51,7 +50,6 @@ class GaussianSum {
   double normalize();
 
   std::vector<Part> parts_;
-  Timestamp fused_ = kNever;  ///< the last reading of a crowd
   std::size_t heaviest_ = 0;
 };
 

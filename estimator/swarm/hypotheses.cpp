@@ -16,6 +16,7 @@ constexpr double kMargin = 10.0;  // between rivals
 // Rivals may come as long after the leader, and have as long to win.
 constexpr Duration kProbation = std::chrono::seconds{1};
 constexpr std::size_t kMaxStarts = 8;
+constexpr double kLeadersShare = 1000.0;  // of a budget; what rivals leave
 
 std::array<Measurement, 2> bearings_of(Timestamp stamp, const MutualStart& start) {
   return {Measurement{stamp, MeasurementKind::kBearing, start.bearing},
@@ -28,6 +29,14 @@ constexpr auto kIsWorse = [](const auto& a, const auto& b) {
 };
 
 }  // namespace
+
+bool CorrectionBudget::allows(Timestamp now, double reserve) {
+  constexpr double kBurst = 8000.0;
+  constexpr double kPerSecond = 1000.0;
+  if (now > now_) left_ = std::min(kBurst, left_ + kPerSecond * to_seconds(now - now_));
+  now_ = std::max(now_, now);
+  return left_ > reserve;
+}
 
 void Hypotheses::reconfigure(const FilterSettings& settings) {
   if (settings.profile != settings_.profile) clear();
@@ -110,22 +119,40 @@ void Hypotheses::Start::count(MeasurementKind kind, double score) {
   confirmed = confirmed || believed >= kConfirmed;
 }
 
-void Hypotheses::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
-  if (empty()) return;
-  const double keep = std::exp(-to_seconds(to - stamp()) / kMemory);
-  for (Start& start : starts_) {
-    start.sum.advance_to(to, imu_B, imu_N);
-    start.seeing *= keep;
-    start.seen *= keep;
-  }
+bool Hypotheses::has_time_for(std::size_t raw_poses, Timestamp now) {
+  CorrectionBudget& time = budget(MeasurementKind::kRawPose);
+  if (!time.allows(now)) return false;
+  time.spend(raw_poses * starts_.size());
+  return true;
 }
 
-Association Hypotheses::fuse(std::span<const Measurement> candidates) {
+void Hypotheses::Start::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
+  const Timestamp from = sum.heaviest().stamp();
+  if (to <= from) return;
+  sum.advance_to(to, imu_B, imu_N);
+  const double keep = std::exp(-to_seconds(to - from) / kMemory);
+  seeing *= keep;
+  seen *= keep;
+}
+
+void Hypotheses::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
+  for (Start& start : starts_) start.advance_to(to, imu_B, imu_N);
+}
+
+Association Hypotheses::fuse(std::span<const Measurement> candidates, const ImuHistory& imu_B,
+                             const ImuHistory& imu_N) {
+  const Timestamp stamp = candidates.front().stamp;
+  const MeasurementKind kind = candidates.front().kind;
+  CorrectionBudget& time = budget(kind);
   Association led;
   for (Start& start : starts_) {
+    const bool leads = &start == &starts_.front();
+    if (!time.allows(stamp, leads ? 0.0 : kLeadersShare)) break;
+    time.spend(start.sum.size());
+    start.advance_to(stamp, imu_B, imu_N);
     const Association association = start.sum.fuse(candidates, mounting_, settings_.gates);
-    start.count(candidates.front().kind, association.score);
-    if (&start == &starts_.front()) led = association;
+    start.count(kind, association.score);
+    if (leads) led = association;
   }
   return led;
 }

@@ -1,6 +1,7 @@
 /// The starts of a neighbor's filter that may be right, and how much speaks for each.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -9,6 +10,19 @@
 #include "estimator/swarm/gaussian_sum.hpp"
 
 namespace crepes {
+
+/// Time for corrections by readings of one kind: for many in a burst, as starts compete, not for so
+/// many all the time. A slow machine would fall behind, lose readings for that, and start anew.
+class CorrectionBudget {
+ public:
+  /// More than `reserve` left at `now`?
+  [[nodiscard]] bool allows(Timestamp now, double reserve = 0.0);
+  void spend(std::size_t corrections) { left_ -= static_cast<double>(corrections); }
+
+ private:
+  double left_ = 0.0;
+  Timestamp now_ = kNever;
+};
 
 /// A board and its image in the floor give different first poses, and one sighting does not tell
 /// which is the robot. So starts compete: each takes the readings that fit it, and counts what they
@@ -27,6 +41,8 @@ class Hypotheses {
 
   /// Whether a raw pose would be welcome.
   [[nodiscard]] bool wants_start(Timestamp now) const;
+  /// Whether there is time to compare so many raw poses with all that there is.
+  [[nodiscard]] bool has_time_for(std::size_t raw_poses, Timestamp now);
   /// A new rival at `stamp()`. False, and nothing changes: one that is there explains it already,
   /// or there are too many that are better.
   bool start(Timestamp stamp, const MutualStart& first);
@@ -37,7 +53,9 @@ class Hypotheses {
 
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Corrects each with the likeliest of readings of one kind and instant; what the leader did.
-  Association fuse(std::span<const Measurement> candidates);
+  /// Where there is no time for all, the leader comes first.
+  Association fuse(std::span<const Measurement> candidates, const ImuHistory& imu_B,
+                   const ImuHistory& imu_N);
   /// Drops what is not needed any more and lets the best lead.
   void settle();
 
@@ -58,16 +76,21 @@ class Hypotheses {
     bool one_way = false;  ///< only one direction can speak for it
     bool confirmed = false;
 
+    void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
     void count(MeasurementKind kind, double score);
     [[nodiscard]] double score() const { return seeing + seen; }
   };
   [[nodiscard]] bool is_explained(Timestamp stamp, const MutualStart& first) const;
   [[nodiscard]] Start make(GaussianSum sum);
+  [[nodiscard]] CorrectionBudget& budget(MeasurementKind kind) {
+    return budgets_[static_cast<std::size_t>(kind)];
+  }
 
   FilterSettings settings_;
   PairMounting mounting_;
   std::vector<Start> starts_;  ///< the leader first
   std::uint32_t generations_ = 0;
+  std::array<CorrectionBudget, kMeasurementKindCount> budgets_;
 };
 
 }  // namespace crepes

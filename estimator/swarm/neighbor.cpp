@@ -198,14 +198,13 @@ void Neighbor::release(Timestamp now, const RobotState& self) {
   for (auto group = sequencer_.pop_ready(now); !group.empty(); group = sequencer_.pop_ready(now)) {
     const Measurement& first = group.front();
     const bool is_late = !hypotheses_.empty() && first.stamp < hypotheses_.stamp();
-    if (can_move && !is_late) hypotheses_.advance_to(first.stamp, self.imu, body_.imu);
     if (can_move && !is_late && is_a_start(first)) {
-      for (const Measurement& measurement : group) start(measurement);
+      start(group, self);
       continue;
     }
     const bool usable = can_move && !is_late && !hypotheses_.empty();
-    const Association association =
-        usable ? hypotheses_.fuse(group) : Association{.fusion{.verdict = Verdict::kNoState}};
+    const Association association = usable ? hypotheses_.fuse(group, self.imu, body_.imu)
+                                           : Association{.fusion{.verdict = Verdict::kNoState}};
     const Fusion other{.verdict = usable ? Verdict::kGated : Verdict::kNoState};
     for (std::size_t i = 0; i < group.size(); ++i)
       note(first.stamp, first.kind, i == association.chosen ? association.fusion : other);
@@ -225,17 +224,22 @@ bool Neighbor::is_a_start(const Measurement& measurement) const {
          (hypotheses_.empty() || !hypotheses_.leader().heaviest().is_certain());
 }
 
-void Neighbor::start(const Measurement& measurement) {
-  const bool started = std::visit(
-      [&](const auto& first) {
-        if constexpr (requires { hypotheses_.start(measurement.stamp, first); }) {
-          return hypotheses_.start(measurement.stamp, first);
-        } else {
-          return false;
-        }
-      },
-      measurement.reading);
-  if (started) note(measurement.stamp, measurement.kind, {.verdict = Verdict::kFused});
+void Neighbor::start(std::span<const Measurement> group, const RobotState& self) {
+  const Timestamp stamp = group.front().stamp;
+  if (!hypotheses_.has_time_for(group.size(), stamp)) return;
+  hypotheses_.advance_to(stamp, self.imu, body_.imu);
+  for (const Measurement& measurement : group) {
+    const bool started = std::visit(
+        [&](const auto& first) {
+          if constexpr (requires { hypotheses_.start(stamp, first); }) {
+            return hypotheses_.start(stamp, first);
+          } else {
+            return false;
+          }
+        },
+        measurement.reading);
+    if (started) note(stamp, measurement.kind, {.verdict = Verdict::kFused});
+  }
 }
 
 void Neighbor::find_pose(Timestamp now, const RobotState& self) {

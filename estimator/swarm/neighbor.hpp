@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "estimator/core/config.hpp"
@@ -59,7 +60,7 @@ class Neighbor {
   void note(Timestamp stamp, MeasurementKind kind, const Fusion& fusion);
   void release(Timestamp now, const RobotState& self);
   void find_pose(Timestamp now, const RobotState& self);
-  void start(const Measurement& measurement);
+  void start(std::span<const Measurement> group, const RobotState& self);
   void try_one_way(Timestamp now, const RobotState& self);
   [[nodiscard]] bool is_a_start(const Measurement& measurement) const;
   [[nodiscard]] NoPoseReason reason(Timestamp now, const RobotState& self) const;

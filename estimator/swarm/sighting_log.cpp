@@ -24,11 +24,14 @@ constexpr Duration kAgain = std::chrono::milliseconds{100};
 constexpr double kAgainReach = 0.02;  // rad, and what kLineRate adds
 
 bool is_seen_again(const Bearing& bearing, const Recent<Bearing, 256>& log, const ImuHistory& imu) {
+  Timestamp from = bearing.stamp;  // of `turn`, which all bearings of a frame share
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
   return std::any_of(log.all().begin(), log.all().end(), [&](const Bearing& other) {
     const Duration apart = std::chrono::abs(other.stamp - bearing.stamp);
     if (apart == Duration{0} || apart > kAgain) return false;
-    const Eigen::Vector3d turned = imu.rotation(other.stamp, bearing.stamp).conjugate() * other.u_B;
-    return (turned - bearing.u_B).norm() < kAgainReach + kLineRate * to_seconds(apart);
+    if (other.stamp != std::exchange(from, other.stamp))
+      turn = imu.rotation(other.stamp, bearing.stamp).conjugate();
+    return (turn * other.u_B - bearing.u_B).norm() < kAgainReach + kLineRate * to_seconds(apart);
   });
 }
 
