@@ -1,5 +1,6 @@
 #include "drivers/sim/sim_imu.hpp"
 
+#include <array>
 #include <cmath>
 
 #include "drivers/imu/witmotion.hpp"
@@ -14,6 +15,9 @@ constexpr std::uint64_t kAccel = 0x616363656cU;
 constexpr double kGyroVibration = 0.0052;  // rad/s
 constexpr double kAccelVibration = 0.2;    // m/s^2
 
+// Recordings show 0.0017 where gyroscopes have 0.0026.
+constexpr double kAccelScale = 0.6;  // of the gyroscope's
+
 SeededNoise noise_of(std::uint64_t sensor, const SimWorld& world, RobotId robot) {
   return SeededNoise{sensor, static_cast<std::uint64_t>(world.seed()), robot.value};
 }
@@ -21,15 +25,15 @@ SeededNoise noise_of(std::uint64_t sensor, const SimWorld& world, RobotId robot)
 }  // namespace
 
 SimTriad::SimTriad(SeededNoise source, const Sigmas& sigmas)
-    : source_(source),
-      sigmas_(sigmas),
-      scale_(sigmas.scale * source_.gaussian3(0)),
-      bias_(sigmas.bias * source_.gaussian3(1)),
-      drawn_(2) {}
+    : source_(source), sigmas_(sigmas), bias_(sigmas.bias * source_.gaussian3(1)), drawn_(4) {
+  constexpr std::array<std::uint64_t, 3> kColumns{0, 2, 3};
+  for (int axis = 0; axis < 3; ++axis)
+    scale_.col(axis) = sigmas.scale * source_.gaussian3(kColumns.at(axis));
+}
 
 Eigen::Vector3d SimTriad::measure(const Eigen::Vector3d& truth, double dt_s) {
   bias_ += sigmas_.random_walk * std::sqrt(dt_s) * source_.gaussian3(drawn_++);
-  return truth + scale_.cwiseProduct(truth) + bias_ + sigmas_.noise * source_.gaussian3(drawn_++);
+  return truth + scale_ * truth + bias_ + sigmas_.noise * source_.gaussian3(drawn_++);
 }
 
 SimImu::SimImu(const SimWorld& world, RobotId robot, const ImuConfig& config)
@@ -45,7 +49,7 @@ SimImu::SimImu(const SimWorld& world, RobotId robot, const ImuConfig& config)
              {.bias = config.accelerometer_bias_sigma,
               .random_walk = config.accelerometer_random_walk,
               .noise = sample_noise(config.accelerometer_noise_density, kAccelVibration),
-              .scale = config.scale_sigma}) {}
+              .scale = kAccelScale * config.scale_sigma}) {}
 
 double SimImu::sample_noise(double density, double vibration) const {
   return std::hypot(density / std::sqrt(period_s_), world_.has_rotors(robot_) ? vibration : 0.0);

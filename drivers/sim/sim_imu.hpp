@@ -11,14 +11,14 @@
 
 namespace crepes {
 
-/// The errors of one sensor triad:  measured = (1 + scale) true + bias(t) + noise.
+/// The errors of one sensor triad:  measured = (I + S) true + bias(t) + noise.
 class SimTriad {
  public:
   struct Sigmas {
     double bias;
     double random_walk;  ///< of the bias [unit/s/sqrt(Hz)]
     double noise;        ///< of one sample
-    double scale;
+    double scale;        ///< of each element of S: scales, and axes that are not quite orthogonal
   };
 
   SimTriad(SeededNoise source, const Sigmas& sigmas);
@@ -27,7 +27,7 @@ class SimTriad {
  private:
   SeededNoise source_;
   Sigmas sigmas_;
-  Eigen::Vector3d scale_;
+  Eigen::Matrix3d scale_;
   Eigen::Vector3d bias_;
   std::uint64_t drawn_ = 0;
 };

@@ -59,7 +59,7 @@ struct EstimatorConfig {
   Profile profile = Profile::kTight;
   double lag_ms = 100.0;
   double output_rate_hz = 50.0;
-  double camera_misalignment_deg = 0.2;
+  double camera_misalignment_deg = 0.17;
   double gate_probability = 0.999;
   double predicted_after_s = 0.5;
   double forget_after_s = 30.0;
