@@ -1,7 +1,6 @@
 #include "estimator/relative/imu_history.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "estimator/core/contract.hpp"
 #include "estimator/core/so3.hpp"
@@ -9,9 +8,7 @@
 namespace crepes {
 namespace {
 
-constexpr double kNoiseShare = 0.02;       // of one sample in the smoothed noise: 0.5 s at 100 Hz
-constexpr double kMeanTime = 3.0;          // s
-constexpr std::size_t kChangeSamples = 3;  // about as long as a peer's samples are late
+constexpr double kMeanTime = 3.0;  // s
 constexpr Duration kRotationStep = std::chrono::milliseconds{5};
 
 void add(const ImuSample& sample, double dt, ImuMean& sum) {
@@ -66,30 +63,49 @@ bool ImuHistory::push(const ImuSample& sample) {
   return true;
 }
 
-// White noise of variance s^2 has second differences of variance 6 s^2, on each of three axes.
-void ImuHistory::observe_motion() {
-  if (size_ == 1) accel_mean_ = newest().accel_mps2;
-  if (size_ < 3) return;
-  const ImuSample& a = (*this)[size_ - 3];
-  const ImuSample& b = (*this)[size_ - 2];
-  const ImuSample& c = newest();
-  if (c.stamp - a.stamp > kMaxGap) return;
-  const double period = 0.5 * to_seconds(c.stamp - a.stamp);
-  const auto smooth = [](double value, double& mean) { mean += kNoiseShare * (value - mean); };
-  const auto observe = [&](const auto& second_difference, double& density2) {
-    smooth(period * second_difference.squaredNorm() / 18.0, density2);
-  };
-  observe(c.gyro_radps - 2.0 * b.gyro_radps + a.gyro_radps, gyro_density2_);
-  observe(c.accel_mps2 - 2.0 * b.accel_mps2 + a.accel_mps2, accel_density2_);
-  accel_mean_ += std::min(1.0, period / kMeanTime) * (c.accel_mps2 - accel_mean_);
+std::optional<ImuHistory::Recent> ImuHistory::recent() const {
+  constexpr int kSamples = SignalModel::Window::ColsAtCompileTime;
+  if (size_ < kSamples) return std::nullopt;
+  const Duration span = newest().stamp - (*this)[size_ - kSamples].stamp;
+  const Duration pace = span / (kSamples - 1);
+  if (pace > kMaxGap) return std::nullopt;
+  Recent recent{.gyro = {}, .accel = {}, .period_s = to_seconds(pace)};
+  for (int back = 0; back < kSamples; ++back) {
+    const std::size_t i = size_ - 1 - static_cast<std::size_t>(back);
+    if (back > 0 && (*this)[i + 1].stamp - (*this)[i].stamp > 2 * pace) return std::nullopt;
+    recent.gyro.col(back) = (*this)[i].gyro_radps;
+    recent.accel.col(back) = (*this)[i].accel_mps2;
+  }
+  return recent;
+}
 
-  if (size_ <= kChangeSamples) return;
-  const ImuSample& before = (*this)[size_ - 1 - kChangeSamples];
-  const double apart = to_seconds(c.stamp - before.stamp);
-  if (apart > static_cast<double>(kChangeSamples) * to_seconds(kMaxGap)) return;
-  smooth((c.gyro_radps - before.gyro_radps).squaredNorm() / 3.0 / apart, gyro_change2_);
-  smooth((c.accel_mps2 - before.accel_mps2).squaredNorm() / 3.0 / apart, accel_change2_);
-  noise_share_ = 2.0 / (apart * period);
+void ImuHistory::observe_motion() {
+  if (size_ == 1) {
+    accel_mean_ = newest().accel_mps2;
+    return;
+  }
+  const double since_last = to_seconds(newest().stamp - (*this)[size_ - 2].stamp);
+  accel_mean_ += std::min(1.0, since_last / kMeanTime) * (newest().accel_mps2 - accel_mean_);
+  if (const auto samples = recent()) {
+    gyro_.observe(samples->gyro, samples->period_s);
+    accel_.observe(samples->accel, samples->period_s);
+  }
+}
+
+// The newest sample is the mean since the one before: it stands for the middle of that time. What a
+// prediction says is believed for as long as it was learned for.
+void ImuHistory::add_predicted(Timestamp from, Timestamp to, ImuMean& sum) const {
+  const double dt = to_seconds(to - from);
+  add(newest(), dt, sum);
+  if (const auto samples = recent()) {
+    const double since =
+        0.5 * (to_seconds(from - newest().stamp) + to_seconds(to - newest().stamp));
+    const double strides =
+        std::clamp(since / samples->period_s + 0.5, 0.0, double{SignalModel::kStride}) /
+        SignalModel::kStride;
+    sum.gyro_radps += dt * strides * gyro_.next_change(samples->gyro);
+    sum.accel_mps2 += dt * strides * accel_.next_change(samples->accel);
+  }
 }
 
 ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
@@ -111,24 +127,20 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
   }
   if (t < to) {
     const double dt = to_seconds(to - t);
-    add(newest(), dt, sum);
+    add_predicted(t, to, sum);
     guess(to_seconds(t - newest().stamp), dt);
   }
 
   const double width = to_seconds(to - from);
   const Eigen::Vector3d accel_mps2 = sum.accel_mps2 / width;
-  // A change of white noise alone has variance 2 s^2.
-  const auto change = [this](double change2, double density2) {
-    return std::sqrt(std::max(0.0, change2 - noise_share_ * density2));
-  };
   return {.gyro_radps = sum.gyro_radps / width,
           .accel_mps2 = accel_mps2,
           .guessed = sum.guessed / width,
           .held_s2 = sum.held_s2 / width,
-          .gyro_density = std::sqrt(gyro_density2_),
-          .accel_density = std::sqrt(accel_density2_),
-          .gyro_change = change(gyro_change2_, gyro_density2_),
-          .accel_change = change(accel_change2_, accel_density2_),
+          .gyro_density = gyro_.density(),
+          .accel_density = accel_.density(),
+          .gyro_surprise = gyro_.surprise(),
+          .accel_surprise = accel_.surprise(),
           .accel_swing_mps2 = (accel_mps2 - accel_mean_).norm()};
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "estimator/core/measurements.hpp"
+#include "estimator/relative/signal_model.hpp"
 
 namespace crepes {
 
@@ -21,9 +22,9 @@ struct ImuMean {
   /// White noise that the samples themselves show, vibration included.
   double gyro_density = 0.0;   ///< [rad/s/sqrt(Hz)]
   double accel_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
-  /// How fast the signals change beside their noise, as a random walk of this density.
-  double gyro_change = 0.0;   ///< [rad/s/sqrt(s)]
-  double accel_change = 0.0;  ///< [m/s^2/sqrt(s)]
+  /// How fast the signals leave their prediction, as a random walk of this density.
+  double gyro_surprise = 0.0;   ///< [rad/s/sqrt(s)]
+  double accel_surprise = 0.0;  ///< [m/s^2/sqrt(s)]
   /// How far the force is from its mean of the last seconds [m/s^2].
   double accel_swing_mps2 = 0.0;
 };
@@ -33,10 +34,9 @@ struct ImuMean {
 
 /// Bounded: keeps the newest `kCapacity` samples in order of their stamps. A sample is the mean
 /// since the one before, stamped at the end, as an IMU that integrates inside gives it: so sums
-/// over samples are exact. Outside and across gaps longer than `kMaxGap` the nearest is held and
-/// called guessed. The noise is read off the second differences of successive samples, in which
-/// motion cancels: no data sheet knows how an airframe vibrates; how fast the motion changes, off
-/// the differences over a few samples.
+/// over samples are exact. Beyond the newest the signals are predicted (SignalModel), before the
+/// oldest and across gaps longer than `kMaxGap` the next sample is held; all that is called
+/// guessed.
 class ImuHistory {
  public:
   static constexpr std::size_t kCapacity = 256;
@@ -64,18 +64,21 @@ class ImuHistory {
  private:
   ImuSample& slot(std::size_t i) { return samples_[(first_ + i) % kCapacity]; }
   [[nodiscard]] std::size_t first_after(Timestamp t) const;
+  /// The newest samples, where they came at an even pace.
+  struct Recent {
+    SignalModel::Window gyro;
+    SignalModel::Window accel;
+    double period_s = 0.0;
+  };
+  [[nodiscard]] std::optional<Recent> recent() const;
   void observe_motion();
+  void add_predicted(Timestamp from, Timestamp to, ImuMean& sum) const;
 
   std::array<ImuSample, kCapacity> samples_{};
   std::size_t first_ = 0;
   std::size_t size_ = 0;
-  // Smoothed: variance of a sample's noise times the sample period, that of a change over its
-  // duration, and the force.
-  double gyro_density2_ = 0.0;
-  double accel_density2_ = 0.0;
-  double gyro_change2_ = 0.0;
-  double accel_change2_ = 0.0;
-  double noise_share_ = 0.0;  ///< of density2 in change2
+  SignalModel gyro_;
+  SignalModel accel_;
   Eigen::Vector3d accel_mean_ = Eigen::Vector3d::Zero();
 };
 

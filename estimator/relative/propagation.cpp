@@ -143,20 +143,20 @@ PropagationJacobian propagation_jacobian(const RelativeMotion& before, const Rel
 Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body, const ImuMean& neighbor,
                                            const ProcessNoise& noise, double dt) {
   const auto square = [](double x) { return x * x; };
-  // A rate held for s is off by change * sqrt(s), and stays so: its integral by s^3/3 change^2.
-  const auto density2 = [&](double white, double shown, double guess, double change,
+  // A rate held for s is off by surprise * sqrt(s), and stays so: its integral by s^3/3 surprise^2.
+  const auto density2 = [&](double white, double shown, double guess, double surprise,
                             double held_s2) {
-    return square(std::max(white, shown)) + (square(guess) + square(change)) * held_s2;
+    return square(std::max(white, shown)) + (square(guess) + square(surprise)) * held_s2;
   };
   Eigen::Matrix<double, 12, 1> variance;
   int row = 0;
   for (const ImuMean* imu : {&body, &neighbor}) {
     variance.segment<3>(row).setConstant(density2(noise.gyro_density, imu->gyro_density,
-                                                  noise.gyro_guess_change, imu->gyro_change,
+                                                  noise.gyro_guess_change, imu->gyro_surprise,
                                                   imu->held_s2));
     variance.segment<3>(row + 3).setConstant(
         density2(noise.accel_density, imu->accel_density, noise.accel_guess_change,
-                 imu->accel_change, imu->held_s2) +
+                 imu->accel_surprise, imu->held_s2) +
         square(noise.scale_sigma * imu->accel_swing_mps2) * kScaleTime);
     row += 6;
   }

@@ -162,6 +162,54 @@ TEST(ImuHistory, RotationIsTheTurnOfABodyAtConstantRate) {
   EXPECT_LT((so3_log(q) - 0.666 * w).norm(), 1e-12);
 }
 
+/// A hand's swing: samples every 10 ms, each the mean over the interval that it ends.
+double swing_mean(double from_s, double to_s) {
+  constexpr double kOmega = 7.0;  // rad/s
+  return 3.0 * (std::sin(kOmega * to_s) - std::sin(kOmega * from_s)) / kOmega / (to_s - from_s);
+}
+
+TEST(ImuHistory, ASwingGoesOnBeyondTheNewestSample) {
+  double squares = 0.0;
+  double held_squares = 0.0;
+  ImuHistory imu;
+  for (int i = 1; i < 600; ++i) {
+    ASSERT_TRUE(imu.push(sample_at(i * 10ms, swing_mean(0.01 * (i - 1), 0.01 * i))));
+    if (i < 200) continue;
+    const ImuMean mean = imu.mean(Timestamp{i * 10ms + 10ms}, Timestamp{i * 10ms + 20ms});
+    const double truth = swing_mean(0.01 * i + 0.01, 0.01 * i + 0.02);
+    squares += std::pow(mean.gyro_radps.x() - truth, 2);
+    held_squares += std::pow(imu.newest().gyro_radps.x() - truth, 2);
+    EXPECT_NEAR(mean.accel_mps2.y(), 2.0 * mean.gyro_radps.y(), 1e-9);
+    EXPECT_EQ(mean.guessed, 1.0);
+  }
+  EXPECT_LT(squares, 0.05 * 0.05 * held_squares);
+}
+
+TEST(ImuHistory, HoldsAfterAGapAndForgetsNothing) {
+  ImuHistory imu;
+  for (int i = 1; i < 300; ++i) imu.push(sample_at(i * 10ms, swing_mean(0.01 * (i - 1), 0.01 * i)));
+  const auto ahead = [&imu](Duration by) {
+    const Timestamp t = imu.newest().stamp + by;
+    return imu.mean(t, t + 1ms).gyro_radps.x();
+  };
+  EXPECT_NE(ahead(20ms), imu.newest().gyro_radps.x());
+  EXPECT_EQ(ahead(40ms), ahead(400ms)) << "believed for three samples, then held";
+
+  imu.push(sample_at(3040ms, swing_mean(3.03, 3.04)));
+  EXPECT_EQ(ahead(20ms), imu.newest().gyro_radps.x());
+
+  for (int i = 305; i < 316; ++i)
+    imu.push(sample_at(i * 10ms, swing_mean(0.01 * (i - 1), 0.01 * i)));
+  EXPECT_NEAR(ahead(20ms), swing_mean(3.17, 3.171), 0.03);
+}
+
+TEST(ImuHistory, AConstantIsPredictedToTheBit) {
+  ImuHistory imu;
+  for (int i = 1; i < 300; ++i) imu.push(sample_at(i * 10ms, 0.7));
+
+  EXPECT_EQ(imu.mean(Timestamp{3s}, Timestamp{3020ms}).gyro_radps.x(), 0.7);
+}
+
 TEST(ImuHistory, ReadsTheWhiteNoiseOffTheSamples) {
   RandomGeometry random(3);
   ImuHistory imu;
