@@ -15,9 +15,6 @@ constexpr std::uint64_t kAccel = 0x616363656cU;
 constexpr double kGyroVibration = 0.0052;  // rad/s
 constexpr double kAccelVibration = 0.2;    // m/s^2
 
-// Recordings show 0.0017 where gyroscopes have 0.0026.
-constexpr double kAccelScale = 0.6;  // of the gyroscope's
-
 SeededNoise noise_of(std::uint64_t sensor, const SimWorld& world, RobotId robot) {
   return SeededNoise{sensor, static_cast<std::uint64_t>(world.seed()), robot.value};
 }
@@ -44,12 +41,12 @@ SimImu::SimImu(const SimWorld& world, RobotId robot, const ImuConfig& config)
             {.bias = config.gyroscope_bias_sigma,
              .random_walk = config.gyroscope_random_walk,
              .noise = sample_noise(config.gyroscope_noise_density, kGyroVibration),
-             .scale = config.scale_sigma}),
+             .scale = config.gyroscope_scale_sigma}),
       accel_(noise_of(kAccel, world, robot),
              {.bias = config.accelerometer_bias_sigma,
               .random_walk = config.accelerometer_random_walk,
               .noise = sample_noise(config.accelerometer_noise_density, kAccelVibration),
-              .scale = kAccelScale * config.scale_sigma}) {}
+              .scale = config.accelerometer_scale_sigma}) {}
 
 double SimImu::sample_noise(double density, double vibration) const {
   return std::hypot(density / std::sqrt(period_s_), world_.has_rotors(robot_) ? vibration : 0.0);

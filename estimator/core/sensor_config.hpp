@@ -124,7 +124,8 @@ struct ImuConfig {
   double gyroscope_random_walk = 0.0001;
   double accelerometer_bias_sigma = 0.035;
   double gyroscope_bias_sigma = 0.005;
-  double scale_sigma = 0.003;
+  double accelerometer_scale_sigma = 0.002;
+  double gyroscope_scale_sigma = 0.003;
   std::string port;
   int baud = 115200;
   ImuProtocol protocol = ImuProtocol::kAuto;
@@ -150,8 +151,10 @@ struct ImuConfig {
             "prior of the bias at start, one sigma [m/s^2]");
     v.field("gyroscope_bias_sigma", gyroscope_bias_sigma, Bounds{0, 1},
             "prior of the bias at start, one sigma [rad/s]");
-    v.field("scale_sigma", scale_sigma, Bounds{0, 0.1},
-            "scale and axis errors that calibration left, one sigma; noise that grows with rate");
+    v.field("accelerometer_scale_sigma", accelerometer_scale_sigma, Bounds{0, 0.1},
+            "scale and axis errors that calibration left, each, one sigma");
+    v.field("gyroscope_scale_sigma", gyroscope_scale_sigma, Bounds{0, 0.1},
+            "scale and axis errors that calibration left, each, one sigma");
     v.field("port", port, "serial device, best under /dev/serial/by-id");
     v.field("baud", baud, Bounds{1200, 4000000}, "bits a second");
     v.choice("protocol", protocol, kImuProtocols, "what the device speaks; auto: find out");

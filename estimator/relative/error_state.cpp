@@ -17,6 +17,8 @@ void inject(const ErrorState::Vector& dx, NominalState& state) {
   state.range_bias_m += dx(E::kRangeBias);
   state.misalignment_B += dx.segment<3>(E::kMisalignB);
   state.misalignment_N += dx.segment<3>(E::kMisalignN);
+  state.bias_B.accel_scale.reshaped() += dx.segment<9>(E::kAccelScaleB);
+  state.bias_N.accel_scale.reshaped() += dx.segment<9>(E::kAccelScaleN);
 }
 
 }  // namespace crepes

@@ -14,13 +14,13 @@ struct RelativeMotion {
   Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
 };
 
-/// What an IMU reads beside the truth: the gyroscope (I + S) w + bias, S for scales and axes that
-/// are not quite as they should be; the accelerometer a + bias, of which a constant force's share
-/// of scale errors is a part.
+/// What an IMU reads beside the truth: (I + scale) x + bias of either sensor, `scale` for scales
+/// and axes that are not quite as they should be.
 struct ImuBias {
   Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d gyro_scale = Eigen::Matrix3d::Zero();  ///< S
+  Eigen::Matrix3d gyro_scale = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d accel_scale = Eigen::Matrix3d::Zero();
 };
 
 /// Everything that the tight filter estimates.
@@ -48,9 +48,11 @@ struct ErrorState {
     kRangeBias = 21,
     kMisalignB = 22,
     kMisalignN = 25,
-    kGyroScaleB = 28,  ///< by columns
-    kGyroScaleN = 37,
-    kSize = 46,
+    kGyroScaleB = 28,  ///< by columns, as the following
+    kAccelScaleB = 37,
+    kGyroScaleN = 46,
+    kAccelScaleN = 55,
+    kSize = 64,
   };
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Covariance = Eigen::Matrix<double, kSize, kSize>;

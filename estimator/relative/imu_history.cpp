@@ -8,7 +8,6 @@
 namespace crepes {
 namespace {
 
-constexpr double kMeanTime = 3.0;  // s
 constexpr Duration kRotationStep = std::chrono::milliseconds{5};
 
 void add(const ImuSample& sample, double dt, ImuMean& sum) {
@@ -80,12 +79,6 @@ std::optional<ImuHistory::Recent> ImuHistory::recent() const {
 }
 
 void ImuHistory::observe_motion() {
-  if (size_ == 1) {
-    accel_mean_ = newest().accel_mps2;
-    return;
-  }
-  const double since_last = to_seconds(newest().stamp - (*this)[size_ - 2].stamp);
-  accel_mean_ += std::min(1.0, since_last / kMeanTime) * (newest().accel_mps2 - accel_mean_);
   if (const auto samples = recent()) {
     gyro_.observe(samples->gyro, samples->period_s);
     accel_.observe(samples->accel, samples->period_s);
@@ -132,16 +125,14 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
   }
 
   const double width = to_seconds(to - from);
-  const Eigen::Vector3d accel_mps2 = sum.accel_mps2 / width;
   return {.gyro_radps = sum.gyro_radps / width,
-          .accel_mps2 = accel_mps2,
+          .accel_mps2 = sum.accel_mps2 / width,
           .guessed = sum.guessed / width,
           .held_s2 = sum.held_s2 / width,
           .gyro_density = gyro_.density(),
           .accel_density = accel_.density(),
           .gyro_surprise = gyro_.surprise(),
-          .accel_surprise = accel_.surprise(),
-          .accel_swing_mps2 = (accel_mps2 - accel_mean_).norm()};
+          .accel_surprise = accel_.surprise()};
 }
 
 Eigen::Quaterniond ImuHistory::rotation(Timestamp from, Timestamp to) const {

@@ -25,8 +25,6 @@ struct ImuMean {
   /// How fast the signals leave their prediction, as a random walk of this density.
   double gyro_surprise = 0.0;   ///< [rad/s/sqrt(s)]
   double accel_surprise = 0.0;  ///< [m/s^2/sqrt(s)]
-  /// How far the force is from its mean of the last seconds [m/s^2].
-  double accel_swing_mps2 = 0.0;
 };
 
 /// Finite, and within what sensors of these robots measure: 100 rad/s and 1000 m/s^2 an axis.
@@ -79,7 +77,6 @@ class ImuHistory {
   std::size_t size_ = 0;
   SignalModel gyro_;
   SignalModel accel_;
-  Eigen::Vector3d accel_mean_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace crepes

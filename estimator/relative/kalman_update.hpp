@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <tuple>
@@ -35,11 +36,20 @@ struct UpdateOutcome {
 template <int M, int N>
 [[nodiscard]] UpdateOutcome<M, N> kalman_gain(const Innovation<M, N>& z, double gate_nis,
                                               const Eigen::Matrix<double, N, N>& P) {
-  // A measurement sees few of the states: most of H is zero.
-  Eigen::Matrix<double, N, M> PHt = Eigen::Matrix<double, N, M>::Zero();
-  for (int i = 0; i < N; ++i) {
-    for (int m = 0; m < M; ++m)
-      if (z.H(m, i) != 0.0) PHt.col(m) += z.H(m, i) * P.col(i);
+  // A measurement sees few of the states: most of H is zero. By stripes that registers hold.
+  std::array<int, N> seen{};
+  int count = 0;
+  for (int i = 0; i < N; ++i)
+    if (!z.H.col(i).isZero(0.0)) seen[count++] = i;
+  constexpr int kStripe = N % 16 == 0 ? 16 : N;
+  Eigen::Matrix<double, N, M> PHt;
+  for (int row = 0; row < N; row += kStripe) {
+    for (int m = 0; m < M; ++m) {
+      Eigen::Matrix<double, kStripe, 1> sum = Eigen::Matrix<double, kStripe, 1>::Zero();
+      for (int k = 0; k < count; ++k)
+        sum += z.H(m, seen[k]) * P.col(seen[k]).template segment<kStripe>(row);
+      PHt.col(m).template segment<kStripe>(row) = sum;
+    }
   }
   const Eigen::Matrix<double, M, M> S = z.H.lazyProduct(PHt) + z.cov_z;
   const Eigen::LLT<Eigen::Matrix<double, M, M>> S_chol(S);
@@ -63,16 +73,25 @@ template <int M, int N>
 }
 
 /// Joseph's form  (I - KH) P (I - KH)^T + K V K^T  multiplied out,  P - K L^T - L K^T:  holds
-/// for a gain that is not quite the best, costs N^2 M and stays symmetric to the bit.
+/// for a gain that is not quite the best, costs N^2 M and stays symmetric to the bit. By blocks,
+/// each written together with its mirror image.
 template <int M, int N>
 void correct_covariance(const UpdateOutcome<M, N>& outcome, Eigen::Matrix<double, N, N>& P) {
+  constexpr int kBlock = N % 4 == 0 ? 4 : N % 3 == 0 ? 3 : 1;
   const auto& [K, L] = std::tie(outcome.K, outcome.L);
-  for (int j = 0; j < N; ++j) {
-    auto column = P.col(j).tail(N - j);
-    for (int m = 0; m < M; ++m)
-      column -= L(j, m) * K.col(m).tail(N - j) + K(j, m) * L.col(m).tail(N - j);
+  for (int j = 0; j < N; j += kBlock) {
+    const auto K_j = K.template middleRows<kBlock>(j);
+    const auto L_j = L.template middleRows<kBlock>(j);
+    for (int i = j; i < N; i += kBlock) {
+      Eigen::Matrix<double, kBlock, kBlock> block = P.template block<kBlock, kBlock>(i, j);
+      for (int m = 0; m < M; ++m) {
+        block -= K.col(m).template segment<kBlock>(i) * L_j.col(m).transpose() +
+                 L.col(m).template segment<kBlock>(i) * K_j.col(m).transpose();
+      }
+      P.template block<kBlock, kBlock>(i, j) = block;
+      if (i != j) P.template block<kBlock, kBlock>(j, i) = block.transpose();
+    }
   }
-  P.template triangularView<Eigen::StrictlyUpper>() = P.transpose();
 }
 
 /// Both at once.

@@ -38,7 +38,10 @@ ErrorState::Covariance first_covariance(const Matrix6d& pose, double speed_sigma
   set(E::kAccelN, priors.accel_bias_mps2);
   set(E::kMisalignB, priors.misalignment_rad);
   set(E::kMisalignN, priors.misalignment_rad);
-  P.diagonal().segment<18>(E::kGyroScaleB).setConstant(square(priors.gyro_scale));
+  for (const int scale : {E::kGyroScaleB, E::kGyroScaleN})
+    P.diagonal().segment<9>(scale).setConstant(square(priors.gyro_scale));
+  for (const int scale : {E::kAccelScaleB, E::kAccelScaleN})
+    P.diagonal().segment<9>(scale).setConstant(square(priors.accel_scale));
   P(E::kRangeBias, E::kRangeBias) = square(priors.range_bias_m);
   return P;
 }
@@ -58,14 +61,23 @@ void correlate(const CalibrationJacobian& J, E::Covariance& P) {
   add(J.by_misalignment_N, E::kMisalignN);
   add(J.by_accel_bias_B, E::kAccelB);
   add(J.by_accel_bias_N, E::kAccelN);
+  add(J.by_accel_scale_B, E::kAccelScaleB);
+  add(J.by_accel_scale_N, E::kAccelScaleN);
   add(J.by_range_bias, E::kRangeBias);
 }
 
-Matrix6d with_tilt_of_biases(const RawPose& raw, double accel_bias_mps2) {
-  const auto& B = raw.by_calibration.by_accel_bias_B;
-  const auto& N = raw.by_calibration.by_accel_bias_N;
-  return raw.gaussian().covariance +
-         accel_bias_mps2 * accel_bias_mps2 * (B * B.transpose() + N * N.transpose());
+// With the tilt of accelerometers that are not quite right.
+Matrix6d tilted_covariance(const RawPose& raw, const Priors& priors) {
+  Matrix6d covariance = raw.gaussian().covariance;
+  const auto add = [&](const auto& by_state, double sigma) {
+    covariance += sigma * sigma * by_state * by_state.transpose();
+  };
+  const CalibrationJacobian& J = raw.by_calibration;
+  add(J.by_accel_bias_B, priors.accel_bias_mps2);
+  add(J.by_accel_bias_N, priors.accel_bias_mps2);
+  add(J.by_accel_scale_B, priors.accel_scale);
+  add(J.by_accel_scale_N, priors.accel_scale);
+  return covariance;
 }
 
 // How much two estimates whose errors go together, nobody knows how much, should each count: the
@@ -120,8 +132,7 @@ void turn_to_sight(const BearingInnovation& z, E::Covariance& P) {
 NeighborFilter::NeighborFilter(Timestamp stamp, const RawPose& first, const ProcessNoise& noise,
                                const Priors& priors)
     : stamp_(stamp),
-      P_(first_covariance(with_tilt_of_biases(first, priors.accel_bias_mps2), priors.speed_mps,
-                          priors)),
+      P_(first_covariance(tilted_covariance(first, priors), priors.speed_mps, priors)),
       noise_(noise) {
   correlate(first.by_calibration, P_);
   state_.motion.T_B_N = first.T_B_N;

@@ -17,7 +17,8 @@ struct Priors {
   double speed_mps = 2.0;
   double gyro_bias_radps = 0.0;
   double accel_bias_mps2 = 0.0;
-  double gyro_scale = 0.0;  ///< of each entry
+  double gyro_scale = 0.0;   ///< of each entry
+  double accel_scale = 0.0;  ///< of each entry
   double range_bias_m = 0.0;
   double misalignment_rad = 0.0;
 };
@@ -34,7 +35,7 @@ struct RangeReading {
   double sigma_m = 0.0;
 };
 
-/// ErrorState::kSize error states: relative motion, both IMUs' biases and gyro scales, the pair's
+/// ErrorState::kSize error states: relative motion, both IMUs' biases and scales, the pair's
 /// range bias and both cameras' misalignment. Moves forward only; corrections apply at `stamp()`.
 class NeighborFilter {
  public:

@@ -9,43 +9,47 @@ namespace crepes {
 namespace {
 
 constexpr Duration kMaxStep = std::chrono::milliseconds{10};
-// An accelerometer's scale and axis errors change in effect as the force does: as white noise they
-// weigh as if they held for this long. What they make of a force that stays the same is a bias.
-constexpr double kScaleTime = 0.2;  // s
 
 BodyRates rates(const ImuMean& mean, const ImuBias& bias) {
   const Eigen::Vector3d w = mean.gyro_radps - bias.gyro_radps;
-  return {w - bias.gyro_scale * w, mean.accel_mps2 - bias.accel_mps2};
+  const Eigen::Vector3d a = mean.accel_mps2 - bias.accel_mps2;
+  return {w - bias.gyro_scale * w, a - bias.accel_scale * a};
 }
 
 constexpr int kMotion = ErrorState::kGyroB;  // size of [p, v, theta]
 
-/// Columns of errors after a step, of the motion alone: what J makes of the motion's and the
-/// rates', and the rates' are those of the biases and, by each axis a robot turns about, of a
-/// column of its gyroscope's scale. By columns, because a product of all would spend its time
-/// packing.
-template <int kColumns>
-Eigen::Matrix<double, kMotion, kColumns> moved_errors(
-    const Eigen::Matrix<double, ErrorState::kSize, kColumns>& errors, const PropagationJacobian& J,
+/// E F^T of the motion after a step, where E's rows are errors: what J makes of the motion's and
+/// the rates', and the rates' are those of the biases and, by each axis a robot turns or is pushed
+/// about, of a column of its sensors' scales.
+template <int kRows>
+Eigen::Matrix<double, kRows, kMotion> moved_errors(
+    const Eigen::Matrix<double, kRows, ErrorState::kSize>& errors, const PropagationJacobian& J,
     const BodyRates& body, const BodyRates& neighbor) {
   using E = ErrorState;
-  constexpr int kEven = kMotion + 1;  // pairs of rows are what a register holds
-  Eigen::Matrix<double, kEven, kMotion + 12> F;
-  F << J.by_motion, -J.by_rates, Eigen::Matrix<double, 1, kMotion + 12>::Zero();
+  Eigen::Matrix<double, kRows, 12> of_rates;
+  const auto collect = [&](int bias, const Eigen::Vector3d& rate, int scale) {
+    of_rates.template middleCols<3>(bias - kMotion) =
+        errors.template middleCols<3>(bias) + rate(0) * errors.template middleCols<3>(scale) +
+        rate(1) * errors.template middleCols<3>(scale + 3) +
+        rate(2) * errors.template middleCols<3>(scale + 6);
+  };
+  collect(E::kGyroB, body.w, E::kGyroScaleB);
+  collect(E::kAccelB, body.a, E::kAccelScaleB);
+  collect(E::kGyroN, neighbor.w, E::kGyroScaleN);
+  collect(E::kAccelN, neighbor.a, E::kAccelScaleN);
 
-  Eigen::Matrix<double, kMotion, kColumns> moved;
-  for (int column = 0; column < kColumns; ++column) {
-    const auto error = errors.col(column);
-    Eigen::Matrix<double, kMotion + 12, 1> cause = error.template head<kMotion + 12>();
-    for (int axis = 0; axis < 3; ++axis) {
-      cause.template segment<3>(E::kGyroB) +=
-          body.w(axis) * error.template segment<3>(E::kGyroScaleB + 3 * axis);
-      cause.template segment<3>(E::kGyroN) +=
-          neighbor.w(axis) * error.template segment<3>(E::kGyroScaleN + 3 * axis);
+  // By stripes of rows that registers hold; `by_motion` is triangular by blocks.
+  constexpr int kStripe = kRows % 16 == 0 ? 16 : kRows;
+  Eigen::Matrix<double, kRows, kMotion> moved;
+  for (int row = 0; row < kRows; row += kStripe) {
+    for (int i = 0; i < kMotion; ++i) {
+      Eigen::Matrix<double, kStripe, 1> sum = Eigen::Matrix<double, kStripe, 1>::Zero();
+      for (int k = i / 3 * 3; k < kMotion; ++k)
+        sum += J.by_motion(i, k) * errors.col(k).template segment<kStripe>(row);
+      for (int k = 0; k < 12; ++k)
+        sum -= J.by_rates(i, k) * of_rates.col(k).template segment<kStripe>(row);
+      moved.col(i).template segment<kStripe>(row) = sum;
     }
-    Eigen::Matrix<double, kEven, 1> sum = F.col(0) * cause(0);
-    for (int k = 1; k < cause.size(); ++k) sum += F.col(k) * cause(k);
-    moved.col(column) = sum.template head<kMotion>();
   }
   return moved;
 }
@@ -62,13 +66,16 @@ void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
   using E = ErrorState;
   constexpr int kRest = E::kSize - kMotion;  // biases and calibration
 
-  const Eigen::Matrix<double, kMotion, E::kSize> rows = moved_errors(P, J, body, neighbor);
-  const Eigen::Matrix<double, E::kSize, kMotion> columns = rows.transpose();
+  const Eigen::Matrix<double, E::kSize, kMotion> columns = moved_errors(P, J, body, neighbor);
+  // F P, where biases stand less J Q, so that F (F P - ..)^T has J Q J^T in it; and a row of zeros,
+  // because an even number is faster.
+  Eigen::Matrix<double, kMotion + 1, E::kSize> rows;
+  rows << columns.transpose(), Eigen::Matrix<double, 1, E::kSize>::Zero();
+  rows.topRows<kMotion>().middleCols<12>(kMotion) -= J.by_rates * variance.asDiagonal();
   const Eigen::Matrix<double, kMotion, kMotion> motion =
-      moved_errors(columns, J, body, neighbor) +
-      J.by_rates * variance.asDiagonal() * J.by_rates.transpose();
+      moved_errors(rows, J, body, neighbor).topRows<kMotion>();
   P.topLeftCorner<kMotion, kMotion>() = 0.5 * (motion + motion.transpose());
-  P.topRightCorner<kMotion, kRest>() = rows.rightCols<kRest>();
+  P.topRightCorner<kMotion, kRest>() = columns.bottomRows<kRest>().transpose();
   P.bottomLeftCorner<kRest, kMotion>() = columns.bottomRows<kRest>();
 
   const double gyro_walk = noise.gyro_walk * noise.gyro_walk * dt;
@@ -154,10 +161,9 @@ Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body, const ImuMean& n
     variance.segment<3>(row).setConstant(density2(noise.gyro_density, imu->gyro_density,
                                                   noise.gyro_guess_change, imu->gyro_surprise,
                                                   imu->held_s2));
-    variance.segment<3>(row + 3).setConstant(
-        density2(noise.accel_density, imu->accel_density, noise.accel_guess_change,
-                 imu->accel_surprise, imu->held_s2) +
-        square(noise.scale_sigma * imu->accel_swing_mps2) * kScaleTime);
+    variance.segment<3>(row + 3).setConstant(density2(noise.accel_density, imu->accel_density,
+                                                      noise.accel_guess_change, imu->accel_surprise,
+                                                      imu->held_s2));
     row += 6;
   }
   return variance / dt;

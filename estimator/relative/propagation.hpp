@@ -23,8 +23,8 @@ struct ProcessNoise {
   double gyro_walk = 0.0;
   double accel_walk = 0.0;
   double scale_sigma = 0.0;
-  double gyro_guess_change = 0.5;   ///< [rad/s/sqrt(s)]
-  double accel_guess_change = 5.0;  ///< [m/s^2/sqrt(s)]
+  double gyro_guess_change = 0.3;   ///< [rad/s/sqrt(s)]
+  double accel_guess_change = 3.0;  ///< [m/s^2/sqrt(s)]
   double range_bias_walk = 0.0;     ///< [m/sqrt(s)]
   double range_bias_return = 0.0;   ///< to zero, so that a walk stays within bounds [1/s]
 };

@@ -151,7 +151,8 @@ Eigen::Matrix<double, 9, 9> covariance(const MutualSighting& m, const InputJacob
 }
 
 // Truth lies where the inputs would lead without their fault: u turned back by the misalignment,
-// Exp(-m) u; the force less the bias, up - b / g; the range less its own.
+// Exp(-m) u; the force less the bias and what scales make of gravity, up - b / g - S up; the range
+// less its own.
 CalibrationJacobian calibration_jacobian(const MutualSighting& m, const InputJacobian& J) {
   constexpr double kGravity = 9.80665;
   Eigen::Matrix<double, 6, kInputs> J_pose;
@@ -162,10 +163,18 @@ CalibrationJacobian calibration_jacobian(const MutualSighting& m, const InputJac
   const auto by_force = [&](int column, const Eigen::Vector3d& up) -> Eigen::Matrix<double, 6, 3> {
     return J_pose.middleCols<2>(column) * tangent_basis(up).transpose() / -kGravity;
   };
+  const auto by_scale = [&](int column, const Eigen::Vector3d& up) {
+    Eigen::Matrix<double, 6, 9> J_scale;
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      J_scale.middleCols<3>(3 * axis) = kGravity * up(axis) * by_force(column, up);
+    return J_scale;
+  };
   return {.by_misalignment_B = by_turn(0, m.B.u),
           .by_misalignment_N = by_turn(2, m.N.u),
           .by_accel_bias_B = by_force(4, m.B.up),
           .by_accel_bias_N = by_force(6, m.N.up),
+          .by_accel_scale_B = by_scale(4, m.B.up),
+          .by_accel_scale_N = by_scale(6, m.N.up),
           .by_range_bias = -J_pose.col(8)};
 }
 

@@ -35,12 +35,14 @@ struct MutualSighting {
 };
 
 /// What one raw pose and the next get wrong alike: both cameras' misalignment, both accelerometers'
-/// bias (which tilts "up") and the pair's range bias.
+/// bias and scale (which tilt "up") and the pair's range bias.
 struct CalibrationJacobian {
   Eigen::Matrix<double, 6, 3> by_misalignment_B = Eigen::Matrix<double, 6, 3>::Zero();
   Eigen::Matrix<double, 6, 3> by_misalignment_N = Eigen::Matrix<double, 6, 3>::Zero();
   Eigen::Matrix<double, 6, 3> by_accel_bias_B = Eigen::Matrix<double, 6, 3>::Zero();
   Eigen::Matrix<double, 6, 3> by_accel_bias_N = Eigen::Matrix<double, 6, 3>::Zero();
+  Eigen::Matrix<double, 6, 9> by_accel_scale_B = Eigen::Matrix<double, 6, 9>::Zero();
+  Eigen::Matrix<double, 6, 9> by_accel_scale_N = Eigen::Matrix<double, 6, 9>::Zero();
   Vector6d by_range_bias = Vector6d::Zero();
 };
 

@@ -13,9 +13,9 @@ constexpr double kMostGrowth = 2.0;        // from one change to the next
 
 // The last two changes before sample `now` of a window, as columns, the later one first.
 Eigen::Matrix<double, 3, 2> changes_before(const SignalModel::Window& window, int now) {
-  constexpr int k = SignalModel::kStride;
+  const auto sample = [&](int strides) { return window.col(now + strides * SignalModel::kStride); };
   Eigen::Matrix<double, 3, 2> changes;
-  changes << window.col(now) - window.col(now + k), window.col(now + k) - window.col(now + 2 * k);
+  changes << sample(0) - sample(1), sample(1) - sample(2);
   return changes;
 }
 

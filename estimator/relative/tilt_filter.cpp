@@ -61,7 +61,7 @@ void TiltFilter::predict(const ImuSample& sample, double dt) {
   F.block<3, 3>(kTheta, kTheta) = so3_exp(w * dt).conjugate().toRotationMatrix();
   F.block<3, 3>(kTheta, kBias) = -dt * so3_right_jacobian(w * dt);
   P_ = (F * P_ * F.transpose()).eval();
-  const double scale = config_.scale_sigma * w.norm();
+  const double scale = config_.gyroscope_scale_sigma * w.norm();
   P_.diagonal().head<3>().array() +=
       dt * (config_.gyroscope_noise_density * config_.gyroscope_noise_density +
             scale * scale * kAccelerationTime);

@@ -24,7 +24,6 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig
   s.noise.accel_density = imu.accelerometer_noise_density;
   s.noise.gyro_walk = imu.gyroscope_random_walk;
   s.noise.accel_walk = imu.accelerometer_random_walk;
-  s.noise.scale_sigma = imu.scale_sigma;
   // A random walk that reaches bias_drift_m within bias_time_s, drawn back so that in the long run
   // it stays within bias_sigma_m (a Gauss-Markov process).
   s.noise.range_bias_walk = uwb.bias_drift_m / std::sqrt(uwb.bias_time_s);
@@ -41,7 +40,8 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig
 
   s.priors.gyro_bias_radps = imu.gyroscope_bias_sigma;
   s.priors.accel_bias_mps2 = imu.accelerometer_bias_sigma;
-  s.priors.gyro_scale = imu.scale_sigma;
+  s.priors.gyro_scale = imu.gyroscope_scale_sigma;
+  s.priors.accel_scale = imu.accelerometer_scale_sigma;
   s.priors.range_bias_m = uwb.bias_sigma_m;
   s.priors.misalignment_rad = estimator.camera_misalignment_deg * std::numbers::pi / 180.0;
 

@@ -142,7 +142,7 @@ TEST(SimImu, ReadsWhatTheBodyFeelsWithinItsErrors) {
   EXPECT_GT(errors.gyro_mean.norm(), 1e-4);
   EXPECT_LT(errors.gyro_mean.cwiseAbs().maxCoeff(), 4.0 * config.gyroscope_bias_sigma);
   EXPECT_LT(errors.accel_mean.cwiseAbs().maxCoeff(),
-            4.0 * (config.accelerometer_bias_sigma + 9.81 * config.scale_sigma));
+            4.0 * (config.accelerometer_bias_sigma + 9.81 * config.accelerometer_scale_sigma));
   // White noise of density s at rate f, quantized in steps of 2000/32768 deg/s.
   const double step = 2000.0 * M_PI / 180.0 / 32768.0;
   const double expected =

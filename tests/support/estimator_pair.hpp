@@ -128,7 +128,8 @@ class EstimatorPair {
     config.imu.accelerometer_noise_density = n.accel * root_period;
     config.imu.gyroscope_bias_sigma = n.priors.gyro_bias_radps;
     config.imu.accelerometer_bias_sigma = n.priors.accel_bias_mps2;
-    config.imu.scale_sigma = n.priors.gyro_scale;
+    config.imu.gyroscope_scale_sigma = n.priors.gyro_scale;
+    config.imu.accelerometer_scale_sigma = n.priors.accel_scale;
     config.uwb.noise_m = n.range;
     config.uwb.bias_sigma_m = n.priors.range_bias_m;
     config.vision.bearing_sigma_px = n.bearing * 316.9;

@@ -42,6 +42,7 @@ struct PairNoise {
                 .gyro_bias_radps = 0.005,
                 .accel_bias_mps2 = 0.05,
                 .gyro_scale = 0.003,
+                .accel_scale = 0.002,
                 .range_bias_m = 0.10,
                 .misalignment_rad = 0.0035};
 };
@@ -64,8 +65,10 @@ class SimulatedPair {
     const Priors& p = noise.priors;
     truth_.bias_B = {random_.vector(p.gyro_bias_radps), random_.vector(p.accel_bias_mps2)};
     truth_.bias_N = {random_.vector(p.gyro_bias_radps), random_.vector(p.accel_bias_mps2)};
-    for (ImuBias* bias : {&truth_.bias_B, &truth_.bias_N})
+    for (ImuBias* bias : {&truth_.bias_B, &truth_.bias_N}) {
       for (double& s : bias->gyro_scale.reshaped()) s = random_.normal(p.gyro_scale);
+      for (double& s : bias->accel_scale.reshaped()) s = random_.normal(p.accel_scale);
+    }
     truth_.range_bias_m = random_.normal(p.range_bias_m);
     truth_.misalignment_B = random_.vector(p.misalignment_rad);
     truth_.misalignment_N = random_.vector(p.misalignment_rad);
@@ -107,8 +110,9 @@ class SimulatedPair {
   [[nodiscard]] MutualSighting sighting(Timestamp stamp) {
     const auto side = [&](const DirectionReading& u, const Pose& T_W_X, const Mounting& mounting,
                           const ImuBias& bias) {
+      const Eigen::Vector3d true_up = T_W_X.q.conjugate() * Eigen::Vector3d::UnitZ();
       const Eigen::Vector3d up =
-          (T_W_X.q.conjugate() * Eigen::Vector3d::UnitZ() + bias.accel_mps2 / 9.80665).normalized();
+          (true_up + bias.accel_scale * true_up + bias.accel_mps2 / 9.80665).normalized();
       return Sighting{
           .u = u.u,
           .up = (up + tangent_basis(up) * random_.normal_vector<2>(noise_.tilt)).normalized(),
@@ -145,10 +149,10 @@ class SimulatedPair {
     const Eigen::Vector3d w = so3_log(before.q.conjugate() * after.q) / dt;
     const Eigen::Vector3d f_W =
         (flight.v_W_B(t + dt) - flight.v_W_B(t)) / dt + 9.80665 * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d f = flight.T_W_B(t + 0.5 * dt).q.conjugate() * f_W;
     return {sampled_ + kImuPeriod,
             w + bias.gyro_scale * w + bias.gyro_radps + random_.vector(noise_.gyro),
-            flight.T_W_B(t + 0.5 * dt).q.conjugate() * f_W + bias.accel_mps2 +
-                random_.vector(noise_.accel)};
+            f + bias.accel_scale * f + bias.accel_mps2 + random_.vector(noise_.accel)};
   }
 
   DirectionReading direction(const Eigen::Vector3d& ring, const Eigen::Vector3d& camera,

@@ -48,8 +48,8 @@ struct Trials {
   Duration slowest_return{};  ///< to a measured pose
   std::uint32_t restarts = 0;
 
-  explicit Trials(const Fault& fault) {
-    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+  explicit Trials(const Fault& fault, std::uint64_t seeds = kSeeds) {
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
       EstimatorPair pair(seed);
       pair.run_for(kWarmUp);
       const std::uint32_t starts = starts_of(pair);
@@ -130,8 +130,10 @@ TEST(EstimatorFaults, APeersImuThatHangsTakesThePoseAwayAndIsTold) {
 }
 
 TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsTold) {
+  // A pose that starts three sigma off stays so for a while: a few of these decide the share.
+  constexpr std::uint64_t kStarts = 100;
   for (const bool own : {true, false}) {
-    const Trials trials([&](EstimatorPair& pair, std::uint64_t seed) {
+    const auto saturate = [&](EstimatorPair& pair, std::uint64_t seed) {
       Conditions with;
       (own ? with.own_imu : with.peer_imu) = at_its_end;
       pair.run_for(100ms, with);
@@ -139,7 +141,8 @@ TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsTold) {
       pair.run_for(650ms, with);
       EXPECT_EQ(pair.latest(), nullptr) << seed;
       EXPECT_EQ(pair.status().reason, own ? NoPoseReason::kNoOwnImu : NoPoseReason::kNoPeerImu);
-    });
+    };
+    const Trials trials(saturate, kStarts);
 
     EXPECT_LE(trials.slowest_return, 500ms);
     // Our tilt starts anew from a single sample in flight, as wrong as the robot then accelerates.
