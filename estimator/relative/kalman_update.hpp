@@ -98,7 +98,7 @@ void correct_covariance(const UpdateOutcome<M, N>& outcome, Eigen::Matrix<double
 template <int M, int N>
 [[nodiscard]] UpdateOutcome<M, N> kalman_update(const Innovation<M, N>& z, double gate_nis,
                                                 Eigen::Matrix<double, N, N>& P) {
-  const auto outcome = kalman_gain(z, gate_nis, P);
+  auto outcome = kalman_gain(z, gate_nis, P);
   if (outcome.verdict == Verdict::kFused) correct_covariance(outcome, P);
   return outcome;
 }

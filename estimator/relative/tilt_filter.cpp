@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimator/core/so3.hpp"
 #include "estimator/relative/imu_history.hpp"
@@ -24,7 +25,7 @@ constexpr int kBias = 3;
 
 }  // namespace
 
-TiltFilter::TiltFilter(const ImuConfig& config) : config_(config) {}
+TiltFilter::TiltFilter(ImuConfig config) : config_(std::move(config)) {}
 
 void TiltFilter::start(const ImuSample& sample) {
   q_L_B_ = Eigen::Quaterniond::FromTwoVectors(sample.accel_mps2, Eigen::Vector3d::UnitZ());

@@ -16,7 +16,7 @@ namespace crepes {
 /// as the present motion suggests, and the gyroscope carries the attitude in between.
 class TiltFilter {
  public:
-  explicit TiltFilter(const ImuConfig& config);
+  explicit TiltFilter(ImuConfig config);
 
   /// Another noise from now on; what is known stays known.
   void set_noise(const ImuConfig& config) { config_ = config; }

@@ -158,6 +158,57 @@ TEST(RawPose, CovarianceMatchesAMonteCarloWithinTwentyPercent) {
   }
 }
 
+/// What calibration leaves of one robot: misalignment, accelerometer bias and scale by columns.
+using Faults = Eigen::Matrix<double, 15, 1>;
+
+/// As it would be without faults of calibration.
+Sighting without(const Faults& faults, Sighting z) {
+  const Eigen::Vector3d misalignment = faults.head<3>();
+  const Eigen::Vector3d bias = faults.segment<3>(3);
+  const auto scale = faults.tail<9>().reshaped(3, 3);
+  z.u = so3_exp(-misalignment) * z.u;
+  z.up = (z.up - bias / 9.80665 - scale * z.up).normalized();
+  return z;
+}
+
+TEST(RawPose, CalibrationJacobianIsWhatFaultsOfCalibrationDo) {
+  RandomGeometry random(12);
+  int tried = 0;
+  while (tried < 100) {
+    const MutualSighting z = random_pair(random, 0.1).sighting();
+    const auto found = compute_raw_pose(z);
+    const auto* raw = std::get_if<RawPose>(&found);
+    if (raw == nullptr) continue;
+    ++tried;
+    const auto error_of = [&](const MutualSighting& corrected) -> Vector6d {
+      const Pose truth = std::get<RawPose>(compute_raw_pose(corrected)).T_B_N;
+      Vector6d error;
+      error << truth.p - raw->T_B_N.p, so3_log(raw->T_B_N.q.conjugate() * truth.q);
+      return error;
+    };
+    const auto by_B = test::numeric_jacobian<6, 15>([&](const Faults& faults) {
+      return error_of({without(faults, z.B), z.N, z.range_m, z.range_sigma_m});
+    });
+    const auto by_N = test::numeric_jacobian<6, 15>([&](const Faults& faults) {
+      return error_of({z.B, without(faults, z.N), z.range_m, z.range_sigma_m});
+    });
+    const auto by_range =
+        test::numeric_jacobian<6, 1>([&](const Eigen::Matrix<double, 1, 1>& bias) {
+          return error_of({z.B, z.N, z.range_m - bias(0), z.range_sigma_m});
+        });
+
+    const CalibrationJacobian& J = raw->by_calibration;
+    Eigen::Matrix<double, 6, 15> J_B;
+    J_B << J.by_misalignment_B, J.by_accel_bias_B, J.by_accel_scale_B;
+    Eigen::Matrix<double, 6, 15> J_N;
+    J_N << J.by_misalignment_N, J.by_accel_bias_N, J.by_accel_scale_N;
+    const double tolerance = 1e-5 * by_B.cwiseAbs().maxCoeff();
+    EXPECT_LT(test::largest_difference(J_B, by_B), tolerance);
+    EXPECT_LT(test::largest_difference(J_N, by_N), tolerance);
+    EXPECT_LT(test::largest_difference(J.by_range_bias, by_range), tolerance);
+  }
+}
+
 TEST(RawPose, RefusesANeighborNearTheVertical) {
   EXPECT_EQ(refusal(level_pair({0.1, 0.0, 3.0}).sighting()), NoPoseReason::kNearVertical);
   EXPECT_EQ(refusal(level_pair({0.0, 0.0, -3.0}).sighting()), NoPoseReason::kNearVertical);
