@@ -67,8 +67,8 @@ void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
   constexpr int kRest = E::kSize - kMotion;  // biases and calibration
 
   const Eigen::Matrix<double, E::kSize, kMotion> columns = moved_errors(P, J, body, neighbor);
-  // F P, where biases stand less J Q, so that F (F P - ..)^T has J Q J^T in it; and a row of zeros,
-  // because an even number is faster.
+  // F P, from whose biases J Q is taken: as F has -J there, the next product adds J Q J^T. The row
+  // of zeros makes their number even, which is faster.
   Eigen::Matrix<double, kMotion + 1, E::kSize> rows;
   rows << columns.transpose(), Eigen::Matrix<double, 1, E::kSize>::Zero();
   rows.topRows<kMotion>().middleCols<12>(kMotion) -= J.by_rates * variance.asDiagonal();

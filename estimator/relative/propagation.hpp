@@ -15,14 +15,13 @@ struct BodyRates {
 };
 
 /// How far to trust the IMUs, the same for all robots of a team. Densities are white noise per
-/// sqrt(Hz); `guess` changes are what may begin at any time where no sample covers; `scale_sigma`
-/// errors of the accelerometer weigh with the force's swing.
+/// sqrt(Hz); `guess` changes are what may begin at any time where no sample covers, beside what the
+/// signal's own surprises tell.
 struct ProcessNoise {
   double gyro_density = 0.0;
   double accel_density = 0.0;
   double gyro_walk = 0.0;
   double accel_walk = 0.0;
-  double scale_sigma = 0.0;
   double gyro_guess_change = 0.3;   ///< [rad/s/sqrt(s)]
   double accel_guess_change = 3.0;  ///< [m/s^2/sqrt(s)]
   double range_bias_walk = 0.0;     ///< [m/sqrt(s)]

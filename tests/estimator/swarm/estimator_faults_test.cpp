@@ -129,25 +129,28 @@ TEST(EstimatorFaults, APeersImuThatHangsTakesThePoseAwayAndIsTold) {
   expect_unknown_for(NoPoseReason::kNoPeerImu, [] { return Conditions{.peer_imu = frozen()}; });
 }
 
-TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsTold) {
-  // A pose that starts three sigma off stays so for a while: a few of these decide the share.
-  constexpr std::uint64_t kStarts = 100;
-  for (const bool own : {true, false}) {
-    const auto saturate = [&](EstimatorPair& pair, std::uint64_t seed) {
-      Conditions with;
-      (own ? with.own_imu : with.peer_imu) = at_its_end;
-      pair.run_for(100ms, with);
-      EXPECT_EQ(pair.latest(), nullptr) << seed;
-      pair.run_for(650ms, with);
-      EXPECT_EQ(pair.latest(), nullptr) << seed;
-      EXPECT_EQ(pair.status().reason, own ? NoPoseReason::kNoOwnImu : NoPoseReason::kNoPeerImu);
-    };
-    const Trials trials(saturate, kStarts);
+/// Three quarters of a second of an accelerometer that reads the end of its range: no pose, told.
+template <bool kOwn>
+void saturate(EstimatorPair& pair, std::uint64_t seed) {
+  Conditions with;
+  (kOwn ? with.own_imu : with.peer_imu) = at_its_end;
+  pair.run_for(100ms, with);
+  EXPECT_EQ(pair.latest(), nullptr) << seed;
+  pair.run_for(650ms, with);
+  EXPECT_EQ(pair.latest(), nullptr) << seed;
+  EXPECT_EQ(pair.status().reason, kOwn ? NoPoseReason::kNoOwnImu : NoPoseReason::kNoPeerImu);
+}
 
-    EXPECT_LE(trials.slowest_return, 500ms);
-    // Our tilt starts anew from a single sample in flight, as wrong as the robot then accelerates.
-    EXPECT_LE(trials.after.dishonest_share(), 0.02);
-  }
+TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsTold) {
+  EXPECT_LE(Trials(saturate<true>).slowest_return, 500ms);
+  EXPECT_LE(Trials(saturate<false>).slowest_return, 500ms);
+}
+
+TEST(EstimatorFaults, HundredStartsAfterASaturatedImuAreHonest) {
+  // A pose that starts three sigma off stays so for a while: a few of these decide the share. Our
+  // tilt starts anew from a single sample in flight, as wrong as the robot then accelerates.
+  EXPECT_LE(Trials(saturate<true>, 100).after.dishonest_share(), 0.02);
+  EXPECT_LE(Trials(saturate<false>, 100).after.dishonest_share(), 0.02);
 }
 
 TEST(EstimatorFaults, AfterTwoSecondsOutOfViewThePoseIsMeasuredAgainWithin200Milliseconds) {
