@@ -89,7 +89,7 @@ enum class NoPoseReason : std::uint8_t {
 enum class Verdict : std::uint8_t {
   kFused,
   kGated,       ///< too unlikely
-  kDegenerate,  ///< geometry in which the measurement says nothing
+  kDegenerate,  ///< the measurement says nothing here, or nothing that counts
   kLate,        ///< older than the lag
   kNoState,     ///< nothing to correct yet
 };

@@ -282,6 +282,15 @@ void NeighborFilter::forget_distance(double sigma_m, const Priors& priors) {
   state_.motion.v_B_N = v_B_N;
 }
 
+void NeighborFilter::change_camera(MeasurementKind kind, double misalignment_rad) {
+  const bool ours = kind == MeasurementKind::kBearing;
+  const int index = ours ? E::kMisalignB : E::kMisalignN;
+  (ours ? state_.misalignment_B : state_.misalignment_N).setZero();
+  P_.middleRows<3>(index).setZero();
+  P_.middleCols<3>(index).setZero();
+  P_.diagonal().segment<3>(index).setConstant(misalignment_rad * misalignment_rad);
+}
+
 Matrix6d NeighborFilter::pose_covariance() const {
   Matrix6d covariance;
   covariance << P_.block<3, 3>(E::kP, E::kP), P_.block<3, 3>(E::kP, E::kTheta),

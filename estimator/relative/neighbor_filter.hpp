@@ -70,6 +70,9 @@ class NeighborFilter {
   /// the sensors no better than at the start: wrong ranges have led them astray.
   void forget_distance(double sigma_m, const Priors& priors);
 
+  /// Bearings of this kind come from another camera from now on, misaligned in its own way.
+  void change_camera(MeasurementKind kind, double misalignment_rad);
+
   struct Part;
   /// As Gaussians that are narrow enough for one linearization each, the attitude cut across its
   /// most uncertain axis; their weighted sum is about the whole.

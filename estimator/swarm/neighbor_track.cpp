@@ -13,6 +13,9 @@ namespace {
 constexpr double kMaxSigma = 1.0;                                      // m
 constexpr double kMaxAttitudeSigma = 20.0 * std::numbers::pi / 180.0;  // rad
 
+// A camera that has not shown the neighbor for so long gives way to another of the same robot.
+constexpr Duration kHandover = std::chrono::milliseconds{100};
+
 constexpr int kEnough = 10;            // refusals in a row, to mean something
 constexpr double kLostDistance = 1.0;  // m
 
@@ -100,9 +103,11 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
   // bring it back: bearings of a robot at twice the distance are the same.
   if (tight != nullptr && has_lost_its_distance(measurement.kind))
     tight->forget_distance(kLostDistance, priors_);
-  const Fusion fusion = tight != nullptr
-                            ? fuse_tight(*tight, measurement, mounting, gates)
-                            : fuse_paper(std::get<PaperFilter>(filter_), measurement, gates);
+  const bool is_bearing = std::holds_alternative<DirectionReading>(measurement.reading);
+  const Fusion fusion = tight == nullptr
+                            ? fuse_paper(std::get<PaperFilter>(filter_), measurement, gates)
+                        : is_bearing ? fuse_bearing(*tight, measurement, mounting, gates)
+                                     : fuse_tight(*tight, measurement, mounting, gates);
   const auto kind = static_cast<std::size_t>(measurement.kind);
   if (fusion.verdict == Verdict::kFused) {
     last_[kind] = measurement.stamp;
@@ -112,6 +117,23 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
     if (refused.count++ == 0) refused.since = measurement.stamp;
     refused.latest = measurement.stamp;
   }
+  return fusion;
+}
+
+Fusion NeighborTrack::fuse_bearing(NeighborFilter& filter, const Measurement& bearing,
+                                   const PairMounting& mounting, const Gates& gates) {
+  const Eigen::Vector3d& camera = std::get<DirectionReading>(bearing.reading).camera;
+  auto& speaking = bearing.kind == MeasurementKind::kBearing ? p_B_C_ : p_N_C_;
+  Fusion fusion{.verdict = Verdict::kDegenerate};
+  if (!speaking || *speaking == camera) {
+    fusion = fuse_tight(filter, bearing, mounting, gates);
+  } else if (bearing.stamp - last(bearing.kind) > kHandover) {
+    NeighborFilter asked = filter;
+    asked.change_camera(bearing.kind, priors_.misalignment_rad);
+    fusion = fuse_tight(asked, bearing, mounting, gates);
+    if (fusion.verdict == Verdict::kFused) filter = asked;
+  }
+  if (fusion.verdict == Verdict::kFused) speaking = camera;
   return fusion;
 }
 

@@ -72,6 +72,10 @@ class NeighborTrack {
   [[nodiscard]] bool has_lost_its_way() const;
 
  private:
+  /// The filter has one misalignment a robot, that of the camera which spoke last. Another one that
+  /// sees the same meanwhile is not heard.
+  Fusion fuse_bearing(NeighborFilter& filter, const Measurement& bearing,
+                      const PairMounting& mounting, const Gates& gates);
   /// Both directions fit, and for half a second no range did.
   [[nodiscard]] bool has_lost_its_distance(MeasurementKind kind) const;
 
@@ -90,6 +94,9 @@ class NeighborTrack {
     return never;
   }();
   std::array<Refusals, kMeasurementKindCount> refused_{};
+  /// Where the cameras are whose bearings were used last.
+  std::optional<Eigen::Vector3d> p_B_C_;
+  std::optional<Eigen::Vector3d> p_N_C_;
 };
 
 struct NeighborTrack::Part {

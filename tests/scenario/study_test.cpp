@@ -100,6 +100,19 @@ TEST(PairBound, OfIdealSensorsLeavesNoiseAlone) {
   EXPECT_GT(best.position_rms_m, 0.0005);
 }
 
+TEST(PairBound, OfSensorsWithScaleErrorsIsWiderWhereRobotsTurn) {
+  const auto widening = [](const char* name) {
+    const Swarm swarm = simulate_swarm(scenario(name), 1, 12.0);
+    const PairBound without = pair_bound(swarm, RobotId{1}, RobotId{2}, {}, kAfter);
+    const PairBound with = pair_bound(swarm, RobotId{1}, RobotId{2}, kScaledPriors, kAfter);
+    return with.rotation_rms_rad / without.rotation_rms_rad;
+  };
+
+  // At rest gravity passes 0.002 on, less than the accelerometers' bias.
+  EXPECT_NEAR(widening("static"), std::hypot(0.0325, 0.002 * 9.81) / 0.0325, 0.15);
+  EXPECT_GT(widening("aggressive"), 2.0);
+}
+
 TEST(SimulatedSwarm, IsAsNoisyAsTheRecordings) {
   const Swarm swarm = simulate_swarm(scenario("four"), 3, 20.0);
   const auto noise_of = [&](RobotId robot) {

@@ -25,8 +25,13 @@ enum Index : int {
   kMisalignB = 21,
   kMisalignN = 24,
   kRangeBias = 27,
-  kSize = 28,
+  kGyroScaleB = 28,  // by columns, as the following
+  kAccelScaleB = 37,
+  kGyroScaleN = 46,
+  kAccelScaleN = 55,
+  kSize = 64,
 };
+constexpr int kMotion = 9;
 using Covariance = Eigen::Matrix<double, kSize, kSize>;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -55,6 +60,10 @@ Covariance prior(const SensorPriors& s) {
   set(kMisalignB, s.misalignment_rad);
   set(kMisalignN, s.misalignment_rad);
   P(kRangeBias, kRangeBias) = square(s.range_bias_m);
+  for (const int gyro : {kGyroScaleB, kGyroScaleN})
+    P.diagonal().segment<9>(gyro).setConstant(square(s.gyro_scale));
+  for (const int accel : {kAccelScaleB, kAccelScaleN})
+    P.diagonal().segment<9>(accel).setConstant(square(s.accel_scale));
   return P;
 }
 
@@ -133,25 +142,39 @@ class Recursion {
   ///   p' = v - w_B x p,  v' = R f_N - f_B - w_B x v,  theta' = w_N - R^T w_B - w_N x theta
   void step(const Truth& x, double dt) {
     const Matrix3d R = x.T_B_N.R();
-    Covariance A = Covariance::Zero();
+    Eigen::Matrix<double, kMotion, kSize> A = Eigen::Matrix<double, kMotion, kSize>::Zero();
     A.block<3, 3>(kP, kP) = -hat(x.body.w_B);
     A.block<3, 3>(kP, kV) = Matrix3d::Identity();
     A.block<3, 3>(kV, kV) = -hat(x.body.w_B);
     A.block<3, 3>(kV, kTheta) = -R * hat(x.neighbor.f_B);
     A.block<3, 3>(kTheta, kTheta) = -hat(x.neighbor.w_B);
     // By the rates; a bias is subtracted from what was measured.
-    Eigen::Matrix<double, 9, 12> G = Eigen::Matrix<double, 9, 12>::Zero();
+    Eigen::Matrix<double, kMotion, 12> G = Eigen::Matrix<double, kMotion, 12>::Zero();
     G.block<3, 3>(kP, 0) = hat(x.T_B_N.p);
     G.block<3, 3>(kV, 0) = hat(x.v_B_N);
     G.block<3, 3>(kTheta, 0) = -R.transpose();
     G.block<3, 3>(kV, 3) = -Matrix3d::Identity();
     G.block<3, 3>(kTheta, 6) = Matrix3d::Identity();
     G.block<3, 3>(kV, 9) = R;
-    A.block<9, 12>(0, kGyroB) = -G;
+    A.middleCols<12>(kGyroB) = -G;
+    // A scale error is a bias in proportion to each component of the rate.
+    const auto scale = [&](int index, int rate, const Vector3d& size) {
+      for (int k = 0; k < 3; ++k) A.middleCols<3>(index + 3 * k) = -size(k) * G.middleCols<3>(rate);
+    };
+    scale(kGyroScaleB, 0, x.body.w_B);
+    scale(kAccelScaleB, 3, x.body.f_B);
+    scale(kGyroScaleN, 6, x.neighbor.w_B);
+    scale(kAccelScaleN, 9, x.neighbor.f_B);
 
-    const Covariance F = Covariance::Identity() + dt * A + 0.5 * dt * dt * A * A;
-    P_ = (F * P_ * F.transpose()).eval();
-    P_.topLeftCorner<9, 9>() += dt * G * density_.cwiseAbs2().asDiagonal() * G.transpose();
+    // Only the motion changes: F = [I + dt A + dt^2/2 A A; 0 I].
+    Eigen::Matrix<double, kMotion, kSize> F = dt * A + 0.5 * dt * dt * A.leftCols<kMotion>() * A;
+    F.leftCols<kMotion>() += Eigen::Matrix<double, kMotion, kMotion>::Identity();
+    const Eigen::Matrix<double, kMotion, kSize> FP = F * P_;
+    P_.topLeftCorner<kMotion, kMotion>() = FP * F.transpose();
+    P_.topRightCorner<kMotion, kSize - kMotion>() = FP.rightCols<kSize - kMotion>();
+    P_.bottomLeftCorner<kSize - kMotion, kMotion>() = FP.rightCols<kSize - kMotion>().transpose();
+    P_.topLeftCorner<kMotion, kMotion>() +=
+        dt * G * density_.cwiseAbs2().asDiagonal() * G.transpose();
     for (const int gyro : {kGyroB, kGyroN})
       P_.diagonal().segment<3>(gyro).array() += dt * square(priors_.gyro_walk);
     for (const int accel : {kAccelB, kAccelN})
@@ -176,7 +199,7 @@ class Recursion {
     const Eigen::Matrix<double, kSize, M> PHt = P_ * H.transpose();
     const Eigen::Matrix<double, M, M> S = H * PHt + V;
     const Eigen::Matrix<double, kSize, M> K = S.llt().solve(PHt.transpose()).transpose();
-    P_ -= K * S * K.transpose();
+    P_ -= K * PHt.transpose();
     P_ = (0.5 * (P_ + P_.transpose())).eval();
   }
 

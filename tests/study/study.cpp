@@ -31,9 +31,22 @@ void append(std::vector<double>& all, const std::vector<double>& more) {
   all.insert(all.end(), more.begin(), more.end());
 }
 
-Ratio ratio_of(const Trial& trial, const Quality& quality) {
-  return {quality.position_rmse_m / trial.bound.position_rms_m,
-          quality.rotation_rmse_rad / trial.bound.rotation_rms_rad};
+Ratio ratio_of(const Quality& quality, const PairBound& bound) {
+  return {quality.position_rmse_m / bound.position_rms_m,
+          quality.rotation_rmse_rad / bound.rotation_rms_rad};
+}
+
+PairBound pooled_bound(const std::vector<Trial>& trials, PairBound Trial::*bound) {
+  const auto n = static_cast<double>(trials.size());
+  PairBound all;
+  for (const Trial& trial : trials) {
+    const PairBound& one = trial.*bound;
+    all.position_rms_m += one.position_rms_m * one.position_rms_m / n;
+    all.rotation_rms_rad += one.rotation_rms_rad * one.rotation_rms_rad / n;
+  }
+  all.position_rms_m = std::sqrt(all.position_rms_m);
+  all.rotation_rms_rad = std::sqrt(all.rotation_rms_rad);
+  return all;
 }
 
 /// Root mean squares of errors, the median of medians, the worst availability, all divergences.
@@ -57,18 +70,11 @@ Quality pooled_quality(const std::vector<Trial>& trials, Quality Trial::*profile
 }
 
 Trial pooled(const std::vector<Trial>& trials) {
-  const auto n = static_cast<double>(trials.size());
-  Trial all{.name = "all " + std::to_string(trials.size()),
-            .bound = {},
-            .tight = pooled_quality(trials, &Trial::tight),
-            .paper = pooled_quality(trials, &Trial::paper)};
-  for (const Trial& trial : trials) {
-    all.bound.position_rms_m += trial.bound.position_rms_m * trial.bound.position_rms_m / n;
-    all.bound.rotation_rms_rad += trial.bound.rotation_rms_rad * trial.bound.rotation_rms_rad / n;
-  }
-  all.bound.position_rms_m = std::sqrt(all.bound.position_rms_m);
-  all.bound.rotation_rms_rad = std::sqrt(all.bound.rotation_rms_rad);
-  return all;
+  return {.name = "all " + std::to_string(trials.size()),
+          .bound = pooled_bound(trials, &Trial::bound),
+          .scaled_bound = pooled_bound(trials, &Trial::scaled_bound),
+          .tight = pooled_quality(trials, &Trial::tight),
+          .paper = pooled_quality(trials, &Trial::paper)};
 }
 
 }  // namespace
@@ -130,6 +136,7 @@ Result<Quality> replay_quality(const Swarm& swarm, Profile profile, double after
 Result<Trial> run_trial(const Swarm& swarm, double after_s) {
   Trial trial{.name = swarm.dataset.manifest.scenario,
               .bound = swarm_bound(swarm, {}, after_s),
+              .scaled_bound = swarm_bound(swarm, kScaledPriors, after_s),
               .tight = {},
               .paper = {}};
   for (auto [quality, profile] :
@@ -141,10 +148,11 @@ Result<Trial> run_trial(const Swarm& swarm, double after_s) {
   return trial;
 }
 
-Ratio pooled_ratio(const std::vector<Trial>& trials, Quality Trial::*profile) {
+Ratio pooled_ratio(const std::vector<Trial>& trials, Quality Trial::*profile,
+                   PairBound Trial::*bound) {
   Ratio sum;
   for (const Trial& trial : trials) {
-    const Ratio ratio = ratio_of(trial, trial.*profile);
+    const Ratio ratio = ratio_of(trial.*profile, trial.*bound);
     sum.position += ratio.position * ratio.position;
     sum.rotation += ratio.rotation * ratio.rotation;
   }
@@ -154,15 +162,17 @@ Ratio pooled_ratio(const std::vector<Trial>& trials, Quality Trial::*profile) {
 
 std::string table_of(const std::vector<Trial>& trials) {
   std::vector<std::vector<std::string>> rows{
-      {"set", "bound m", "deg", "tight m", "deg", "ratio m", "deg", "nees", "in 95 %", "avail %",
-       "diverged", "paper m", "deg", "ratio m", "deg", "nees", "diverged"}};
-  const auto add = [&rows](const Trial& trial, const Ratio& tight, const Ratio& paper) {
+      {"set", "bound m", "deg", "tight m", "deg", "ratio m", "deg", "of scaled m", "deg", "nees",
+       "in 95 %", "avail %", "diverged", "paper m", "deg", "ratio m", "deg", "nees", "diverged"}};
+  const auto add = [&rows](const Trial& trial, const Ratio& tight, const Ratio& scaled,
+                           const Ratio& paper) {
     const Quality& t = trial.tight;
     const Quality& p = trial.paper;
     rows.push_back({trial.name, fixed(trial.bound.position_rms_m, 4),
                     fixed(kDegPerRad * trial.bound.rotation_rms_rad, 3),
                     fixed(t.position_rmse_m, 4), fixed(kDegPerRad * t.rotation_rmse_rad, 3),
-                    fixed(tight.position, 2), fixed(tight.rotation, 2), fixed(t.median_nees, 2),
+                    fixed(tight.position, 2), fixed(tight.rotation, 2), fixed(scaled.position, 2),
+                    fixed(scaled.rotation, 2), fixed(t.median_nees, 2),
                     fixed(100.0 * t.share_within_95, 1), fixed(100.0 * t.worst_availability, 1),
                     std::to_string(t.divergences), fixed(p.position_rmse_m, 4),
                     fixed(kDegPerRad * p.rotation_rmse_rad, 3), fixed(paper.position, 2),
@@ -170,8 +180,11 @@ std::string table_of(const std::vector<Trial>& trials) {
                     std::to_string(p.divergences)});
   };
   for (const Trial& trial : trials)
-    add(trial, ratio_of(trial, trial.tight), ratio_of(trial, trial.paper));
-  add(pooled(trials), pooled_ratio(trials, &Trial::tight), pooled_ratio(trials, &Trial::paper));
+    add(trial, ratio_of(trial.tight, trial.bound), ratio_of(trial.tight, trial.scaled_bound),
+        ratio_of(trial.paper, trial.bound));
+  add(pooled(trials), pooled_ratio(trials, &Trial::tight),
+      pooled_ratio(trials, &Trial::tight, &Trial::scaled_bound),
+      pooled_ratio(trials, &Trial::paper));
   return text_table(rows);
 }
 

@@ -23,7 +23,8 @@ struct Quality {
 /// One swarm, what is possible, and what was reached.
 struct Trial {
   std::string name;
-  PairBound bound;  ///< pooled over the same pairs
+  PairBound bound;         ///< pooled over the same pairs
+  PairBound scaled_bound;  ///< with kScaledPriors
   Quality tight;
   Quality paper;
 };
@@ -41,7 +42,8 @@ struct Ratio {
   double position = 0.0;
   double rotation = 0.0;
 };
-[[nodiscard]] Ratio pooled_ratio(const std::vector<Trial>& trials, Quality Trial::*profile);
+[[nodiscard]] Ratio pooled_ratio(const std::vector<Trial>& trials, Quality Trial::*profile,
+                                 PairBound Trial::*bound = &Trial::bound);
 
 /// A row for each trial, tight and paper side by side, and one for all of them.
 [[nodiscard]] std::string table_of(const std::vector<Trial>& trials);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "estimator/swarm/estimator.hpp"
@@ -43,8 +44,11 @@ class EstimatorPair {
 
   explicit EstimatorPair(std::uint64_t seed)
       : pair_(seed, noise()), config_(config_of(pair_)), estimator_(config_) {
+    RandomGeometry random(seed + 1'000'000);  // apart from the pair's
     for (const CameraConfig& camera : config_.cameras)
-      cameras_.push_back(CameraModel::from(camera).value());
+      cameras_.push_back({CameraModel::from(camera).value(), camera.T_cam_imu.inverse(),
+                          random.vector(noise().priors.misalignment_rad)});
+    cameras_.front().misalignment = pair_.truth({}).misalignment_B;
   }
 
   void run_for(Duration duration, const Conditions& with = {}) {
@@ -83,8 +87,15 @@ class EstimatorPair {
   [[nodiscard]] Timestamp own_time(Duration t) const { return Timestamp{t + own_clock_}; }
   /// When our cameras last identified the neighbor, true time.
   [[nodiscard]] Duration last_bearing() const { return last_bearing_; }
+  /// How often the neighbor went over from one of our cameras to the other.
+  [[nodiscard]] int camera_changes() const { return camera_changes_; }
 
  private:
+  struct Camera {
+    CameraModel model;
+    Pose T_B_C;
+    Eigen::Vector3d misalignment;
+  };
   struct Datagram {
     Duration arrival{};
     std::vector<std::uint8_t> bytes;
@@ -98,7 +109,7 @@ class EstimatorPair {
     return noise;
   }
 
-  /// A camera ahead and one behind, which see all around between them.
+  /// A camera ahead and one 6 cm behind it, which see all around between them.
   static Config config_of(const SimulatedPair& pair) {
     Config config;
     config.robot.id = kSelf;
@@ -119,7 +130,9 @@ class EstimatorPair {
       camera.intrinsics = {-0.1723, 0.5931, 316.9, 316.8, 638.2, 512.5};
       camera.resolution = {1280, 1024};
       const Eigen::Quaterniond q_B_C = so3_exp({0.0, 0.0, heading}) * Eigen::Quaterniond(R_B_C);
-      camera.T_cam_imu = Pose{pair.mounting_B.camera, q_B_C}.inverse();
+      const Eigen::Vector3d p_B_C =
+          pair.mounting_B.camera - Eigen::Vector3d(heading == 0.0 ? 0.0 : 0.06, 0.0, 0.0);
+      camera.T_cam_imu = Pose{p_B_C, q_B_C}.inverse();
       config.cameras.push_back(camera);
     }
     const double root_period = std::sqrt(to_seconds(SimulatedPair::kImuPeriod));
@@ -193,18 +206,24 @@ class EstimatorPair {
   }
 
   void look(const Conditions& with) {
+    static constexpr Duration kHandover = std::chrono::milliseconds{100};
     static constexpr Duration kPhase = std::chrono::microseconds{37123};  // of the neighbor's board
     const IdLibrary library = IdLibrary::from(config_.swarm).value();
     const bool is_lit = with.in_view && library.entries()[1].code.is_lit(now_ + kPhase);
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
       SpotFrame frame{own_time(now_), static_cast<std::uint8_t>(k), {}};
-      const Eigen::Vector3d u_B =
-          so3_exp({0.0, 0.0, with.decoy_rad}) * pair_.bearing(Timestamp{now_}).u;
-      const auto uv = cameras_[k].project(config_.cameras[k].T_cam_imu.q * u_B);
-      if (is_lit && uv && cameras_[k].contains(*uv))
+      const auto& [camera, T_B_C, misalignment] = cameras_[k];
+      const Eigen::Vector3d u_B = so3_exp({0.0, 0.0, with.decoy_rad}) *
+                                  pair_.bearing(Timestamp{now_}, T_B_C.p, misalignment).u;
+      const auto uv = camera.project(T_B_C.q.conjugate() * u_B);
+      if (is_lit && uv && camera.contains(*uv))
         frame.spots.push_back({uv->x(), uv->y(), 12.0, 255.0, 1.0});
       const Outputs outputs = step(frame);
-      if (!outputs.bearings.empty()) last_bearing_ = now_;
+      if (outputs.bearings.empty()) continue;
+      last_bearing_ = now_;
+      if (k != seeing_camera_ && now_ - last_seen_ < kHandover) continue;
+      if (std::exchange(seeing_camera_, k) != k) ++camera_changes_;
+      last_seen_ = now_;
     }
   }
 
@@ -237,7 +256,7 @@ class EstimatorPair {
   SimulatedPair pair_;
   Config config_;
   Estimator estimator_;
-  std::vector<CameraModel> cameras_;
+  std::vector<Camera> cameras_;
   PeerLink own_link_{kSelf, {kSelf, kOther}};
   PeerLink peer_link_{kOther, {kSelf, kOther}};
   Duration own_clock_ = std::chrono::seconds{100};
@@ -245,6 +264,9 @@ class EstimatorPair {
   Duration now_{};
   Duration last_tick_{};
   Duration last_bearing_{};
+  std::size_t seeing_camera_ = 0;
+  Duration last_seen_{};  ///< by that camera
+  int camera_changes_ = 0;
   Report peer_report_;
   std::vector<Datagram> in_flight_to_us_;
   std::vector<Datagram> in_flight_to_peer_;

@@ -93,8 +93,12 @@ class SimulatedPair {
   }
 
   [[nodiscard]] DirectionReading bearing(Timestamp stamp) {
-    const Pose T_B_N = truth(stamp).motion.T_B_N;
-    return direction(T_B_N * mounting_N.led, mounting_B.camera, truth_.misalignment_B);
+    return bearing(stamp, mounting_B.camera, truth_.misalignment_B);
+  }
+  /// Of another camera on B.
+  [[nodiscard]] DirectionReading bearing(Timestamp stamp, const Eigen::Vector3d& p_B_C,
+                                         const Eigen::Vector3d& misalignment) {
+    return direction(truth(stamp).motion.T_B_N * mounting_N.led, p_B_C, misalignment);
   }
   [[nodiscard]] DirectionReading peer_bearing(Timestamp stamp) {
     const Pose T_N_B = truth(stamp).motion.T_B_N.inverse();
