@@ -131,6 +131,12 @@ class SimulatedPair {
             .range_sigma_m = std::hypot(noise_.range, noise_.priors.range_bias_m)};
   }
 
+  /// Both robots look with other cameras at the same places from now on.
+  void change_cameras() {
+    truth_.misalignment_B = random_.vector(noise_.priors.misalignment_rad);
+    truth_.misalignment_N = random_.vector(noise_.priors.misalignment_rad);
+  }
+
   [[nodiscard]] ProcessNoise process_noise() const {
     const double root_period = std::sqrt(to_seconds(kImuPeriod));
     return {.gyro_density = noise_.gyro * root_period, .accel_density = noise_.accel * root_period};

@@ -20,11 +20,10 @@ RawPose first_raw_pose(SimulatedPair& pair, Timestamp t) {
   return std::get<RawPose>(compute_raw_pose(pair.sighting(t)));
 }
 
-/// Runs the tight filter from `first` at 50 ms: bearings of both at 50 Hz, ranges at 25 Hz.
-NeighborFilter tight_filter(SimulatedPair& pair, const RawPose& first, Duration duration) {
-  pair.sample_imus(Timestamp{50ms});
-  NeighborFilter filter(Timestamp{50ms}, first, pair.process_noise(), pair.priors());
-  for (Timestamp t{60ms}; t <= Timestamp{50ms} + duration; t += 10ms) {
+/// Bearings of both at 50 Hz, ranges at 25 Hz.
+void run(NeighborFilter& filter, SimulatedPair& pair, Duration duration) {
+  for (const Timestamp end = filter.stamp() + duration; filter.stamp() < end;) {
+    const Timestamp t = filter.stamp() + 10ms;
     pair.sample_imus(t);
     filter.advance_to(t, pair.imu_B, pair.imu_N);
     const auto tick = t.time_since_epoch() / 10ms;
@@ -38,6 +37,13 @@ NeighborFilter tight_filter(SimulatedPair& pair, const RawPose& first, Duration 
                                           pair.mounting_N.antenna, kNoGate));
     }
   }
+}
+
+/// Runs the tight filter from `first` at 50 ms.
+NeighborFilter tight_filter(SimulatedPair& pair, const RawPose& first, Duration duration) {
+  pair.sample_imus(Timestamp{50ms});
+  NeighborFilter filter(Timestamp{50ms}, first, pair.process_noise(), pair.priors());
+  run(filter, pair, duration);
   return filter;
 }
 
@@ -74,18 +80,26 @@ RawPose independent_start(SimulatedPair& pair, std::uint64_t seed) {
   return start;
 }
 
-/// Mean normalized squared error of the pose over 50 runs of this length, divided by its dimension.
-template <class Start>
-double mean_pose_nees(Duration duration, const Start& start) {
+/// Mean normalized squared error of the pose over 50 pairs' filters, divided by its dimension.
+template <class MakeFilter>
+double mean_pose_nees(const MakeFilter& make_filter) {
   constexpr int kRuns = 50;
   double sum = 0.0;
   for (std::uint64_t seed = 100; seed < 100 + kRuns; ++seed) {
     SimulatedPair pair(seed);
-    const NeighborFilter filter = tight_filter(pair, start(pair, seed), duration);
+    const NeighborFilter filter = make_filter(pair, seed);
     const Vector6d e = pose_error(pair, filter);
     sum += e.dot(filter.pose_covariance().inverse() * e);
   }
   return sum / (6 * kRuns);
+}
+
+/// After so long from `start`.
+template <class Start>
+double mean_pose_nees(Duration duration, const Start& start) {
+  return mean_pose_nees([&](SimulatedPair& pair, std::uint64_t seed) {
+    return tight_filter(pair, start(pair, seed), duration);
+  });
 }
 
 // chi-square with 300 degrees of freedom lies within [253.9, 349.9] in 95 % of all trials.
@@ -100,6 +114,19 @@ TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysAfterASecond) {
 
 TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysAfterFiveSeconds) {
   const double nees = mean_pose_nees(5s, independent_start);
+  EXPECT_GT(nees, kLow);
+  EXPECT_LT(nees, kHigh);
+}
+
+TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysOnceOtherCamerasLook) {
+  const double nees = mean_pose_nees([](SimulatedPair& pair, std::uint64_t) {
+    NeighborFilter filter = tight_filter(pair, 3s);
+    pair.change_cameras();
+    for (const MeasurementKind kind : {MeasurementKind::kBearing, MeasurementKind::kPeerBearing})
+      filter.change_camera(kind, pair.priors().misalignment_rad);
+    run(filter, pair, 2s);
+    return filter;
+  });
   EXPECT_GT(nees, kLow);
   EXPECT_LT(nees, kHigh);
 }
