@@ -127,6 +127,26 @@ void turn_to_sight(const BearingInnovation& z, E::Covariance& P) {
   map_errors(E::kP, so3_exp(share / length2 * along.cross(aside)).toRotationMatrix(), P);
 }
 
+// A turn of everything that our camera sees looks like its misalignment:
+//   dp = p x dm,  dv = v x dm,  dtheta = -R^T dm.
+// Each correction moves p, v and R by some noise; P lying as before, the next one would learn dm
+// from that. So P goes along, as if in coordinates in which bearings do not see dm at all (compare
+// Barrau and Bonnabel 2015, and Huang, Mourikis and Roumeliotis 2010).
+void carry_misalignment(const RelativeMotion& before, const RelativeMotion& after,
+                        E::Covariance& P) {
+  constexpr int kMotion = 9;
+  Eigen::Matrix<double, kMotion, 3> by_m;
+  by_m << hat(after.T_B_N.p - before.T_B_N.p), hat(after.v_B_N - before.v_B_N),
+      (before.T_B_N.R() - after.T_B_N.R()).transpose();
+  Eigen::Matrix<double, E::kSize, kMotion> columns =
+      P.leftCols<kMotion>() + P.middleCols<3>(E::kMisalignB).lazyProduct(by_m.transpose());
+  const Eigen::Matrix<double, kMotion, kMotion> motion =
+      columns.topRows<kMotion>() + by_m.lazyProduct(columns.middleRows<3>(E::kMisalignB));
+  columns.topRows<kMotion>() = 0.5 * (motion + motion.transpose());
+  P.leftCols<kMotion>() = columns;
+  P.topRows<kMotion>() = columns.transpose();
+}
+
 }  // namespace
 
 NeighborFilter::NeighborFilter(Timestamp stamp, const RawPose& first, const ProcessNoise& noise,
@@ -196,7 +216,9 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
   }
   correct_covariance(outcome, P_);
   if (is_far) reset(so3_right_jacobian(theta), P_);
+  const RelativeMotion before = state_.motion;
   inject(outcome.correction, state_);
+  carry_misalignment(before, state_.motion, P_);
   return fusion;
 }
 
