@@ -114,7 +114,7 @@ void reset(const Eigen::Matrix3d& J_r, E::Covariance& P) { map_errors(E::kTheta,
 // is turned until this bearing says nothing of the range's bias, as far as the estimate's unrest
 // explains it; what shows because robots moved, a parallax, is much more and stays. Compare Huang,
 // Mourikis and Roumeliotis 2010: an unobservable direction has to be one at every linearization.
-void turn_to_sight(const BearingInnovation& z, E::Covariance& P) {
+Eigen::Matrix3d turn_to_sight(const BearingInnovation& z, const E::Covariance& P) {
   constexpr double kUnrest = 3e-4;  // rad
   const Eigen::Vector3d along = P.block<3, 1>(E::kP, E::kRangeBias);
   const Eigen::Matrix<double, 2, 3> by_p = z.H.middleCols<3>(E::kP);
@@ -122,9 +122,18 @@ void turn_to_sight(const BearingInnovation& z, E::Covariance& P) {
   const Eigen::Matrix2d across = by_p * by_p.transpose();
   const Eigen::Vector3d aside = -by_p.transpose() * across.inverse() * seen;
   const double length2 = along.squaredNorm();
-  if (!(aside.squaredNorm() < 0.01 * length2)) return;  // no such correlation yet
+  if (!(aside.squaredNorm() < 0.01 * length2)) return Eigen::Matrix3d::Identity();  // not yet
   const double share = kUnrest * kUnrest / (kUnrest * kUnrest + aside.squaredNorm() / length2);
-  map_errors(E::kP, so3_exp(share / length2 * along.cross(aside)).toRotationMatrix(), P);
+  return so3_exp(share / length2 * along.cross(aside)).toRotationMatrix();
+}
+
+/// The same, once P's errors of position are `turn` times what they were.
+template <int M>
+void turn_outcome(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& outcome) {
+  const auto apply = [&turn](auto&& rows) { rows = (turn * rows).eval(); };
+  apply(outcome.correction.template segment<3>(E::kP));
+  apply(outcome.K.template middleRows<3>(E::kP));
+  apply(outcome.L.template middleRows<3>(E::kP));
 }
 
 // A turn of everything that our camera sees looks like its misalignment:
@@ -192,12 +201,18 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
 
   auto z = linearize(state_);
   if (!z) return {};
+  constexpr bool kIsBearing = std::is_same_v<std::decay_t<decltype(*z)>, BearingInnovation>;
+  Eigen::Matrix3d turn;
+  if constexpr (kIsBearing) {
+    turn = turn_to_sight(*z, P_);
+    z->H.template middleCols<3>(E::kP) *= turn;  // as good as turning P, which a gate may forbid
+  }
   auto outcome = kalman_gain(*z, gate_nis, P_);
   const Fusion fusion = fusion_of(*z, outcome);
   if (outcome.verdict != Verdict::kFused) return fusion;
-  if constexpr (std::is_same_v<std::decay_t<decltype(*z)>, BearingInnovation>) {
-    turn_to_sight(*z, P_);
-    outcome = kalman_gain(*z, std::numeric_limits<double>::infinity(), P_);
+  if constexpr (kIsBearing) {
+    map_errors(E::kP, turn, P_);
+    turn_outcome(turn, outcome);
   }
 
   Eigen::Vector3d theta = outcome.correction.template segment<3>(E::kTheta);
