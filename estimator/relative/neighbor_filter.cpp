@@ -127,7 +127,7 @@ Eigen::Matrix3d turn_to_sight(const BearingInnovation& z, const E::Covariance& P
   return so3_exp(share / length2 * along.cross(aside)).toRotationMatrix();
 }
 
-/// The same, once P's errors of position are `turn` times what they were.
+// What an update asks for, once P's errors of position are `turn` times what they were.
 template <int M>
 void turn_outcome(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& outcome) {
   const auto apply = [&turn](auto&& rows) { rows = (turn * rows).eval(); };
@@ -140,10 +140,11 @@ void turn_outcome(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& outco
 //   dp = p x dm,  dv = v x dm,  dtheta = -R^T dm.
 // Each correction moves p, v and R by some noise; P lying as before, the next one would learn dm
 // from that. So P goes along, as if in coordinates in which bearings do not see dm at all (compare
-// Barrau and Bonnabel 2015, and Huang, Mourikis and Roumeliotis 2010).
+// Barrau and Bonnabel 2015, and Huang, Mourikis and Roumeliotis 2010). The neighbor's camera needs
+// nothing of the kind: there it is dtheta = dm, wherever the neighbor is.
 void carry_misalignment(const RelativeMotion& before, const RelativeMotion& after,
                         E::Covariance& P) {
-  constexpr int kMotion = 9;
+  constexpr int kMotion = E::kGyroB;
   Eigen::Matrix<double, kMotion, 3> by_m;
   by_m << hat(after.T_B_N.p - before.T_B_N.p), hat(after.v_B_N - before.v_B_N),
       (before.T_B_N.R() - after.T_B_N.R()).transpose();
@@ -202,7 +203,7 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
   auto z = linearize(state_);
   if (!z) return {};
   constexpr bool kIsBearing = std::is_same_v<std::decay_t<decltype(*z)>, BearingInnovation>;
-  Eigen::Matrix3d turn;
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
   if constexpr (kIsBearing) {
     turn = turn_to_sight(*z, P_);
     z->H.template middleCols<3>(E::kP) *= turn;  // as good as turning P, which a gate may forbid

@@ -108,8 +108,13 @@ TEST(PairBound, OfSensorsWithScaleErrorsIsWiderWhereRobotsTurn) {
     return with.rotation_rms_rad / without.rotation_rms_rad;
   };
 
-  // At rest gravity passes 0.002 on, less than the accelerometers' bias.
-  EXPECT_NEAR(widening("static"), std::hypot(0.0325, 0.002 * 9.81) / 0.0325, 0.15);
+  // At rest only gravity's share of the accelerometers' errors adds to what was there.
+  const SensorPriors s = kScaledPriors;
+  const double mounting = 2.0 * s.misalignment_rad;
+  const double bias = std::numbers::sqrt2 * s.accel_bias_mps2 / 9.81;
+  const double scale = std::numbers::sqrt2 * s.accel_scale;
+  EXPECT_NEAR(widening("static"), std::hypot(mounting, bias, scale) / std::hypot(mounting, bias),
+              0.03);
   EXPECT_GT(widening("aggressive"), 2.0);
 }
 
