@@ -1,0 +1,180 @@
+// Whether the tight filter's errors are as large as it says.
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "tests/support/tight_filter.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using test::first_raw_pose;
+using test::kNoGate;
+using test::pose_error;
+using test::run;
+using test::SimulatedPair;
+using test::tight_filter;
+
+/// A first pose whose error is what its covariance says and has nothing to do with any sensor's.
+RawPose independent_start(SimulatedPair& pair, std::uint64_t seed) {
+  test::RandomGeometry random(seed + 1000);
+  RawPose start = first_raw_pose(pair, Timestamp{50ms});
+  const Pose truth = pair.truth(Timestamp{50ms}).motion.T_B_N;
+  start.T_B_N = perturbed(truth, random.draw<6>(start.gaussian().covariance));
+  start.by_calibration = {};
+  return start;
+}
+
+/// Mean normalized squared error of the pose over 50 pairs' filters, divided by its dimension.
+template <class MakeFilter>
+double mean_pose_nees(const MakeFilter& make_filter) {
+  constexpr int kRuns = 50;
+  double sum = 0.0;
+  for (std::uint64_t seed = 100; seed < 100 + kRuns; ++seed) {
+    SimulatedPair pair(seed);
+    const NeighborFilter filter = make_filter(pair, seed);
+    const Vector6d e = pose_error(pair, filter);
+    sum += e.dot(filter.pose_covariance().inverse() * e);
+  }
+  return sum / (6 * kRuns);
+}
+
+/// After so long from `start`.
+template <class Start>
+double mean_pose_nees(Duration duration, const Start& start) {
+  return mean_pose_nees([&](SimulatedPair& pair, std::uint64_t seed) {
+    return tight_filter(pair, start(pair, seed), duration);
+  });
+}
+
+// chi-square with 300 degrees of freedom lies within [253.9, 349.9] in 95 % of all trials.
+constexpr double kLow = 253.9 / 300;
+constexpr double kHigh = 349.9 / 300;
+
+TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysAfterASecond) {
+  const double nees = mean_pose_nees(1s, independent_start);
+  EXPECT_GT(nees, kLow);
+  EXPECT_LT(nees, kHigh);
+}
+
+TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysAfterFiveSeconds) {
+  const double nees = mean_pose_nees(5s, independent_start);
+  EXPECT_GT(nees, kLow);
+  EXPECT_LT(nees, kHigh);
+}
+
+TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysOnceOtherCamerasLook) {
+  const double nees = mean_pose_nees([](SimulatedPair& pair, std::uint64_t) {
+    NeighborFilter filter = tight_filter(pair, 3s);
+    pair.change_cameras();
+    for (const MeasurementKind kind : {MeasurementKind::kBearing, MeasurementKind::kPeerBearing})
+      filter.change_camera(kind, pair.priors().misalignment_rad);
+    run(filter, pair, 2s);
+    return filter;
+  });
+  EXPECT_GT(nees, kLow);
+  EXPECT_LT(nees, kHigh);
+}
+
+// A raw pose shares the range's bias, the cameras' misalignments and the accelerometers' biases
+// with the filter's own states.
+TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysFiveSecondsAfterARawPose) {
+  const double nees = mean_pose_nees(
+      5s, [](SimulatedPair& pair, std::uint64_t) { return first_raw_pose(pair, Timestamp{50ms}); });
+  EXPECT_GT(nees, kLow);
+  EXPECT_LT(nees, kHigh);
+}
+
+TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysRightAfterARawPose) {
+  const double nees = mean_pose_nees(
+      0s, [](SimulatedPair& pair, std::uint64_t) { return first_raw_pose(pair, Timestamp{50ms}); });
+  EXPECT_GT(nees, kLow);
+  EXPECT_LT(nees, kHigh);
+}
+
+/// What the filter takes the range's bias, zero in truth, for after two robots stood still.
+double range_bias_learned_at_rest(std::uint64_t seed, Duration duration) {
+  constexpr double kBearing = 3.5e-4;  // rad
+  constexpr double kRange = 0.05;      // m
+  test::RandomGeometry random(seed);
+  const Eigen::Vector3d p_B_N(4.0, 1.0, 0.3);
+  const ProcessNoise noise{.gyro_density = 4e-4, .accel_density = 2e-3};
+  ImuHistory imu_B;
+  ImuHistory imu_N;
+  const auto sample = [&](Timestamp t) {
+    for (ImuHistory* imu : {&imu_B, &imu_N}) {
+      imu->push(
+          {t, random.normal_vector<3>(10.0 * noise.gyro_density),
+           Eigen::Vector3d(0, 0, 9.81) + random.normal_vector<3>(10.0 * noise.accel_density)});
+    }
+  };
+  const auto seen = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector3d u = p.normalized();
+    return DirectionReading{(u + tangent_basis(u) * random.normal_vector<2>(kBearing)).normalized(),
+                            Eigen::Vector3d::Zero(), kBearing};
+  };
+
+  sample(Timestamp{0ms});
+  Matrix6d start = Matrix6d::Identity() * 1e-4;
+  start.topLeftCorner<3, 3>().diagonal().setConstant(0.01);
+  NeighborFilter filter(Timestamp{0ms},
+                        GaussianPose{{p_B_N, Eigen::Quaterniond::Identity()}, start}, noise,
+                        {.speed_mps = 0.1,
+                         .gyro_bias_radps = 0.005,
+                         .accel_bias_mps2 = 0.03,
+                         .range_bias_m = 0.05,
+                         .misalignment_rad = 0.0026});
+  for (Timestamp t{10ms}; t <= Timestamp{duration}; t += 10ms) {
+    sample(t);
+    filter.advance_to(t, imu_B, imu_N);
+    static_cast<void>(filter.fuse_bearing(seen(p_B_N), Eigen::Vector3d::Zero(), kNoGate));
+    static_cast<void>(filter.fuse_peer_bearing(seen(-p_B_N), Eigen::Vector3d::Zero(), kNoGate));
+    static_cast<void>(filter.fuse_range({p_B_N.norm() + random.normal(kRange), kRange},
+                                        Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), kNoGate));
+  }
+  return filter.state().range_bias_m;
+}
+
+TEST(NeighborFilter, AtRestBearingsSayNothingOfTheDistance) {
+  constexpr int kRuns = 10;
+  double sum = 0.0;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) sum += range_bias_learned_at_rest(seed, 60s);
+
+  EXPECT_NEAR(sum / kRuns, 0.0, 0.02);
+}
+
+/// Of where across the line of sight the neighbor is, the mean squared error of 150 pairs over its
+/// variance, after two seconds with 200 sharp bearings a second.
+double across_ratio() {
+  constexpr int kRuns = 150;
+  test::PairNoise noise;
+  noise.bearing = 0.001;
+  double sum = 0.0;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    SimulatedPair pair(seed, noise);
+    NeighborFilter filter = tight_filter(pair, 0s);
+    while (filter.stamp() < Timestamp{2050ms}) {
+      run(filter, pair, 10ms);
+      for (int i = 0; i < 2; ++i)
+        static_cast<void>(
+            filter.fuse_bearing(pair.bearing(filter.stamp()), pair.mounting_N.led, kNoGate));
+    }
+    const Eigen::Matrix<double, 3, 2> across = tangent_basis(filter.motion().T_B_N.p.normalized());
+    const Eigen::Vector2d error = across.transpose() * pose_error(pair, filter).head<3>();
+    const Eigen::Matrix2d P =
+        across.transpose() * filter.pose_covariance().topLeftCorner<3, 3>() * across;
+    sum += error.dot(P.inverse() * error);
+  }
+  return sum / (2 * kRuns);
+}
+
+TEST(NeighborFilter, SharpBearingsDoNotTeachItTheCamerasMisalignment) {
+  // chi-square with 300 degrees of freedom, as above
+  const double ratio = across_ratio();
+  EXPECT_GT(ratio, kLow);
+  EXPECT_LT(ratio, kHigh);
+}
+
+}  // namespace
+}  // namespace crepes
