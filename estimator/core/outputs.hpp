@@ -89,15 +89,16 @@ enum class NoPoseReason : std::uint8_t {
 enum class Verdict : std::uint8_t {
   kFused,
   kGated,       ///< too unlikely
-  kDegenerate,  ///< the measurement says nothing here, or nothing that counts
+  kDegenerate,  ///< the measurement says nothing here
   kLate,        ///< older than the lag
   kNoState,     ///< nothing to correct yet
+  kSkipped,     ///< another camera is listened to, or there was no time for it
 };
-inline constexpr std::size_t kVerdictCount = 5;
+inline constexpr std::size_t kVerdictCount = 6;
 
 [[nodiscard]] constexpr std::string_view name_of(Verdict verdict) {
-  constexpr std::array<std::string_view, kVerdictCount> kNames{"fused", "gated", "degenerate",
-                                                               "late", "no_state"};
+  constexpr std::array<std::string_view, kVerdictCount> kNames{"fused", "gated",    "degenerate",
+                                                               "late",  "no_state", "skipped"};
   return kNames[static_cast<std::size_t>(verdict)];
 }
 

@@ -4,10 +4,20 @@
 #include <utility>
 
 namespace crepes {
+namespace {
+
+bool are_rivals(const Measurement& a, const Measurement& b) {
+  if (a.stamp != b.stamp || a.kind != b.kind) return false;
+  const auto* bearing = std::get_if<DirectionReading>(&a.reading);
+  const auto* other = std::get_if<DirectionReading>(&b.reading);
+  return bearing == nullptr || other == nullptr || bearing->camera == other->camera;
+}
+
+}  // namespace
 
 std::span<const Measurement> leading_group(std::span<const Measurement> ordered) {
   const auto end = std::find_if(ordered.begin(), ordered.end(), [&](const Measurement& m) {
-    return m.stamp != ordered.front().stamp || m.kind != ordered.front().kind;
+    return !are_rivals(m, ordered.front());
   });
   return {ordered.begin(), end};
 }

@@ -32,7 +32,7 @@ struct Measurement {
   std::variant<DirectionReading, RangeReading, MutualStart, OneWayStart, GraphPose> reading;
 };
 
-/// The leading ones of one kind and instant: candidates, of which at most one is true.
+/// The leading ones of one kind, instant and camera: candidates, of which at most one is true.
 [[nodiscard]] std::span<const Measurement> leading_group(std::span<const Measurement> ordered);
 
 /// Waits `lag` for late data: what has waited so long is released in order, what comes later is

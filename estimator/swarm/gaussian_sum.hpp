@@ -8,7 +8,7 @@
 
 namespace crepes {
 
-/// What became of readings of one kind and instant, of which at most one is true.
+/// What became of a group of rival readings, of which at most one is true.
 struct Association {
   std::size_t chosen = 0;  ///< the likeliest
   Fusion fusion;           ///< of the chosen one

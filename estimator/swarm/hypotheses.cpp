@@ -144,7 +144,7 @@ Association Hypotheses::fuse(std::span<const Measurement> candidates, const ImuH
   const Timestamp stamp = candidates.front().stamp;
   const MeasurementKind kind = candidates.front().kind;
   CorrectionBudget& time = budget(kind);
-  Association led;
+  Association led{.fusion{.verdict = Verdict::kSkipped}};
   for (Start& start : starts_) {
     const bool leads = &start == &starts_.front();
     if (!time.allows(stamp, leads ? 0.0 : kLeadersShare)) break;

@@ -52,7 +52,7 @@ class Hypotheses {
   bool start(Timestamp stamp, const GraphPose& first);
 
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
-  /// Corrects each with the likeliest of readings of one kind and instant; what the leader did.
+  /// Corrects each with the likeliest of a group of rival readings; what the leader did.
   /// Where there is no time for all, the leader comes first.
   Association fuse(std::span<const Measurement> candidates, const ImuHistory& imu_B,
                    const ImuHistory& imu_N);

@@ -226,7 +226,11 @@ bool Neighbor::is_a_start(const Measurement& measurement) const {
 
 void Neighbor::start(std::span<const Measurement> group, const RobotState& self) {
   const Timestamp stamp = group.front().stamp;
-  if (!hypotheses_.has_time_for(group.size(), stamp)) return;
+  if (!hypotheses_.has_time_for(group.size(), stamp)) {
+    for (const Measurement& measurement : group)
+      note(stamp, measurement.kind, {.verdict = Verdict::kSkipped});
+    return;
+  }
   hypotheses_.advance_to(stamp, self.imu, body_.imu);
   for (const Measurement& measurement : group) {
     const bool started = std::visit(

@@ -124,7 +124,7 @@ Fusion NeighborTrack::fuse_bearing(NeighborFilter& filter, const Measurement& be
                                    const PairMounting& mounting, const Gates& gates) {
   const Eigen::Vector3d& camera = std::get<DirectionReading>(bearing.reading).camera;
   auto& speaking = bearing.kind == MeasurementKind::kBearing ? p_B_C_ : p_N_C_;
-  Fusion fusion{.verdict = Verdict::kDegenerate};
+  Fusion fusion{.verdict = Verdict::kSkipped};
   if (!speaking || *speaking == camera) {
     fusion = fuse_tight(filter, bearing, mounting, gates);
   } else if (bearing.stamp - last(bearing.kind) > kHandover) {

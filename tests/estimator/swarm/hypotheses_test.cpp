@@ -53,7 +53,7 @@ std::array<std::map<MeasurementKind, int>, 2> taken_by(int count) {
     const auto offer = [&](MeasurementKind kind) {
       const Measurement one = reading(kind, t);
       const Fusion fusion = hypotheses.fuse({&one, 1}, imu, imu).fusion;
-      if (fusion.verdict != Verdict::kDegenerate) ++taken.at(ms / 1000)[kind];
+      if (fusion.verdict != Verdict::kSkipped) ++taken.at(ms / 1000)[kind];
     };
     if (ms % 10 == 0) imu.push(at_rest(t));
     if (ms % 5 == 0) offer(MeasurementKind::kBearing);

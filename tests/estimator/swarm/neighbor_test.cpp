@@ -35,6 +35,7 @@ struct Ingredients {
   bool bearings = true;
   bool peer_bearings = true;
   bool ranges = true;
+  int second_camera = -1;       ///< sees it as well: 0 at the same instants, 1 between them
   Duration imu_memory = 160ms;  ///< how much of the past a report tells
   double heading_rad = 0.0;  ///< own bearings turned so far about the vertical: a mirror in a wall
 };
@@ -60,6 +61,7 @@ class View {
       if (with.own_imu && !pair_.imu_B.empty()) self_.imu.push(pair_.imu_B.newest());
       if (with.own_tilt) self_.tilt = tilt(true, now_);
       if (with.bearings && step % 2 == 0) neighbor_.add_bearing(own_bearing(with.heading_rad));
+      if (step % 2 == with.second_camera) neighbor_.add_bearing(second_bearing());
       if (with.ranges && step % 4 == 1) neighbor_.add_range(range());
       if (with.reports && step % 2 == 1) neighbor_.add_report(report(with), self_);
       neighbor_.tick(now_, self_);
@@ -126,6 +128,11 @@ class View {
     const DirectionReading u = pair_.bearing(now_);
     const Eigen::AngleAxisd turn(heading_rad, pair_.sighting(now_).B.up);
     return {now_, kOther, turn * u.u, u.camera, u.sigma_rad};
+  }
+  [[nodiscard]] Bearing second_bearing() {
+    const Eigen::Vector3d p_B_C = pair_.mounting_B.camera - Eigen::Vector3d(0.1, 0.0, 0.0);
+    const DirectionReading u = pair_.bearing(now_, p_B_C, {0.0, 0.002, -0.003});
+    return {now_, kOther, u.u, u.camera, u.sigma_rad};
   }
   [[nodiscard]] UwbRange range() { return {now_, kOther, pair_.range(now_).range_m, -80.0, -79.0}; }
 
@@ -302,6 +309,23 @@ TEST(Neighbor, SurvivesAReportFullOfNotANumber) {
   EXPECT_GT(view.count(MeasurementKind::kPeerBearing, Verdict::kGated) +
                 view.count(MeasurementKind::kPeerBearing, Verdict::kDegenerate),
             0U);
+}
+
+TEST(Neighbor, CountsTheBearingsOfASecondCameraAsSkippedWhileTheFirstSees) {
+  for (const int when : {0, 1}) {
+    View view;
+    view.run_until(Timestamp{2s});
+    const auto fused = view.count(MeasurementKind::kBearing, Verdict::kFused);
+    const auto gated = view.count(MeasurementKind::kBearing, Verdict::kGated);
+    EXPECT_EQ(view.count(MeasurementKind::kBearing, Verdict::kSkipped), 0U);
+
+    view.run_until(Timestamp{4s}, {.second_camera = when});
+
+    ASSERT_TRUE(view.neighbor().pose());
+    EXPECT_EQ(view.count(MeasurementKind::kBearing, Verdict::kFused), fused + 100);
+    EXPECT_NEAR(view.count(MeasurementKind::kBearing, Verdict::kSkipped), 100 - 5, 1);  // lag
+    EXPECT_EQ(view.count(MeasurementKind::kBearing, Verdict::kGated), gated);
+  }
 }
 
 TEST(Neighbor, CountsWhatComesTooLate) {
