@@ -8,7 +8,7 @@
 
 namespace crepes {
 
-using BearingInnovation = Innovation<2, ErrorState::kSize>;
+using BearingInnovation = Innovation<2, ErrorState::kSeen>;
 
 /// Linearizes  u = Exp(m_B) d / |d|,  d = p_B_N + R_B_N p_N_M - p_B_C,  in the plane across the
 /// predicted direction. `p_N_M` is the neighbor's LED ring, `p_B_C` our camera.

@@ -35,26 +35,31 @@ struct NominalState {
 };
 
 /// Layout of the error state. Position and velocity are additive in B's axes, attitude is a right
-/// perturbation (N's axes), the rest is additive.
+/// perturbation (N's axes), the rest is additive. Measurements see the first `kSeen` states; the
+/// rest moves the motion as it goes on.
 struct ErrorState {
   enum Index : int {
     kP = 0,
     kV = 3,
     kTheta = 6,
-    kGyroB = 9,
-    kAccelB = 12,
-    kGyroN = 15,
-    kAccelN = 18,
-    kRangeBias = 21,
-    kMisalignB = 22,
-    kMisalignN = 25,
+    kRangeBias = 9,
+    kMisalignB = 10,
+    kMisalignN = 13,
+    kGyroB = 16,
+    kAccelB = 19,
+    kGyroN = 22,
+    kAccelN = 25,
     kGyroScaleB = 28,  ///< by columns, as the following
     kAccelScaleB = 37,
     kGyroScaleN = 46,
     kAccelScaleN = 55,
     kSize = 64,
   };
+  static constexpr int kMotion = kRangeBias;  ///< size of [p, v, theta]
+  static constexpr int kSeen = kGyroB;
   using Vector = Eigen::Matrix<double, kSize, 1>;
+  /// As kalman_update.hpp keeps it: of the seen rows, what stands right of the seen columns is
+  /// void.
   using Covariance = Eigen::Matrix<double, kSize, kSize>;
 };
 

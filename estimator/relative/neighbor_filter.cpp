@@ -101,7 +101,8 @@ double intersection_weight(const Matrix6d& first, const Matrix6d& second) {
 
 /// P once three errors are J times what they were.
 void map_errors(int index, const Eigen::Matrix3d& J, E::Covariance& P) {
-  P.middleRows<3>(index) = (J * P.middleRows<3>(index)).eval();
+  auto rows = P.block<3, E::kSeen>(index, 0);
+  rows = (J * rows).eval();
   P.middleCols<3>(index) = (P.middleCols<3>(index) * J.transpose()).eval();
 }
 
@@ -118,7 +119,7 @@ Eigen::Matrix3d turn_to_sight(const BearingInnovation& z, const E::Covariance& P
   constexpr double kUnrest = 3e-4;  // rad
   const Eigen::Vector3d along = P.block<3, 1>(E::kP, E::kRangeBias);
   const Eigen::Matrix<double, 2, 3> by_p = z.H.middleCols<3>(E::kP);
-  const Eigen::Vector2d seen = z.H.lazyProduct(P.col(E::kRangeBias));
+  const Eigen::Vector2d seen = z.H.lazyProduct(P.col(E::kRangeBias).head<E::kSeen>());
   const Eigen::Matrix2d across = by_p * by_p.transpose();
   const Eigen::Vector3d aside = -by_p.transpose() * across.inverse() * seen;
   const double length2 = along.squaredNorm();
@@ -132,8 +133,7 @@ template <int M>
 void turn_outcome(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& outcome) {
   const auto apply = [&turn](auto&& rows) { rows = (turn * rows).eval(); };
   apply(outcome.correction.template segment<3>(E::kP));
-  apply(outcome.K.template middleRows<3>(E::kP));
-  apply(outcome.L.template middleRows<3>(E::kP));
+  apply(outcome.G.template middleRows<3>(E::kP));
 }
 
 // A turn of everything that our camera sees looks like its misalignment:
@@ -144,17 +144,13 @@ void turn_outcome(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& outco
 // nothing of the kind: there it is dtheta = dm, wherever the neighbor is.
 void carry_misalignment(const RelativeMotion& before, const RelativeMotion& after,
                         E::Covariance& P) {
-  constexpr int kMotion = E::kGyroB;
-  Eigen::Matrix<double, kMotion, 3> by_m;
+  Eigen::Matrix<double, E::kMotion, 3> by_m;
   by_m << hat(after.T_B_N.p - before.T_B_N.p), hat(after.v_B_N - before.v_B_N),
       (before.T_B_N.R() - after.T_B_N.R()).transpose();
-  Eigen::Matrix<double, E::kSize, kMotion> columns =
-      P.leftCols<kMotion>() + P.middleCols<3>(E::kMisalignB).lazyProduct(by_m.transpose());
-  const Eigen::Matrix<double, kMotion, kMotion> motion =
-      columns.topRows<kMotion>() + by_m.lazyProduct(columns.middleRows<3>(E::kMisalignB));
-  columns.topRows<kMotion>() = 0.5 * (motion + motion.transpose());
-  P.leftCols<kMotion>() = columns;
-  P.topRows<kMotion>() = columns.transpose();
+  add_product(P.middleCols<3>(E::kMisalignB), by_m, P.leftCols<E::kMotion>());
+  P.block<E::kMotion, E::kSeen>(0, 0) += by_m.lazyProduct(P.block<3, E::kSeen>(E::kMisalignB, 0));
+  auto motion = P.topLeftCorner<E::kMotion, E::kMotion>();
+  motion = (0.5 * (motion + motion.transpose())).eval();
 }
 
 }  // namespace
@@ -226,11 +222,11 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
     if (!z) return {};
     z->H.template middleCols<3>(E::kTheta) =
         (z->H.template middleCols<3>(E::kTheta) * so3_right_jacobian(theta)).eval();
-    z->residual += z->H * outcome.correction;
+    z->residual += z->H * outcome.correction.template head<E::kSeen>();
     outcome = kalman_gain(*z, std::numeric_limits<double>::infinity(), P_);
     theta = outcome.correction.template segment<3>(E::kTheta);
   }
-  correct_covariance(outcome, P_);
+  correct_covariance<E::kSeen>(outcome, P_);
   if (is_far) reset(so3_right_jacobian(theta), P_);
   const RelativeMotion before = state_.motion;
   inject(outcome.correction, state_);
@@ -301,8 +297,8 @@ Fusion NeighborFilter::fuse_correlated_pose(const GaussianPose& T_B_N, double ga
   const double own = intersection_weight(pose_covariance(), T_B_N.covariance);
   if (own == 1.0) return {.verdict = Verdict::kFused};
   const E::Covariance before = P_;
-  P_.topRows<E::kGyroB>() /= std::sqrt(own);
-  P_.leftCols<E::kGyroB>() /= std::sqrt(own);
+  P_.block<E::kMotion, E::kSeen>(0, 0) /= std::sqrt(own);
+  P_.leftCols<E::kMotion>() /= std::sqrt(own);
   const GaussianPose discounted{T_B_N.pose, T_B_N.covariance / (1.0 - own)};
   const Fusion fusion = correct(
       [&](const NominalState& state) { return std::optional(linearize_pose(state, discounted)); },
@@ -327,6 +323,10 @@ void NeighborFilter::change_camera(MeasurementKind kind, double misalignment_rad
   P_.middleRows<3>(index).setZero();
   P_.middleCols<3>(index).setZero();
   P_.diagonal().segment<3>(index).setConstant(misalignment_rad * misalignment_rad);
+}
+
+ErrorState::Covariance NeighborFilter::covariance() const {
+  return P_.selfadjointView<Eigen::Lower>();
 }
 
 Matrix6d NeighborFilter::pose_covariance() const {

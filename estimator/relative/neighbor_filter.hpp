@@ -80,7 +80,7 @@ class NeighborFilter {
 
   [[nodiscard]] const RelativeMotion& motion() const { return state_.motion; }
   [[nodiscard]] const NominalState& state() const { return state_; }
-  [[nodiscard]] const ErrorState::Covariance& covariance() const { return P_; }
+  [[nodiscard]] ErrorState::Covariance covariance() const;
   /// Of T_B_N, in GaussianPose's convention.
   [[nodiscard]] Matrix6d pose_covariance() const;
 

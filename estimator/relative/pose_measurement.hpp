@@ -7,9 +7,9 @@
 namespace crepes {
 
 /// Linearizes  z = T_B_N  with the error convention of GaussianPose, which is the filter's own.
-[[nodiscard]] inline Innovation<6, ErrorState::kSize> linearize_pose(const NominalState& state,
+[[nodiscard]] inline Innovation<6, ErrorState::kSeen> linearize_pose(const NominalState& state,
                                                                      const GaussianPose& T_B_N) {
-  Innovation<6, ErrorState::kSize> z;
+  Innovation<6, ErrorState::kSeen> z;
   z.residual = pose_difference(state.motion.T_B_N, T_B_N.pose);
   z.H.setZero();
   z.H.block<3, 3>(0, ErrorState::kP).setIdentity();

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/core/so3.hpp"
+#include "estimator/relative/small_product.hpp"
 
 namespace crepes {
 namespace {
@@ -16,19 +17,16 @@ BodyRates rates(const ImuMean& mean, const ImuBias& bias) {
   return {w - bias.gyro_scale * w, a - bias.accel_scale * a};
 }
 
-constexpr int kMotion = ErrorState::kGyroB;  // size of [p, v, theta]
+constexpr int kMotion = ErrorState::kMotion;
 
-/// E F^T of the motion after a step, where E's rows are errors: what J makes of the motion's and
-/// the rates', and the rates' are those of the biases and, by each axis a robot turns or is pushed
-/// about, of a column of its sensors' scales.
-template <int kRows>
-Eigen::Matrix<double, kRows, kMotion> moved_errors(
-    const Eigen::Matrix<double, kRows, ErrorState::kSize>& errors, const PropagationJacobian& J,
-    const BodyRates& body, const BodyRates& neighbor) {
+/// The rates' errors from those of the sensors: of the biases and, by each axis a robot turns or is
+/// pushed about, of a column of its sensors' scales.
+template <class Errors>
+auto rate_errors(const Errors& errors, const BodyRates& body, const BodyRates& neighbor) {
   using E = ErrorState;
-  Eigen::Matrix<double, kRows, 12> of_rates;
+  Eigen::Matrix<double, Errors::RowsAtCompileTime, 12> of_rates;
   const auto collect = [&](int bias, const Eigen::Vector3d& rate, int scale) {
-    of_rates.template middleCols<3>(bias - kMotion) =
+    of_rates.template middleCols<3>(bias - E::kGyroB) =
         errors.template middleCols<3>(bias) + rate(0) * errors.template middleCols<3>(scale) +
         rate(1) * errors.template middleCols<3>(scale + 3) +
         rate(2) * errors.template middleCols<3>(scale + 6);
@@ -37,20 +35,16 @@ Eigen::Matrix<double, kRows, kMotion> moved_errors(
   collect(E::kAccelB, body.a, E::kAccelScaleB);
   collect(E::kGyroN, neighbor.w, E::kGyroScaleN);
   collect(E::kAccelN, neighbor.a, E::kAccelScaleN);
+  return of_rates;
+}
 
-  // By stripes of rows that registers hold; `by_motion` is triangular by blocks.
-  constexpr int kStripe = kRows % 16 == 0 ? 16 : kRows;
-  Eigen::Matrix<double, kRows, kMotion> moved;
-  for (int row = 0; row < kRows; row += kStripe) {
-    for (int i = 0; i < kMotion; ++i) {
-      Eigen::Matrix<double, kStripe, 1> sum = Eigen::Matrix<double, kStripe, 1>::Zero();
-      for (int k = i / 3 * 3; k < kMotion; ++k)
-        sum += J.by_motion(i, k) * errors.col(k).template segment<kStripe>(row);
-      for (int k = 0; k < 12; ++k)
-        sum -= J.by_rates(i, k) * of_rates.col(k).template segment<kStripe>(row);
-      moved.col(i).template segment<kStripe>(row) = sum;
-    }
-  }
+/// The motion's errors after a step; each row of the arguments is one case.
+template <class Motion, class Rates>
+auto moved_errors(const Motion& motion, const Rates& rates, const PropagationJacobian& J) {
+  using Moved = Eigen::Matrix<double, Motion::RowsAtCompileTime, kMotion>;
+  Moved moved = Moved::Zero();
+  add_product(motion, J.by_motion, moved);
+  subtract_product(rates, J.by_rates, moved);
   return moved;
 }
 
@@ -64,19 +58,24 @@ void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
                           const BodyRates& neighbor, const Eigen::Matrix<double, 12, 1>& variance,
                           const ProcessNoise& noise, double dt, ErrorState::Covariance& P) {
   using E = ErrorState;
-  constexpr int kRest = E::kSize - kMotion;  // biases and calibration
+  constexpr int kRest = E::kSize - E::kSeen;
 
-  const Eigen::Matrix<double, E::kSize, kMotion> columns = moved_errors(P, J, body, neighbor);
-  // F P, from whose biases J Q is taken: as F has -J there, the next product adds J Q J^T. The row
-  // of zeros makes their number even, which is faster.
-  Eigen::Matrix<double, kMotion + 1, E::kSize> rows;
-  rows << columns.transpose(), Eigen::Matrix<double, 1, E::kSize>::Zero();
-  rows.topRows<kMotion>().middleCols<12>(kMotion) -= J.by_rates * variance.asDiagonal();
-  const Eigen::Matrix<double, kMotion, kMotion> motion =
-      moved_errors(rows, J, body, neighbor).topRows<kMotion>();
-  P.topLeftCorner<kMotion, kMotion>() = 0.5 * (motion + motion.transpose());
-  P.topRightCorner<kMotion, kRest>() = columns.bottomRows<kRest>().transpose();
-  P.bottomLeftCorner<kRest, kMotion>() = columns.bottomRows<kRest>();
+  // P F^T. Of its seen rows, the far half stands below the diagonal.
+  const auto seen =
+      moved_errors(P.topLeftCorner<E::kSeen, kMotion>(),
+                   rate_errors(P.leftCols<E::kSeen>().transpose(), body, neighbor), J);
+  const auto rest = moved_errors(P.bottomLeftCorner<kRest, kMotion>(),
+                                 rate_errors(P.bottomRows<kRest>(), body, neighbor), J);
+  P.leftCols<kMotion>() << seen, rest;
+  P.block<kMotion, E::kSeen - kMotion>(0, kMotion) =
+      seen.bottomRows<E::kSeen - kMotion>().transpose();
+  // F P F^T + J Q J^T: as F has -J for the rates, taking J Q off theirs does it.
+  auto rates = rate_errors(P.leftCols<kMotion>().transpose(), body, neighbor);
+  rates -= J.by_rates * variance.asDiagonal();
+  const Eigen::Matrix<double, kMotion, kMotion> once =
+      P.topLeftCorner<kMotion, kMotion>().transpose();
+  const auto twice = moved_errors(once, rates, J);
+  P.topLeftCorner<kMotion, kMotion>() = 0.5 * (twice + twice.transpose());
 
   const double gyro_walk = noise.gyro_walk * noise.gyro_walk * dt;
   const double accel_walk = noise.accel_walk * noise.accel_walk * dt;
@@ -85,7 +84,7 @@ void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
   P.diagonal().segment<3>(E::kGyroN).array() += gyro_walk;
   P.diagonal().segment<3>(E::kAccelN).array() += accel_walk;
   const double kept = range_bias_kept(noise, dt);
-  P.row(E::kRangeBias) *= kept;
+  P.row(E::kRangeBias).head<E::kSeen>() *= kept;
   P.col(E::kRangeBias) *= kept;
   P(E::kRangeBias, E::kRangeBias) += noise.range_bias_walk * noise.range_bias_walk * dt;
 }
@@ -94,13 +93,14 @@ void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
 
 RelativeMotion propagated(const RelativeMotion& motion, const BodyRates& body,
                           const BodyRates& neighbor, double dt) {
-  const Eigen::Quaterniond dq_B = so3_exp(body.w * dt).conjugate();
-  const Eigen::Vector3d a = motion.T_B_N.q * (so3_exp(0.5 * dt * neighbor.w) * neighbor.a) -
-                            so3_exp(0.5 * dt * body.w) * body.a;
+  const Eigen::Quaterniond half_B = so3_exp(0.5 * dt * body.w);
+  const Eigen::Quaterniond half_N = so3_exp(0.5 * dt * neighbor.w);
+  const Eigen::Quaterniond dq_B = (half_B * half_B).conjugate();
+  const Eigen::Vector3d a = motion.T_B_N.q * (half_N * neighbor.a) - half_B * body.a;
   RelativeMotion next;
   next.T_B_N.p = dq_B * (motion.T_B_N.p + motion.v_B_N * dt + 0.5 * dt * dt * a);
   next.v_B_N = dq_B * (motion.v_B_N + a * dt);
-  next.T_B_N.q = (dq_B * motion.T_B_N.q * so3_exp(neighbor.w * dt)).normalized();
+  next.T_B_N.q = (dq_B * motion.T_B_N.q * half_N * half_N).normalized();
   return next;
 }
 
@@ -108,10 +108,10 @@ PropagationJacobian propagation_jacobian(const RelativeMotion& before, const Rel
                                          const BodyRates& body, const BodyRates& neighbor,
                                          double dt) {
   const Eigen::Matrix3d R = before.T_B_N.R();
-  const Eigen::Matrix3d dR_B = so3_exp(body.w * dt).conjugate().toRotationMatrix();
-  const Eigen::Matrix3d dR_N = so3_exp(neighbor.w * dt).conjugate().toRotationMatrix();
   const Eigen::Matrix3d half_B = so3_exp(0.5 * dt * body.w).toRotationMatrix();
   const Eigen::Matrix3d half_N = so3_exp(0.5 * dt * neighbor.w).toRotationMatrix();
+  const Eigen::Matrix3d dR_B = (half_B * half_B).transpose();
+  const Eigen::Matrix3d dR_N = (half_N * half_N).transpose();
   const Eigen::Matrix3d J_B = dt * so3_right_jacobian(body.w * dt);
   const Eigen::Matrix3d J_N = dt * so3_right_jacobian(neighbor.w * dt);
 

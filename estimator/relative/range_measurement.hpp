@@ -8,7 +8,7 @@
 
 namespace crepes {
 
-using RangeInnovation = Innovation<1, ErrorState::kSize>;
+using RangeInnovation = Innovation<1, ErrorState::kSeen>;
 
 /// Linearizes  z = | p_B_N + R_B_N p_N_Q - p_B_U | + b  at `state`, with `p_B_U` and `p_N_Q` the
 /// antennas. Empty when the antennas nearly coincide: the gradient is undefined there.

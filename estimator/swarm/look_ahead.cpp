@@ -13,18 +13,15 @@ constexpr Duration kBearingDelay = std::chrono::milliseconds{10};
 NeighborTrack LookAhead::at(Timestamp t, const Hypotheses& hypotheses,
                             const AwaitedReadings& readings) {
   const GaussianSum& leader = hypotheses.leader();
-  NeighborTrack track = leader.heaviest();
   const std::uint32_t generation = hypotheses.generation();
-  if (seen_ && seen_->generation == generation && seen_->track.stamp() > track.stamp() &&
-      seen_->track.stamp() <= t) {
-    track = seen_->track;
-  }
+  const bool goes_on = seen_ && seen_->generation == generation &&
+                       seen_->track.stamp() > leader.heaviest().stamp() &&
+                       seen_->track.stamp() <= t;
+  if (!goes_on) seen_ = Seen{leader.heaviest(), generation};
   const Timestamp sure =
       std::min({readings.imu_B.newest().stamp, readings.imu_N.newest().stamp, t}) - kBearingDelay;
-  if (leader.size() == 1 && sure > track.stamp()) {
-    run(track, sure, readings);
-    seen_ = Seen{track, generation};
-  }
+  if (leader.size() == 1 && sure > seen_->track.stamp()) run(seen_->track, sure, readings);
+  NeighborTrack track = seen_->track;
   run(track, t, readings);
   return track;
 }

@@ -181,17 +181,18 @@ std::optional<CalibrationRecord> NeighborTrack::calibration() const {
   const auto* tight = std::get_if<NeighborFilter>(&filter_);
   if (tight == nullptr) return std::nullopt;
   const NominalState& x = tight->state();
-  Eigen::Matrix<double, 19, 1> value;
+  using States = Eigen::Matrix<double, 19, 1>;
+  States value;
   value << x.bias_B.gyro_radps, x.bias_B.accel_mps2, x.bias_N.gyro_radps, x.bias_N.accel_mps2,
       x.range_bias_m, x.misalignment_B, x.misalignment_N;
+  const ErrorState::Vector variance = tight->covariance().diagonal();
+  States sigma;
+  sigma << variance.segment<12>(ErrorState::kGyroB).cwiseSqrt(),
+      variance.segment<7>(ErrorState::kRangeBias).cwiseSqrt();
   CalibrationRecord record;
   record.stamp = tight->stamp();
-  for (int i = 0; i < value.size(); ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const int row = ErrorState::kGyroB + i;  // both list the same states in the same order
-    record.value.at(k) = value(i);
-    record.sigma.at(k) = std::sqrt(tight->covariance()(row, row));
-  }
+  States::Map(record.value.data()) = value;
+  States::Map(record.sigma.data()) = sigma;
   return record;
 }
 

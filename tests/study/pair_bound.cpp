@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "daemon/ctl/pair_score.hpp"
+#include "estimator/relative/small_product.hpp"
 #include "tests/study/imu_noise.hpp"
 #include "tests/study/true_motion.hpp"
 
@@ -169,10 +170,11 @@ class Recursion {
     // Only the motion changes: F = [I + dt A + dt^2/2 A A; 0 I].
     Eigen::Matrix<double, kMotion, kSize> F = dt * A + 0.5 * dt * dt * A.leftCols<kMotion>() * A;
     F.leftCols<kMotion>() += Eigen::Matrix<double, kMotion, kMotion>::Identity();
-    const Eigen::Matrix<double, kMotion, kSize> FP = F * P_;
-    P_.topLeftCorner<kMotion, kMotion>() = FP * F.transpose();
-    P_.topRightCorner<kMotion, kSize - kMotion>() = FP.rightCols<kSize - kMotion>();
-    P_.bottomLeftCorner<kSize - kMotion, kMotion>() = FP.rightCols<kSize - kMotion>().transpose();
+    Eigen::Matrix<double, kSize, kMotion> PFt = Eigen::Matrix<double, kSize, kMotion>::Zero();
+    add_product(P_, F, PFt);
+    P_.leftCols<kMotion>() = PFt;
+    P_.topRows<kMotion>() = PFt.transpose();
+    P_.topLeftCorner<kMotion, kMotion>() = F * PFt;
     P_.topLeftCorner<kMotion, kMotion>() +=
         dt * G * density_.cwiseAbs2().asDiagonal() * G.transpose();
     for (const int gyro : {kGyroB, kGyroN})
@@ -196,11 +198,11 @@ class Recursion {
 
   template <int M>
   void update(const Eigen::Matrix<double, M, kSize>& H, const Eigen::Matrix<double, M, M>& V) {
-    const Eigen::Matrix<double, kSize, M> PHt = P_ * H.transpose();
-    const Eigen::Matrix<double, M, M> S = H * PHt + V;
-    const Eigen::Matrix<double, kSize, M> K = S.llt().solve(PHt.transpose()).transpose();
-    P_ -= K * PHt.transpose();
-    P_ = (0.5 * (P_ + P_.transpose())).eval();
+    Eigen::Matrix<double, kSize, M> PHt = Eigen::Matrix<double, kSize, M>::Zero();
+    add_product(P_, H, PHt);
+    const Eigen::LLT<Eigen::Matrix<double, M, M>> C(H * PHt + V);
+    const Eigen::Matrix<double, kSize, M> G = C.matrixL().solve(PHt.transpose()).transpose();
+    subtract_product(G, G, P_);
   }
 
   const Swarm& swarm_;
