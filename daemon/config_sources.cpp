@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "daemon/imported_calibration.hpp"
+#include "daemon/mesh_key.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
@@ -180,9 +181,21 @@ void add_imu_calibration(ConfigNode& root, Faults& faults) {
   lay_under(*imu, has_imu ? sections.take("imu") : ConfigNode{});
 }
 
+/// The key stays in its file; whether it can be read from there is known before all begins.
+void place_key_file(ConfigNode& root, Faults& faults) {
+  ConfigNode* const net = root.find("net");
+  ConfigNode* const name = net == nullptr ? nullptr : net->find("key_file");
+  if (name == nullptr || !name->is_text() || name->text.empty()) return;
+  const fs::path file = fs::path(name->place.file).parent_path() / name->text;
+  const Result<MeshKey> key = read_mesh_key(file);
+  if (!key) return add_fault(name->place, "net.key_file", key.error().message, faults);
+  name->text = file.string();
+}
+
 ConfigNode with_references(ConfigNode root, Faults& faults) {
   add_members(root, faults);
   add_imu_calibration(root, faults);
+  place_key_file(root, faults);
   if (ConfigNode* const cameras = root.find("cameras"); cameras != nullptr && cameras->is_list()) {
     for (std::size_t i = 0; i < cameras->items.size(); ++i)
       add_camera_calibration(cameras->items[i], "cameras[" + std::to_string(i) + "]", faults);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "daemon/logging.hpp"
+#include "daemon/mesh_key.hpp"
 #include "daemon/process_load.hpp"
 #include "daemon/service_line.hpp"
 #include "daemon/subscription_server.hpp"
@@ -31,15 +32,17 @@ std::vector<RobotId> ids_of(const SwarmConfig& swarm) {
   return ids;
 }
 
-/// The socket on the mesh, opened again when the interface comes and goes.
+/// The socket on the mesh and its seal, opened again when the interface comes and goes. While the
+/// key cannot be read there is no socket: nothing leaves unsealed by mistake.
 class MeshSocket {
  public:
   explicit MeshSocket(NetConfig config) : config_(std::move(config)) {}
 
   [[nodiscard]] UdpSocket* get(Timestamp now) {
     if (socket_ || now < retry_at_) return socket_ ? &*socket_ : nullptr;
-    Result<UdpSocket> opened =
-        UdpSocket::open_broadcast(config_.interface, static_cast<std::uint16_t>(config_.port));
+    Result<UdpSocket> opened = read_key().and_then([&] {
+      return UdpSocket::open_broadcast(config_.interface, static_cast<std::uint16_t>(config_.port));
+    });
     if (!opened) {
       failed(opened.error(), now);
       return nullptr;
@@ -59,12 +62,22 @@ class MeshSocket {
     retry_ = std::min(2 * retry_, kLastRetry);
   }
 
+  [[nodiscard]] const std::optional<PacketSeal>& seal() const { return seal_; }
   /// Empty when all is well.
   [[nodiscard]] const std::string& fault() const { return fault_; }
   [[nodiscard]] int descriptor() const { return socket_ ? socket_->descriptor() : -1; }
 
  private:
+  Result<void> read_key() {
+    if (config_.key_file.empty()) return {};
+    return read_mesh_key(config_.key_file).map([this](const MeshKey& key) {
+      seal_.emplace(key);
+      log_message(LogLevel::kInfo, "mesh: sealed with the key " + fingerprint(key));
+    });
+  }
+
   NetConfig config_;
+  std::optional<PacketSeal> seal_;
   std::optional<UdpSocket> socket_;
   std::string fault_;
   Timestamp retry_at_{};
@@ -88,8 +101,11 @@ class NetLoop {
   void reconfigure(const Config& config) {
     const Config before = std::exchange(config_, config);
     link_.set_members(ids_of(config_.swarm));
-    if (before.net.interface != config_.net.interface || before.net.port != config_.net.port)
+    // Behind the same name may be another key.
+    if (before.net.interface != config_.net.interface || before.net.port != config_.net.port ||
+        before.net.key_file != config_.net.key_file || !config_.net.key_file.empty()) {
       mesh_ = MeshSocket(config_.net);
+    }
     if (before.subscription.listen != config_.subscription.listen ||
         before.subscription.port != config_.subscription.port) {
       open_server();
@@ -146,7 +162,7 @@ class NetLoop {
       const Timestamp arrival = clock_.now();
       if (!datagram) return mesh_.failed(datagram.error(), arrival);
       if (!*datagram) return;
-      if (auto report = link_.receive((*datagram)->bytes, arrival))
+      if (auto report = link_.receive((*datagram)->bytes, arrival, mesh_.seal()))
         stage_.on_report(std::move(*report));
     }
   }
@@ -162,7 +178,7 @@ class NetLoop {
   void broadcast(const Report& report, Timestamp now) {
     UdpSocket* socket = mesh_.get(now);
     if (socket == nullptr) return;
-    const Result<void> sent = socket->broadcast(link_.compose(report, now));
+    const Result<void> sent = socket->broadcast(link_.compose(report, now, mesh_.seal()));
     if (sent) return;
     ++unsent_;
     // A congested mesh is no reason to close the socket, with all that waits in it to be read.

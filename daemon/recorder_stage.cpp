@@ -39,6 +39,12 @@ std::string picture_block(const Frame& frame) {
   return block;
 }
 
+/// As a replay wants it, which seals nothing and may know no key.
+Config without_key(Config config) {
+  config.net.key_file.clear();
+  return config;
+}
+
 /// The tool at the other end.
 class Recipient {
  public:
@@ -160,7 +166,8 @@ class Recorder {
   /// What has come since the last time.
   void hand_over() {
     std::string text;
-    if (!std::exchange(is_config_told_, true)) append_block(text, "config", write_config(config_));
+    if (!std::exchange(is_config_told_, true))
+      append_block(text, "config", write_config(without_key(config_)));
     const std::uint64_t missed = stage_.events.dropped();
     const std::uint64_t gap = missed - std::exchange(missed_before_, missed);
     if (gap > 0) append_block(text, "gap", std::to_string(gap));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "estimator/core/contract.hpp"
 
@@ -27,6 +28,16 @@ Report to_local(const PeerReport& theirs, const ClockOffset& clock) {
   return ours;
 }
 
+/// The message, or why there is none.
+tl::expected<PeerMessage, std::string_view> decode(std::span<const std::uint8_t> datagram,
+                                                   const std::optional<PacketSeal>& seal) {
+  constexpr auto kName = [](auto fault) { return name_of(fault); };
+  if (!seal && PacketSeal::is_on(datagram)) return tl::unexpected<std::string_view>("sealed");
+  if (!seal) return decode_peer_message(datagram).map_error(kName);
+  return seal->open(datagram).map_error(kName).and_then(
+      [&](const auto& plain) { return decode_peer_message(plain).map_error(kName); });
+}
+
 }  // namespace
 
 PeerLink::PeerLink(RobotId self, const std::vector<RobotId>& members) : self_(self) {
@@ -38,7 +49,7 @@ void PeerLink::set_members(const std::vector<RobotId>& members) {
     return std::find(members.begin(), members.end(), peer.first) == members.end();
   });
   for (const RobotId member : members)
-    if (member != self_) peers_.try_emplace(member, std::nullopt);
+    if (member != self_) peers_.try_emplace(member);
 }
 
 void PeerLink::count(std::string_view what, std::uint64_t by) {
@@ -46,8 +57,37 @@ void PeerLink::count(std::string_view what, std::uint64_t by) {
 }
 
 std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> datagram,
-                                                Timestamp arrival) {
-  auto message = decode_peer_message(datagram);
+                                                Timestamp arrival,
+                                                const std::optional<PacketSeal>& seal) {
+  auto message = open(datagram, seal);
+  if (!message) return std::nullopt;
+  const auto found = peers_.find(message->report.sender);
+  if (found == peers_.end()) {
+    count("refused_unknown_sender");
+    return std::nullopt;
+  }
+  Peer& peer = found->second;
+  Session* session = admit(peer, *message);
+  if (session == nullptr) return std::nullopt;
+  session->last_arrival = arrival;
+  if (!tell_clock(*session, *message, arrival)) return std::nullopt;
+  if (peer.newcomer && peer.newcomer->hears_us) {
+    succeed(peer);
+    session = &*peer.live;
+  }
+  if (!session->clock.is_usable()) {
+    count("held_clock_unknown");
+    return std::nullopt;
+  }
+  session->redundancy.apply(message->report);
+  return ReceivedReport{to_local(message->report, session->clock),
+                        session->clock.estimate()->sigma_s};
+}
+
+/// A datagram that is not our own, counted.
+std::optional<PeerMessage> PeerLink::open(std::span<const std::uint8_t> datagram,
+                                          const std::optional<PacketSeal>& seal) {
+  auto message = decode(datagram, seal);
   if (message && message->report.sender == self_) {
     const bool is_ours = first_sent_ && message->session == session();
     if (!is_ours) count("refused_own_id");  // another robot goes by our id
@@ -55,50 +95,30 @@ std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> da
   }
   count("received");
   count("received_bytes", datagram.size());
-  if (!message) {
-    count("refused_" + std::string(name_of(message.error())));
-    return std::nullopt;
-  }
-  Peer* const peer = admit(*message);
-  if (peer == nullptr) return std::nullopt;
-  peer->last_arrival = arrival;
-  if (!tell_clock(*peer, *message, arrival)) return std::nullopt;
-  if (!peer->clock.is_usable()) {
-    count("held_clock_unknown");
-    return std::nullopt;
-  }
-  peer->redundancy.apply(message->report);
-  return ReceivedReport{to_local(message->report, peer->clock), peer->clock.estimate()->sigma_s};
+  if (message) return std::move(*message);
+  count("refused_" + std::string(message.error()));
+  return std::nullopt;
 }
 
-/// The sender, if the message is from a member and new.
-PeerLink::Peer* PeerLink::admit(const PeerMessage& message) {
-  const auto found = peers_.find(message.report.sender);
-  if (found == peers_.end()) {
-    count("refused_unknown_sender");
+/// The session that the message is of, if the message is new in it.
+PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message) {
+  if (peer.ended.contains(message.session)) {
+    count("refused_old_session");  // overtaken by the new one, or played again
     return nullptr;
   }
-  std::optional<Peer>& peer = found->second;
-  if (peer && message.session != peer->session && message.session == peer->previous_session) {
-    count("refused_old_session");  // overtaken by the first datagrams of the new one
-    return nullptr;
+  const auto is_it = [&](const std::optional<Session>& session) {
+    return session && session->id == message.session;
+  };
+  if (!is_it(peer.live) && !is_it(peer.newcomer)) {
+    Session fresh;
+    fresh.id = message.session;
+    fresh.traffic.peer = message.report.sender;
+    peer.newcomer = std::move(fresh);
   }
-  if (!peer || message.session != peer->session) {
-    Peer fresh;
-    fresh.session = message.session;
-    fresh.traffic.peer = found->first;
-    if (peer) {
-      fresh.previous_session = peer->session;
-      fresh.traffic = peer->traffic;
-      fresh.traffic.received += peer->sequence.received();
-      fresh.traffic.lost += peer->sequence.lost();
-      ++fresh.traffic.restarts;
-    }
-    peer = std::move(fresh);
-  }
-  switch (peer->sequence.accept(message.sequence)) {
+  Session& session = is_it(peer.live) ? *peer.live : *peer.newcomer;
+  switch (session.sequence.accept(message.sequence)) {
     case SequenceWindow::Verdict::kNew:
-      return &*peer;
+      return &session;
     case SequenceWindow::Verdict::kDuplicate:
       count("refused_duplicate");
       return nullptr;
@@ -110,9 +130,9 @@ PeerLink::Peer* PeerLink::admit(const PeerMessage& message) {
 }
 
 /// False when the message's stamps contradict the peer's clock as known.
-bool PeerLink::tell_clock(Peer& peer, const PeerMessage& message, Timestamp arrival) {
-  const auto verdict = peer.clock.packet_arrived({message.sent, arrival});
-  if (verdict == ClockOffset::Verdict::kRestarted) ++peer.traffic.restarts;
+bool PeerLink::tell_clock(Session& session, const PeerMessage& message, Timestamp arrival) {
+  const auto verdict = session.clock.packet_arrived({message.sent, arrival});
+  if (verdict == ClockOffset::Verdict::kRestarted) ++session.traffic.restarts;
   if (verdict != ClockOffset::Verdict::kUsed) {
     count("refused_clock_jump");
     return false;
@@ -120,18 +140,17 @@ bool PeerLink::tell_clock(Peer& peer, const PeerMessage& message, Timestamp arri
   for (const ClockEcho& echo : message.echoes) {
     if (echo.peer != self_) continue;
     const Timestamp sent{Duration{echo.sent_ns}};
-    const bool ours =
-        first_sent_ && sent >= *first_sent_ && sent <= arrival && sent > arrival - kMaxEchoAge;
-    if (!ours) {
+    if (!is_own_datagram(sent, arrival)) {
       count("refused_echo");
       continue;
     }
+    session.hears_us = true;
     const PeerTimestamp reached{Duration{echo.received_ns}};
-    switch (peer.clock.packet_echoed(sent, reached, arrival)) {
+    switch (session.clock.packet_echoed(sent, reached, arrival)) {
       case ClockOffset::Verdict::kUsed:
         break;
       case ClockOffset::Verdict::kRestarted:
-        ++peer.traffic.restarts;
+        ++session.traffic.restarts;
         [[fallthrough]];
       case ClockOffset::Verdict::kImplausible:
         count("refused_clock_jump");
@@ -141,26 +160,51 @@ bool PeerLink::tell_clock(Peer& peer, const PeerMessage& message, Timestamp arri
   return true;
 }
 
+/// The newcomer takes the place of the session before.
+void PeerLink::succeed(Peer& peer) {
+  Session next = std::move(*peer.newcomer);
+  peer.newcomer.reset();
+  if (peer.live) {
+    const PeerTraffic& before = peer.live->traffic;
+    next.traffic.received += before.received + peer.live->sequence.received();
+    next.traffic.lost += before.lost + peer.live->sequence.lost();
+    next.traffic.restarts += before.restarts + 1;
+    peer.ended.insert(peer.live->id);
+  }
+  peer.live = std::move(next);
+}
+
+bool PeerLink::is_own_datagram(Timestamp sent, Timestamp now) const {
+  return sent > now - kMaxEchoAge && std::ranges::binary_search(sent_, sent);
+}
+
 /// Differs from the last start's: the clock has moved on, or began anew with the machine.
 std::uint32_t PeerLink::session() const {
   const auto ns = static_cast<std::uint64_t>(to_ns(*first_sent_));
   return static_cast<std::uint32_t>(ns ^ (ns >> 32U));
 }
 
-std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now) {
+std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,
+                                            const std::optional<PacketSeal>& seal) {
   CREPES_EXPECT(report.sender == self_, "a robot reports for itself");
   if (!first_sent_) first_sent_ = now;
+  sent_.push_back(now);
+  while (sent_.front() <= now - kMaxEchoAge) sent_.pop_front();
   OutgoingPeerMessage message{.report = report,
                               .sent = now,
                               .session = session(),
                               .sequence = next_sequence_++,
                               .echoes = {}};
   for (const auto& [id, peer] : peers_) {
-    const auto packet = peer ? peer->clock.fastest_recent_packet() : std::nullopt;
-    if (packet && packet->arrival <= now && packet->arrival > now - kEchoAge)
-      message.echoes.push_back({id, to_ns(packet->sent), to_ns(packet->arrival)});
+    for (const std::optional<Session>* known : {&peer.live, &peer.newcomer}) {
+      const auto packet = *known ? (*known)->clock.fastest_recent_packet() : std::nullopt;
+      if (packet && packet->arrival <= now && packet->arrival > now - kEchoAge)
+        message.echoes.push_back({id, to_ns(packet->sent), to_ns(packet->arrival)});
+    }
   }
-  EncodedPeerMessage encoded = encode_peer_message(message);
+  EncodedPeerMessage encoded =
+      encode_peer_message(message, kMaxPeerMessage - (seal ? PacketSeal::kOverhead : 0));
+  if (seal) encoded.bytes = seal->seal(encoded.bytes);
   count("sent");
   count("sent_bytes", encoded.bytes.size());
   if (encoded.left_out > 0) count("left_out_of_datagrams", encoded.left_out);
@@ -171,8 +215,8 @@ std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now)
 std::vector<ClockStatus> PeerLink::clocks() const {
   std::vector<ClockStatus> known;
   for (const auto& [id, peer] : peers_) {
-    const auto clock = peer ? peer->clock.estimate() : std::nullopt;
-    if (clock && peer->clock.is_usable())
+    const auto clock = peer.live ? peer.live->clock.estimate() : std::nullopt;
+    if (clock && peer.live->clock.is_usable())
       known.push_back({id, clock->offset_s, clock->skew * 1e6, clock->sigma_s});
   }
   return known;
@@ -181,11 +225,12 @@ std::vector<ClockStatus> PeerLink::clocks() const {
 std::vector<PeerTraffic> PeerLink::traffic(Timestamp now) const {
   std::vector<PeerTraffic> heard;
   for (const auto& [id, peer] : peers_) {
-    if (!peer) continue;
-    heard.push_back(peer->traffic);
-    heard.back().received += peer->sequence.received();
-    heard.back().lost += peer->sequence.lost();
-    heard.back().age_s = to_seconds(now - peer->last_arrival);
+    const std::optional<Session>& session = peer.heard();
+    if (!session) continue;
+    heard.push_back(session->traffic);
+    heard.back().received += session->sequence.received();
+    heard.back().lost += session->sequence.lost();
+    heard.back().age_s = to_seconds(now - session->last_arrival);
   }
   return heard;
 }

@@ -31,7 +31,7 @@
 
 namespace crepes {
 
-inline constexpr std::size_t kMaxPeerMessage = 1400;
+inline constexpr std::size_t kMaxPeerMessage = 1400;  ///< bytes of a datagram, sealed or not
 
 /// "Your datagram that you sent at `sent` reached me at `received`": half of a clock comparison.
 struct ClockEcho {
@@ -61,8 +61,9 @@ struct EncodedPeerMessage {
 };
 
 /// Packs what matters most: tilt, echoes, the newest IMU samples, estimates in turn, and bearings
-/// and ranges from the newest back.
-[[nodiscard]] EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message);
+/// and ranges from the newest back, into at most `max_bytes` (900 or more).
+[[nodiscard]] EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
+                                                     std::size_t max_bytes = kMaxPeerMessage);
 
 /// Why bytes are no message.
 enum class PeerMessageFault : std::uint8_t {

@@ -18,6 +18,11 @@ constexpr std::size_t kMaxEchoes = 10;
 constexpr std::size_t kMaxImu = 16;  // 160 ms at 100 Hz: one datagram in three may be lost
 constexpr std::size_t kEstimateBudget = 450;
 constexpr std::size_t kMaxCount = 255;
+constexpr std::size_t kTilt = 12;
+constexpr std::size_t kCounts = 7 + 2;  // of lists, and the IMU's exponents
+constexpr std::size_t kAlways = kHeader + kTilt + kCounts + kChecksum;
+constexpr std::size_t kFirst =
+    kAlways + kMaxEchoes * kEchoSize + kMaxImu * kImuSize + kEstimateBudget;
 
 std::int64_t round_to_ticks(std::int64_t ns) { return floor_to_ticks(ns + kTick / 2); }
 
@@ -81,8 +86,8 @@ std::optional<std::uint8_t> index_in(std::vector<Item>& table, const Item& item,
 /// What goes into one datagram, chosen before anything is written.
 class Selection {
  public:
-  explicit Selection(const OutgoingPeerMessage& message)
-      : base_tick_(floor_to_ticks(to_ns(message.sent))) {
+  Selection(const OutgoingPeerMessage& message, std::size_t max_bytes)
+      : base_tick_(floor_to_ticks(to_ns(message.sent))), room_(max_bytes - kAlways) {
     choose_echoes(message);
     choose_imu(message.report.imu);
     choose_estimates(message.report.estimates, message.sequence);
@@ -190,10 +195,8 @@ class Selection {
     return take(cost);
   }
 
-  static constexpr std::size_t kTilt = 12;
-  static constexpr std::size_t kCounts = 7 + 2;  // of lists, and the IMU's exponents
   std::int64_t base_tick_;
-  std::size_t room_ = kMaxPeerMessage - kHeader - kTilt - kCounts - kChecksum;
+  std::size_t room_;
 };
 
 /// Least e with which |v| <= 32767 * 2^e for all v.
@@ -209,7 +212,7 @@ int exponent_for(const std::vector<const ImuSample*>& samples, Member member) {
 
 class Encoder {
  public:
-  explicit Encoder(std::int64_t base_tick) : base_tick_(base_tick) {}
+  Encoder(std::int64_t base_tick, std::size_t max_bytes) : base_tick_(base_tick), out_(max_bytes) {}
 
   void header(const OutgoingPeerMessage& message) {
     for (const std::uint8_t byte : kMagic) out_.write<std::uint8_t>(byte);
@@ -299,7 +302,7 @@ class Encoder {
     }
   }
 
-  [[nodiscard]] std::vector<std::uint8_t> sealed() && {
+  [[nodiscard]] std::vector<std::uint8_t> finished() && {
     out_.write<std::uint32_t>(crc32(out_.bytes()));
     CREPES_EXPECT(out_.ok(), "the selection fits");
     return std::move(out_).take();
@@ -321,17 +324,18 @@ class Encoder {
   }
 
   std::int64_t base_tick_;
-  ByteWriter out_{kMaxPeerMessage};
+  ByteWriter out_;
 };
 
 }  // namespace
 }  // namespace wire
 
-EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message) {
+EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message, std::size_t max_bytes) {
+  CREPES_EXPECT(max_bytes >= wire::kFirst, "what comes before bearings and ranges has room");
   CREPES_EXPECT(wire::is_robot(message.report.sender), "a sender has an id");
   CREPES_EXPECT(std::abs(to_ns(message.sent)) <= wire::kMaxStamp, "a clock counts from its epoch");
-  const wire::Selection selection(message);
-  wire::Encoder encoder(wire::floor_to_ticks(to_ns(message.sent)));
+  const wire::Selection selection(message, max_bytes);
+  wire::Encoder encoder(wire::floor_to_ticks(to_ns(message.sent)), max_bytes);
   encoder.header(message);
   encoder.tilt(message.report.tilt);
   encoder.echoes(selection.echoes, message.sent);
@@ -339,7 +343,7 @@ EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message) {
   encoder.bearings(selection);
   encoder.ranges(selection.ranges);
   encoder.estimates(selection.estimates);
-  return {std::move(encoder).sealed(), selection.left_out, selection.refused};
+  return {std::move(encoder).finished(), selection.left_out, selection.refused};
 }
 
 }  // namespace crepes

@@ -81,7 +81,9 @@ TEST(ToolsInJson, TellWhereAKeyIs) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
   const std::string file = scratch.path() / "mesh.key";
 
-  EXPECT_EQ(object_of({"keygen", file, "--json"})["file"], file);
+  const Json made = object_of({"keygen", file, "--json"});
+  EXPECT_EQ(made["file"], file);
+  EXPECT_EQ(made["fingerprint"].get<std::string>().size(), 8U);
 
   const Ending again = crepesctl({"keygen", file, "--json"});
   EXPECT_EQ(again.how, "exit code 1");

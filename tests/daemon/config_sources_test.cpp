@@ -10,6 +10,7 @@
 
 #include "daemon/config_file.hpp"
 #include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/mesh_key.hpp"
 #include "tests/support/places.hpp"
 
 namespace crepes {
@@ -191,6 +192,27 @@ TEST_F(ConfigSources, TellsWhatIsWrongWithAMembersFileOnce) {
             "swarm.yaml:6: swarm.members[2].id: 2 is taken by swarm.members[1]");
   fs::remove(path("swarm.yaml"));
   EXPECT_EQ(faults(), "crepesd.yaml:3: swarm.members_file: swarm.yaml is not a file");
+}
+
+TEST_F(ConfigSources, FindsTheKeyBesideTheFileThatNamesIt) {
+  write("crepesd.yaml", kBase);
+  write("crepesd.d/20-key.yaml", "net: {key_file: ../mesh.key}\n");
+  ASSERT_TRUE(write_mesh_key(path("mesh.key")));
+
+  EXPECT_TRUE(fs::equivalent(load().net.key_file, path("mesh.key")));
+}
+
+TEST_F(ConfigSources, TellsWhatIsWrongWithTheKey) {
+  write("crepesd.yaml", kBase);
+  write("crepesd.d/20-key.yaml", "net:\n  key_file: mesh.key\n");
+
+  EXPECT_EQ(faults(),
+            "crepesd.d/20-key.yaml:2: net.key_file: crepesd.d/mesh.key: No such file or directory");
+  write("crepesd.d/mesh.key", "too short");
+  fs::permissions(path("crepesd.d/mesh.key"), fs::perms::owner_read);
+  EXPECT_EQ(faults(),
+            "crepesd.d/20-key.yaml:2: net.key_file: crepesd.d/mesh.key: expected a key of 32 "
+            "bytes, as crepesctl keygen makes it, found 9");
 }
 
 class CalibrationReference : public ConfigSources {

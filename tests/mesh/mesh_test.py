@@ -40,13 +40,14 @@ def start(robot, wires, place):
 
 
 def write_configurations(place):
-    """The examples' robots in one line, on the mesh, in a world that is to begin when all are up."""
+    """The examples' robots in one line, on the mesh, sealed, in a world that is to begin when all are up."""
+    subprocess.run([build / "daemon/crepesctl", "keygen", place / "mesh.key"], check=True)
     for robot in range(1, ROBOTS + 1):
         text = (source / f"config/examples/four-simulated/r{robot}.yaml").read_text()
         assert "interface: lo" in text and "scenario: four" in text
         # Robots are not switched on at the moment at which the world begins.
         text = re.sub(r"clock_offset_s: ([-\d.]+)", lambda offset: f"clock_offset_s: {1000 + float(offset[1])}", text)
-        text = text.replace("interface: lo", "interface: bat0").replace("scenario: four", "scenario: line, epoch_s: EPOCH")
+        text = text.replace("interface: lo", f"interface: bat0, key_file: {place}/mesh.key").replace("scenario: four", "scenario: line, epoch_s: EPOCH")
         (place / f"r{robot}.yaml").write_text(text)
 
 

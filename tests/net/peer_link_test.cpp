@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <optional>
 #include <queue>
 #include <random>
@@ -26,12 +27,13 @@ class Mesh {
     for (; now_s_ < end_s; now_s_ += 0.001, ++step_) {
       if (step_ % 20 == 0) send(two, report_of_two(), local_of_two());
       if (step_ % 20 == 10) send(one, empty_report(RobotId{1}), local_of_one());
+      for (int i = 0; i < 3 && !to_replay.empty(); ++i, to_replay.pop_front())
+        tell_one(to_replay.front());
       while (!wire_.empty() && wire_.top().arrives <= now_s_) {
         const Packet packet = wire_.top();
         wire_.pop();
-        if (const auto report = one.receive(packet.bytes, local_of_one()))
-          received.push_back(*report);
-        (void)two.receive(packet.bytes, local_of_two());
+        tell_one(packet.bytes);
+        (void)two.receive(packet.bytes, local_of_two(), seal_of_two);
       }
     }
   }
@@ -49,9 +51,18 @@ class Mesh {
   PeerLink one{RobotId{1}, {RobotId{1}, RobotId{2}}};
   PeerLink two{RobotId{2}, {RobotId{1}, RobotId{2}}};
   Duration offset_of_two = std::chrono::hours{2};
-  std::vector<ReceivedReport> received;
+  std::optional<PacketSeal> seal_of_one;
+  std::optional<PacketSeal> seal_of_two;
+  std::vector<ReceivedReport> received;               ///< by robot 1
+  std::deque<std::vector<std::uint8_t>> told_by_two;  ///< all of them, for whoever listens
+  std::deque<std::vector<std::uint8_t>> to_replay;    ///< by somebody, to robot 1, three a ms
 
  private:
+  void tell_one(const std::vector<std::uint8_t>& bytes) {
+    if (const auto report = one.receive(bytes, local_of_one(), seal_of_one))
+      received.push_back(*report);
+  }
+
   struct Packet {
     double arrives;
     std::vector<std::uint8_t> bytes;
@@ -76,7 +87,8 @@ class Mesh {
 
   void send(PeerLink& from, const Report& report, Timestamp now) {
     std::uniform_real_distribution<double> uniform(0, 1);
-    auto bytes = from.compose(report, now);
+    auto bytes = from.compose(report, now, &from == &one ? seal_of_one : seal_of_two);
+    if (&from == &two) told_by_two.push_back(bytes);
     if (uniform(random_) >= loss_)
       wire_.push({now_s_ + 0.003 + jitter_s_ * uniform(random_), std::move(bytes)});
   }
@@ -191,6 +203,109 @@ TEST(PeerLink, SaysNothingOfAPeerThatDoesNotHearUs) {
 
   EXPECT_TRUE(one.clocks().empty());
   EXPECT_EQ(one.traffic(Timestamp{}).at(0).received, 100U);
+}
+
+const PacketSeal kSeal(MeshKey{1, 2, 3});
+const PacketSeal kOtherSeal(MeshKey{1, 2, 4});
+
+TEST(PeerLink, HearsSealedPeersThroughItsOwnSeal) {
+  Mesh mesh;
+  mesh.seal_of_one = mesh.seal_of_two = kSeal;
+
+  mesh.run_until(103.0);
+
+  EXPECT_GT(mesh.received.size(), 100U);
+  EXPECT_TRUE(PacketSeal::is_on(mesh.told_by_two.front()));
+}
+
+TEST(PeerLink, RefusesOtherSealsAndTellsWhich) {
+  struct Case {
+    std::optional<PacketSeal> ours, theirs;
+    std::string reason;
+  };
+  for (const Case& seals :
+       {Case{kSeal, std::nullopt, "refused_unsealed"}, Case{std::nullopt, kSeal, "refused_sealed"},
+        Case{kSeal, kOtherSeal, "refused_broken_seal"}}) {
+    Mesh mesh;
+    mesh.seal_of_one = seals.ours;
+    mesh.seal_of_two = seals.theirs;
+
+    mesh.run_until(101.0);
+
+    EXPECT_TRUE(mesh.received.empty());
+    EXPECT_GT(mesh.count_of_one(seals.reason), 40U) << seals.reason;
+    EXPECT_EQ(mesh.count_of_one(seals.reason), mesh.count_of_one("received"));
+    EXPECT_TRUE(mesh.one.traffic(Timestamp{}).empty());
+  }
+}
+
+TEST(PeerLink, SealedDatagramsAreNoLongerThanOthers) {
+  PeerLink link(RobotId{1}, {RobotId{1}, RobotId{2}});
+  Report report;
+  report.sender = RobotId{1};
+  for (int i = 0; i < 300; ++i)
+    report.ranges.push_back({report.stamp - milliseconds{i}, RobotId{2}, 3.0, -80.0, -79.0});
+
+  for (const std::optional<PacketSeal>& seal : {std::optional<PacketSeal>{}, {kSeal}}) {
+    const std::size_t size = link.compose(report, Timestamp{}, seal).size();
+    EXPECT_LE(size, kMaxPeerMessage);
+    EXPECT_GT(size, kMaxPeerMessage - 10);  // a range's
+  }
+}
+
+TEST(PeerLink, IsNotMisledByARecordedSessionPlayedAgain) {
+  Mesh mesh;
+  mesh.seal_of_one = mesh.seal_of_two = kSeal;
+  const auto restart_two = [&](Duration offset) {
+    mesh.two = PeerLink(RobotId{2}, {RobotId{1}, RobotId{2}});
+    mesh.offset_of_two = offset;
+  };
+  const auto expect_all_well_among = [&](const auto& recorded, double from_s, double to_s) {
+    mesh.received.clear();
+    for (int i = 0; i < 20; ++i)
+      mesh.to_replay.insert(mesh.to_replay.end(), recorded.begin(), recorded.end());
+    mesh.run_until(to_s);
+    EXPECT_GT(static_cast<double>(mesh.received.size()), 50 * (to_s - from_s) * 0.9);
+    for (const auto& received : mesh.received) {
+      const double stamp_s = to_seconds(received.report.stamp.time_since_epoch());
+      EXPECT_GT(stamp_s, from_s - 0.1);
+      EXPECT_LT(stamp_s, to_s + 0.1);
+    }
+  };
+  mesh.run_until(103.0);
+  const auto first_session = mesh.told_by_two;
+  restart_two(std::chrono::hours{3});
+  mesh.run_until(106.0);
+  mesh.told_by_two.clear();
+  restart_two(std::chrono::hours{1});
+  mesh.run_until(108.0);
+  const auto current_session = mesh.told_by_two;
+
+  expect_all_well_among(first_session, 108.0, 110.0);
+  expect_all_well_among(current_session, 110.0, 112.0);
+  EXPECT_EQ(mesh.one.traffic(Timestamp{}).at(0).restarts, 2U);
+
+  // Whoever starts now cannot know which of the sessions is the true one.
+  mesh.one = PeerLink(RobotId{1}, {RobotId{1}, RobotId{2}});
+  expect_all_well_among(first_session, 112.1, 114.0);
+  EXPECT_EQ(mesh.one.traffic(Timestamp{}).at(0).restarts, 0U);
+  EXPECT_NEAR(mesh.one.clocks().at(0).offset_s, 3600.0, 1e-3);
+}
+
+TEST(PeerLink, BelievesNoEchoOfWhatItNeverSent) {
+  Mesh mesh;
+  mesh.run_until(100.5);
+  OutgoingPeerMessage message;
+  message.report.sender = RobotId{2};
+  message.report.stamp = message.sent = mesh.local_of_two();
+  message.session = 77;
+  message.echoes = {{RobotId{1}, to_ns(mesh.local_of_one() - milliseconds{7}) + 13,
+                     to_ns(message.sent - milliseconds{5})}};
+
+  EXPECT_FALSE(mesh.one.receive(encode_peer_message(message).bytes, mesh.local_of_one()));
+
+  EXPECT_EQ(mesh.count_of_one("refused_echo"), 1U);
+  EXPECT_EQ(mesh.one.traffic(Timestamp{}).at(0).restarts, 0U);
 }
 
 TEST(SequenceWindow, CountsLossesAndForgivesLateComers) {

@@ -21,6 +21,7 @@
 #include "daemon/ctl/scratch_directory.hpp"
 #include "daemon/ctl/swarm_dataset.hpp"
 #include "daemon/ctl/swarm_replay.hpp"
+#include "daemon/mesh_key.hpp"
 #include "daemon/recorder_stage.hpp"
 #include "daemon/runtime.hpp"
 #include "daemon/unix_socket.hpp"
@@ -64,8 +65,11 @@ class Record : public LiveDaemon {
 };
 
 TEST_F(Record, ReplaysTogetherWithTheOtherRobotsRecording) {
-  const Config first = recorded_config(1);
+  const fs::path key = folder_.path() / "mesh.key";
+  ASSERT_TRUE(write_mesh_key(key));
+  Config first = recorded_config(1);
   Config second = recorded_config(2);
+  first.net.key_file = second.net.key_file = key;
   second.sim.clock_offset_s = 7.25;
   second.sim.clock_skew_ppm = 40.0;
   const auto runtime_1 = std::make_unique<Runtime>(first, machine_);
@@ -90,6 +94,7 @@ TEST_F(Record, ReplaysTogetherWithTheOtherRobotsRecording) {
   const std::size_t line = manifest.find("# - {id: 2");
   ASSERT_NE(line, std::string::npos) << manifest;
   std::ofstream(swarm / "swarm.yaml") << manifest.erase(line, 2);
+  fs::remove(key);  // a replay needs none
 
   ReplayOptions replay;
   replay.swarm_dir = swarm;

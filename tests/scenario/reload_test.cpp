@@ -4,6 +4,7 @@
 #include <sys/un.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <fstream>
@@ -15,6 +16,7 @@
 
 #include "daemon/ctl/child_process.hpp"
 #include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/mesh_key.hpp"
 #include "daemon/runtime.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
@@ -109,6 +111,48 @@ TEST_F(Reload, LetsMembersOutAndIn) {
   ASSERT_TRUE(runtime.reconfigure(both));
   EXPECT_TRUE(client.await_status([](const Json& status) { return fused_ranges(status) > 0; }));
   expect_true_poses(both);
+}
+
+TEST_F(Reload, ChangesTheKeyOfTheSwarm) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  ASSERT_TRUE(write_mesh_key(scratch.path() / "old"));
+  ASSERT_TRUE(write_mesh_key(scratch.path() / "new"));
+  std::array<Config, 2> with_old{pair_config(1, mesh_port_), pair_config(2, mesh_port_)};
+  for (Config& config : with_old) config.net.key_file = scratch.path() / "old";
+  std::array<Config, 2> with_new = with_old;
+  for (Config& config : with_new) config.net.key_file = scratch.path() / "new";
+  Runtime one(with_old[0], machine_);
+  Runtime two(with_old[1], machine_);
+  expect_true_poses(with_old[0]);
+
+  ASSERT_TRUE(one.reconfigure(with_new[0]));
+  for (const Config& config : with_old) {
+    EXPECT_TRUE(Client(config).await_status(
+        [](const Json& status) { return status["network"].value("refused_broken_seal", 0) > 50; }));
+  }
+
+  ASSERT_TRUE(two.reconfigure(with_new[1]));
+  expect_true_poses(with_new[0]);
+}
+
+TEST_F(Reload, SendsNothingWhileItsKeyCannotBeRead) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  Config config = pair_config(1, mesh_port_);
+  config.net.key_file = scratch.path() / "key";
+  const Runtime runtime(config, machine_);
+  Client client(config);
+
+  const auto fault = client.await_status([](const Json& status) {
+    return tells(sensor_of(status, "mesh"), "No such file") &&
+           sensor_of(status, "imu").value("counts", Json::object()).value("samples", 0) > 50;
+  });
+  ASSERT_TRUE(fault);
+  EXPECT_EQ((*fault)["network"].value("sent", 0), 0);
+  ASSERT_TRUE(write_mesh_key(config.net.key_file));
+
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    return sensor_of(status, "mesh").value("ok", false) && status["network"].value("sent", 0) > 0;
+  }));
 }
 
 TEST_F(Reload, NamesWhatHasToWaitAndRefusesWhatCannotBe) {

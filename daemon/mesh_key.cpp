@@ -1,0 +1,76 @@
+#include "daemon/mesh_key.hpp"
+
+#include <fcntl.h>
+#include <sodium.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <system_error>
+
+#include "drivers/unique_fd.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+tl::unexpected<Error> refuse(const fs::path& file, const std::string& reason) {
+  return fail(ErrorCode::kIo, file.string() + ": " + reason);
+}
+
+tl::unexpected<Error> refuse_for(const fs::path& file, int error) {
+  return refuse(file, std::generic_category().message(error));
+}
+
+}  // namespace
+
+Result<MeshKey> write_mesh_key(const fs::path& file) {
+  constexpr mode_t kOwnerOnly = 0600;
+  const UniqueFd fd{::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnerOnly)};
+  if (!fd && errno == EEXIST)
+    return refuse(file, "is there already; a key that is in use is not overwritten");
+  if (!fd) return refuse_for(file, errno);
+  MeshKey key{};
+  randombytes_buf(key.data(), key.size());
+  const ssize_t written = ::write(fd.get(), key.data(), key.size());
+  const int error = written < 0 ? errno : ENOSPC;
+  if (written == static_cast<ssize_t>(key.size()) && ::fsync(fd.get()) == 0) return key;
+  ::unlink(file.c_str());
+  return refuse_for(file, error);
+}
+
+Result<MeshKey> read_mesh_key(const fs::path& file) {
+  // A pipe would keep us waiting.
+  const UniqueFd fd{::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
+  if (!fd && errno == EACCES) {
+    return refuse(file,
+                  "Permission denied; the service is of group crepes: chgrp crepes, chmod 640");
+  }
+  if (!fd) return refuse_for(file, errno);
+  struct stat about {};
+  if (::fstat(fd.get(), &about) != 0) return refuse_for(file, errno);
+  if (!S_ISREG(about.st_mode)) return refuse(file, "is not a file");
+  if ((about.st_mode & S_IRWXO) != 0)
+    return refuse(file, "is open to everybody; chmod o= " + file.string());
+  MeshKey key{};
+  const std::string expected = "expected a key of 32 bytes, as crepesctl keygen makes it, found ";
+  if (about.st_size != static_cast<off_t>(key.size()))
+    return refuse(file, expected + std::to_string(about.st_size));
+  const ssize_t read = ::read(fd.get(), key.data(), key.size());
+  if (read < 0) return refuse_for(file, errno);
+  if (read != static_cast<ssize_t>(key.size()))
+    return refuse(file, expected + std::to_string(read));
+  return key;
+}
+
+std::string fingerprint(const MeshKey& key) {
+  std::array<std::uint8_t, crypto_generichash_BYTES> hash{};
+  crypto_generichash(hash.data(), hash.size(), key.data(), key.size(), nullptr, 0);
+  std::array<char, 9> text{};
+  sodium_bin2hex(text.data(), text.size(), hash.data(), 4);
+  return text.data();
+}
+
+}  // namespace crepes
