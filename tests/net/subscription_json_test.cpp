@@ -3,8 +3,14 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -255,6 +261,39 @@ TEST(SubscriptionJson, TellsOnePartAlone) {
   EXPECT_EQ(network["network"]["refused_14"], 1014);
   EXPECT_EQ(network["queues"]["events"], 42);
   EXPECT_FALSE(network.contains("sensors"));
+}
+
+/// Keys of an object and of the objects in it, but not names that the data choose.
+void add_keys(const Json& json, std::set<std::string>& keys) {
+  const std::set<std::string> named{"faults", "counts", "measurements", "queues", "network"};
+  for (const auto& [key, value] : json.items()) {
+    keys.insert(key);
+    if (named.contains(key)) continue;
+    if (value.is_object()) add_keys(value, keys);
+    for (const Json& item : value.is_array() ? value : Json::array())
+      if (item.is_object()) add_keys(item, keys);
+  }
+}
+
+TEST(SubscriptionJson, HasNoKeyThatTheDocumentsDoNotName) {
+  std::ifstream file(std::string(source_dir()) + "/config/docs/formats.md");
+  const std::string document{std::istreambuf_iterator<char>(file), {}};
+  SystemStatus status = big_status(1);
+  for (SensorStatus& sensor : status.sensors) sensor.message = "short";
+  status.config = {
+      .generation = 2, .since = {}, .restart = {"cameras"}, .fault = "crepesd.yaml:1: no"};
+  std::set<std::string> keys{"truncated", "more"};
+  add_keys(Json::parse(pose_json(1, RobotId{1}, "r2", some_pose())), keys);
+  add_keys(Json::parse(status_json(status, StatusPart::kAll)), keys);
+  add_keys(Json::parse(peer_status_json(status, RobotId{2}).value()), keys);
+  for (const char* axis : {"x", "y", "z", "w"}) keys.erase(axis);
+
+  EXPECT_GT(keys.size(), 30U);
+  for (const std::string& key : keys) {
+    EXPECT_TRUE(document.find('`' + key + '`') != std::string::npos ||
+                document.find('"' + key + '"') != std::string::npos)
+        << key;
+  }
 }
 
 TEST(SubscriptionJson, AnswersWithItsVersionAndLease) {

@@ -86,6 +86,16 @@ def device_rules():
     check("an FTDI bridge does not hold bytes back", "latency_timer' writing '1'" in udev_says("1-4/1-4:1.0/ttyUSB0").stderr)
 
 
+def give_key():
+    """As systemd/MESH.md says, to this robot and its neighbor."""
+    made = run("crepesctl", "keygen", "/crepes/mesh.key")
+    run("install", "-m640", "-gcrepes", "/crepes/mesh.key", "/etc/crepes/")
+    for fragments in (pathlib.Path("/etc/crepes/crepesd.d"), pathlib.Path("/crepes/r2.d")):
+        fragments.mkdir(exist_ok=True)
+        (fragments / "20-key.yaml").write_text("net: {key_file: /etc/crepes/mesh.key}\n")
+    return made.stdout.split()[-1]
+
+
 def faulty_configuration():
     CONFIG.write_text(FIRST.replace("rate_hz:", "rate_herz:"))
     started = run("systemctl", "start", "crepesd")
@@ -96,7 +106,7 @@ def faulty_configuration():
     check("and it is not tried again", shown("ActiveState") == "failed" and shown("NRestarts") == "0", shown("NRestarts"))
 
 
-def start(subscriber):
+def start(subscriber, key):
     CONFIG.write_text(FIRST)
     begin = time.monotonic()
     started = run("systemctl", "start", "crepesd")
@@ -114,6 +124,7 @@ def start(subscriber):
     check("all its threads are real-time", policies == {os.SCHED_FIFO}, policies)
     journal = run("journalctl", "-o", "short", "-t", "crepesd").stdout
     check("its messages are in the journal", "running with" in journal)
+    check("it seals what it tells its neighbor", f"sealed with the key {key}" in journal)
     score = run("systemd-analyze", "security", "--no-pager", "crepesd").stdout.strip().splitlines()
     check("systemd calls it well confined", run("systemd-analyze", "security", "--threshold=20", "crepesd").returncode == 0,
           score[-1].lstrip("→ ") if score else "")
@@ -168,10 +179,11 @@ def remove():
 def main():
     install()
     device_rules()
+    key = give_key()
     neighbor = subprocess.Popen(["/usr/bin/crepesd", "--config", "/crepes/r2.yaml"], stderr=subprocess.DEVNULL)
     subscriber = Subscriber()
     faulty_configuration()
-    start(subscriber)
+    start(subscriber, key)
     comes_back(subscriber, "killed", lambda process: os.kill(process, signal.SIGKILL), 3.0)
     comes_back(subscriber, "hung", lambda process: os.kill(process, signal.SIGSTOP), 3.0 + 3.0)  # WatchdogSec and as above
     reloading(subscriber)
