@@ -25,6 +25,8 @@ constexpr int kMaxDatagramsAtOnce = 256;
 constexpr int kPollTimeoutMs = 100;
 constexpr Duration kFirstRetry = std::chrono::milliseconds{100};
 constexpr Duration kLastRetry = std::chrono::seconds{5};
+constexpr const char* kOtherKey =
+    "no datagram that comes can be opened: net.key_file is not the same on all robots";
 
 std::vector<RobotId> ids_of(const SwarmConfig& swarm) {
   std::vector<RobotId> ids;
@@ -84,6 +86,32 @@ class MeshSocket {
   Duration retry_ = kFirstRetry;
 };
 
+/// Whether datagrams came since the last look, and not one of them could be opened.
+class KeyWatch {
+ public:
+  void look(const PeerLink& link) {
+    std::uint64_t received = 0;
+    std::uint64_t closed = 0;
+    for (const auto& [name, total] : link.counters()) {
+      if (name == "received") received = total;
+      if (name == "refused_sealed" || name == "refused_unsealed" || name == "refused_broken_seal")
+        closed += total;
+    }
+    const std::uint64_t came = received - std::exchange(received_, received);
+    const std::uint64_t stayed_closed = closed - std::exchange(closed_, closed);
+    const bool was_other_key = std::exchange(is_other_key_, came > 0 && stayed_closed == came);
+    if (is_other_key_ && !was_other_key)
+      log_message(LogLevel::kWarning, std::string("mesh: ") + kOtherKey);
+  }
+
+  [[nodiscard]] bool is_other_key() const { return is_other_key_; }
+
+ private:
+  std::uint64_t received_ = 0;
+  std::uint64_t closed_ = 0;
+  bool is_other_key_ = false;
+};
+
 /// The net thread's state.
 class NetLoop {
  public:
@@ -124,14 +152,22 @@ class NetLoop {
     }
     if (auto status = stage_.config_status.try_pop()) config_status_ = std::move(*status);
     server_->serve(clock_.now());
-    tell_service(clock_.now());
+    if (clock_.now() >= second_) every_second();
   }
 
  private:
-  /// Once a second, if there is news.
-  void tell_service(Timestamp now) {
-    if (now < service_due_) return;
-    service_due_ = now + std::chrono::seconds{1};
+  void every_second() {
+    second_ = clock_.now() + std::chrono::seconds{1};
+    key_watch_.look(link_);
+    tell_service();
+  }
+
+  [[nodiscard]] std::string mesh_fault() const {
+    return mesh_.fault().empty() && key_watch_.is_other_key() ? kOtherKey : mesh_.fault();
+  }
+
+  /// If there is news.
+  void tell_service() {
     std::string line = service_line(status());
     if (line == service_line_) return;
     Watchdog::tell_status(line);
@@ -198,7 +234,7 @@ class NetLoop {
     status.config = config_status_;
     status.config_age_s = to_seconds(status.stamp - config_status_.since);
     for (const auto& [name, sensor] : sensors_) status.sensors.push_back(sensor);
-    status.sensors.push_back({"mesh", 0.0, mesh_.fault().empty(), mesh_.fault(), {}});
+    status.sensors.push_back({"mesh", 0.0, mesh_fault().empty(), mesh_fault(), {}});
     status.estimator = estimator_;
     status.clocks = link_.clocks();
     status.traffic = link_.traffic(status.stamp);
@@ -216,12 +252,13 @@ class NetLoop {
   Timestamp start_;
   PeerLink link_;
   MeshSocket mesh_;
+  KeyWatch key_watch_;
   std::uint64_t unsent_ = 0;
   std::optional<SubscriptionServer> server_;
   EstimatorStatus estimator_;
   std::map<std::string, SensorStatus> sensors_;
   std::string service_line_;
-  Timestamp service_due_{};
+  Timestamp second_{};  ///< when this one is over
 };
 
 }  // namespace

@@ -127,12 +127,17 @@ TEST_F(Reload, ChangesTheKeyOfTheSwarm) {
 
   ASSERT_TRUE(one.reconfigure(with_new[0]));
   for (const Config& config : with_old) {
-    EXPECT_TRUE(Client(config).await_status(
-        [](const Json& status) { return status["network"].value("refused_broken_seal", 0) > 50; }));
+    EXPECT_TRUE(Client(config).await_status([](const Json& status) {
+      return tells(sensor_of(status, "mesh"), "net.key_file") &&
+             status["network"].value("refused_broken_seal", 0) > 50;
+    }));
   }
 
   ASSERT_TRUE(two.reconfigure(with_new[1]));
   expect_true_poses(with_new[0]);
+  EXPECT_TRUE(Client(with_new[0]).await_status([](const Json& status) {
+    return sensor_of(status, "mesh").value("ok", false);
+  }));
 }
 
 TEST_F(Reload, SendsNothingWhileItsKeyCannotBeRead) {
