@@ -92,26 +92,38 @@ template <bool kAdd>
 #endif
 
 template <bool kAdd>
-void product(const ConstMatrixRef& A, const ConstMatrixRef& B, MatrixRef& C) {
-  CREPES_EXPECT(A.rows() == C.rows() && B.rows() == C.cols() && A.cols() == B.cols(),
-                "factors fit each other");
-  const Operands x{A.data(),        B.data(), C.data(), A.outerStride(), B.outerStride(),
-                   C.outerStride(), C.rows(), C.cols(), A.cols()};
+void do_narrow_product(Operands x) {
+  do_product<kAdd, 2, 4, 2>(x);
+}
+
+template <bool kAdd>
+void do_best_product(Operands x) {
 #ifdef __x86_64__
   static const bool is_wide = __builtin_cpu_supports("avx2") != 0;
   if (is_wide) return do_wide_product<kAdd>(x);
 #endif
-  do_product<kAdd, 2, 4, 2>(x);
+  do_narrow_product<kAdd>(x);
+}
+
+Operands operands(const ConstMatrixRef& A, const ConstMatrixRef& B, MatrixRef& C) {
+  CREPES_EXPECT(A.rows() == C.rows() && B.rows() == C.cols() && A.cols() == B.cols(),
+                "factors fit each other");
+  return {A.data(),        B.data(), C.data(), A.outerStride(), B.outerStride(),
+          C.outerStride(), C.rows(), C.cols(), A.cols()};
 }
 
 }  // namespace
 
 void add_product(const ConstMatrixRef& A, const ConstMatrixRef& B, MatrixRef C) {
-  product<true>(A, B, C);
+  do_best_product<true>(operands(A, B, C));
 }
 
 void subtract_product(const ConstMatrixRef& A, const ConstMatrixRef& B, MatrixRef C) {
-  product<false>(A, B, C);
+  do_best_product<false>(operands(A, B, C));
+}
+
+void add_product_narrow(const ConstMatrixRef& A, const ConstMatrixRef& B, MatrixRef C) {
+  do_narrow_product<true>(operands(A, B, C));
 }
 
 }  // namespace crepes

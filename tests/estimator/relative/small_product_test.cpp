@@ -23,7 +23,7 @@ Eigen::MatrixXd sum_of_products(const Eigen::MatrixXd& A, const Eigen::MatrixXd&
   return C;
 }
 
-TEST(SmallProduct, IsThePlainSumToTheBitForAllSizes) {
+TEST(SmallProduct, IsThePlainSumToTheBitForAllSizesInAnyWidth) {
   test::RandomGeometry random(1);
   for (Eigen::Index rows = 1; rows <= 20; ++rows) {
     for (Eigen::Index columns = 1; columns <= 8; ++columns) {
@@ -34,10 +34,13 @@ TEST(SmallProduct, IsThePlainSumToTheBitForAllSizes) {
 
         Eigen::MatrixXd sum = C;
         add_product(A, B, sum);
+        Eigen::MatrixXd narrow_sum = C;
+        add_product_narrow(A, B, narrow_sum);
         Eigen::MatrixXd difference = C;
         subtract_product(A, B, difference);
 
         ASSERT_EQ(sum, sum_of_products(A, B, C, 1.0)) << rows << " " << columns << " " << inner;
+        ASSERT_EQ(narrow_sum, sum);
         ASSERT_EQ(difference, sum_of_products(A, B, C, -1.0));
       }
     }
