@@ -94,8 +94,7 @@ class KeyWatch {
     std::uint64_t closed = 0;
     for (const auto& [name, total] : link.counters()) {
       if (name == "received") received = total;
-      if (name == "refused_sealed" || name == "refused_unsealed" || name == "refused_broken_seal")
-        closed += total;
+      if (name.starts_with("refused_seal_")) closed += total;
     }
     const std::uint64_t came = received - std::exchange(received_, received);
     const std::uint64_t stayed_closed = closed - std::exchange(closed_, closed);

@@ -20,7 +20,7 @@ static_assert(crypto_aead_xchacha20poly1305_ietf_KEYBYTES == std::tuple_size_v<M
 }  // namespace
 
 std::string_view name_of(SealFault fault) {
-  constexpr std::array<std::string_view, 3> kNames{"unsealed", "other_seal_version", "broken_seal"};
+  constexpr std::array<std::string_view, 3> kNames{"seal_missing", "seal_version", "seal_broken"};
   return kNames.at(static_cast<std::size_t>(fault));
 }
 

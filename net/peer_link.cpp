@@ -32,7 +32,8 @@ Report to_local(const PeerReport& theirs, const ClockOffset& clock) {
 tl::expected<PeerMessage, std::string_view> decode(std::span<const std::uint8_t> datagram,
                                                    const std::optional<PacketSeal>& seal) {
   constexpr auto kName = [](auto fault) { return name_of(fault); };
-  if (!seal && PacketSeal::is_on(datagram)) return tl::unexpected<std::string_view>("sealed");
+  if (!seal && PacketSeal::is_on(datagram))
+    return tl::unexpected<std::string_view>("seal_unexpected");
   if (!seal) return decode_peer_message(datagram).map_error(kName);
   return seal->open(datagram).map_error(kName).and_then(
       [&](const auto& plain) { return decode_peer_message(plain).map_error(kName); });

@@ -223,9 +223,9 @@ TEST(PeerLink, RefusesOtherSealsAndTellsWhich) {
     std::optional<PacketSeal> ours, theirs;
     std::string reason;
   };
-  for (const Case& seals :
-       {Case{kSeal, std::nullopt, "refused_unsealed"}, Case{std::nullopt, kSeal, "refused_sealed"},
-        Case{kSeal, kOtherSeal, "refused_broken_seal"}}) {
+  for (const Case& seals : {Case{kSeal, std::nullopt, "refused_seal_missing"},
+                            Case{std::nullopt, kSeal, "refused_seal_unexpected"},
+                            Case{kSeal, kOtherSeal, "refused_seal_broken"}}) {
     Mesh mesh;
     mesh.seal_of_one = seals.ours;
     mesh.seal_of_two = seals.theirs;

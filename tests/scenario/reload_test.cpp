@@ -129,7 +129,7 @@ TEST_F(Reload, ChangesTheKeyOfTheSwarm) {
   for (const Config& config : with_old) {
     EXPECT_TRUE(Client(config).await_status([](const Json& status) {
       return tells(sensor_of(status, "mesh"), "net.key_file") &&
-             status["network"].value("refused_broken_seal", 0) > 50;
+             status["network"].value("refused_seal_broken", 0) > 50;
     }));
   }
 
