@@ -16,6 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr ssize_t kKeyBytes = std::tuple_size_v<MeshKey>;
+
 tl::unexpected<Error> refuse(const fs::path& file, const std::string& reason) {
   return fail(ErrorCode::kIo, file.string() + ": " + reason);
 }
@@ -34,9 +36,10 @@ Result<MeshKey> write_mesh_key(const fs::path& file) {
   if (!fd) return refuse_for(file, errno);
   MeshKey key{};
   randombytes_buf(key.data(), key.size());
-  const ssize_t written = ::write(fd.get(), key.data(), key.size());
-  const int error = written < 0 ? errno : ENOSPC;
-  if (written == static_cast<ssize_t>(key.size()) && ::fsync(fd.get()) == 0) return key;
+  errno = ENOSPC;  // what else a write may be short for
+  const bool is_whole = ::write(fd.get(), key.data(), key.size()) == kKeyBytes;
+  if (is_whole && ::fsync(fd.get()) == 0) return key;
+  const int error = errno;
   ::unlink(file.c_str());
   return refuse_for(file, error);
 }
@@ -55,13 +58,12 @@ Result<MeshKey> read_mesh_key(const fs::path& file) {
   if ((about.st_mode & S_IRWXO) != 0)
     return refuse(file, "is open to everybody; chmod o= " + file.string());
   MeshKey key{};
-  const std::string expected = "expected a key of 32 bytes, as crepesctl keygen makes it, found ";
-  if (about.st_size != static_cast<off_t>(key.size()))
-    return refuse(file, expected + std::to_string(about.st_size));
   const ssize_t read = ::read(fd.get(), key.data(), key.size());
   if (read < 0) return refuse_for(file, errno);
-  if (read != static_cast<ssize_t>(key.size()))
-    return refuse(file, expected + std::to_string(read));
+  if (read != kKeyBytes || about.st_size != kKeyBytes) {
+    return refuse(file, "expected a key of 32 bytes, as crepesctl keygen makes it, found " +
+                            std::to_string(about.st_size));
+  }
   return key;
 }
 
