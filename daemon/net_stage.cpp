@@ -3,14 +3,13 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <map>
 #include <string>
 #include <utility>
 
 #include "daemon/logging.hpp"
-#include "daemon/mesh_key.hpp"
+#include "daemon/mesh_socket.hpp"
 #include "daemon/process_load.hpp"
 #include "daemon/service_line.hpp"
 #include "daemon/subscription_server.hpp"
@@ -23,93 +22,12 @@ namespace {
 
 constexpr int kMaxDatagramsAtOnce = 256;
 constexpr int kPollTimeoutMs = 100;
-constexpr Duration kFirstRetry = std::chrono::milliseconds{100};
-constexpr Duration kLastRetry = std::chrono::seconds{5};
-constexpr const char* kOtherKey =
-    "no datagram that comes can be opened: net.key_file is not the same on all robots";
 
 std::vector<RobotId> ids_of(const SwarmConfig& swarm) {
   std::vector<RobotId> ids;
   for (const MemberConfig& member : swarm.members) ids.push_back(member.id);
   return ids;
 }
-
-/// The socket on the mesh and its seal, opened again when the interface comes and goes. While the
-/// key cannot be read there is no socket: nothing leaves unsealed by mistake.
-class MeshSocket {
- public:
-  explicit MeshSocket(NetConfig config) : config_(std::move(config)) {}
-
-  [[nodiscard]] UdpSocket* get(Timestamp now) {
-    if (socket_ || now < retry_at_) return socket_ ? &*socket_ : nullptr;
-    Result<UdpSocket> opened = read_key().and_then([&] {
-      return UdpSocket::open_broadcast(config_.interface, static_cast<std::uint16_t>(config_.port));
-    });
-    if (!opened) {
-      failed(opened.error(), now);
-      return nullptr;
-    }
-    if (!fault_.empty()) log_message(LogLevel::kInfo, "mesh: works again");
-    fault_.clear();
-    retry_ = kFirstRetry;
-    socket_ = std::move(*opened);
-    return &*socket_;
-  }
-
-  void failed(const Error& error, Timestamp now) {
-    socket_.reset();
-    if (error.message != fault_) log_message(LogLevel::kWarning, "mesh: " + error.message);
-    fault_ = error.message;
-    retry_at_ = now + retry_;
-    retry_ = std::min(2 * retry_, kLastRetry);
-  }
-
-  [[nodiscard]] const std::optional<PacketSeal>& seal() const { return seal_; }
-  /// Empty when all is well.
-  [[nodiscard]] const std::string& fault() const { return fault_; }
-  [[nodiscard]] int descriptor() const { return socket_ ? socket_->descriptor() : -1; }
-
- private:
-  Result<void> read_key() {
-    if (config_.key_file.empty()) return {};
-    return read_mesh_key(config_.key_file).map([this](const MeshKey& key) {
-      seal_.emplace(key);
-      log_message(LogLevel::kInfo, "mesh: sealed with the key " + fingerprint(key));
-    });
-  }
-
-  NetConfig config_;
-  std::optional<PacketSeal> seal_;
-  std::optional<UdpSocket> socket_;
-  std::string fault_;
-  Timestamp retry_at_{};
-  Duration retry_ = kFirstRetry;
-};
-
-/// Whether datagrams came since the last look, and not one of them could be opened.
-class KeyWatch {
- public:
-  void look(const PeerLink& link) {
-    std::uint64_t received = 0;
-    std::uint64_t closed = 0;
-    for (const auto& [name, total] : link.counters()) {
-      if (name == "received") received = total;
-      if (name.starts_with("refused_seal_")) closed += total;
-    }
-    const std::uint64_t came = received - std::exchange(received_, received);
-    const std::uint64_t stayed_closed = closed - std::exchange(closed_, closed);
-    const bool was_other_key = std::exchange(is_other_key_, came > 0 && stayed_closed == came);
-    if (is_other_key_ && !was_other_key)
-      log_message(LogLevel::kWarning, std::string("mesh: ") + kOtherKey);
-  }
-
-  [[nodiscard]] bool is_other_key() const { return is_other_key_; }
-
- private:
-  std::uint64_t received_ = 0;
-  std::uint64_t closed_ = 0;
-  bool is_other_key_ = false;
-};
 
 /// The net thread's state.
 class NetLoop {
@@ -162,7 +80,7 @@ class NetLoop {
   }
 
   [[nodiscard]] std::string mesh_fault() const {
-    return mesh_.fault().empty() && key_watch_.is_other_key() ? kOtherKey : mesh_.fault();
+    return mesh_.fault().empty() ? key_watch_.fault() : mesh_.fault();
   }
 
   /// If there is news.
