@@ -46,7 +46,7 @@ class NetLoop {
   void reconfigure(const Config& config) {
     const Config before = std::exchange(config_, config);
     link_.set_members(ids_of(config_.swarm));
-    // Behind the same name may be another key.
+    // Behind the same name there may be another key by now.
     if (before.net.interface != config_.net.interface || before.net.port != config_.net.port ||
         before.net.key_file != config_.net.key_file || !config_.net.key_file.empty()) {
       mesh_ = MeshSocket(config_.net);

@@ -103,7 +103,9 @@ Result<ConfigChange> Runtime::reconfigure(Config wanted) {
     const auto concerns = [&loop](const std::string& key) {
       return std::ranges::any_of(loop.keys, [&](const auto& own) { return key.starts_with(own); });
     };
-    if (std::ranges::any_of(change.live, concerns)) loop.settings.push(in_force_);
+    // Behind the same name there may be another key by now.
+    const bool has_key = !in_force_.net.key_file.empty() && concerns("net.key_file");
+    if (has_key || std::ranges::any_of(change.live, concerns)) loop.settings.push(in_force_);
   }
   ++reload_status_.generation;
   reload_status_.since = clock_.now();

@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <memory>
@@ -113,29 +114,29 @@ TEST_F(Reload, LetsMembersOutAndIn) {
   expect_true_poses(both);
 }
 
-TEST_F(Reload, ChangesTheKeyOfTheSwarm) {
+TEST_F(Reload, TakesTheKeyThatHasTakenTheOldOnesPlace) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
-  ASSERT_TRUE(write_mesh_key(scratch.path() / "old"));
-  ASSERT_TRUE(write_mesh_key(scratch.path() / "new"));
-  std::array<Config, 2> with_old{pair_config(1, mesh_port_), pair_config(2, mesh_port_)};
-  for (Config& config : with_old) config.net.key_file = scratch.path() / "old";
-  std::array<Config, 2> with_new = with_old;
-  for (Config& config : with_new) config.net.key_file = scratch.path() / "new";
-  Runtime one(with_old[0], machine_);
-  Runtime two(with_old[1], machine_);
-  expect_true_poses(with_old[0]);
+  const std::filesystem::path key = scratch.path() / "mesh.key";
+  ASSERT_TRUE(write_mesh_key(key));
+  std::array<Config, 2> configs{pair_config(1, mesh_port_), pair_config(2, mesh_port_)};
+  for (Config& config : configs) config.net.key_file = key;
+  Runtime one(configs[0], machine_);
+  Runtime two(configs[1], machine_);
+  expect_true_poses(configs[0]);
 
-  ASSERT_TRUE(one.reconfigure(with_new[0]));
-  for (const Config& config : with_old) {
+  std::filesystem::remove(key);
+  ASSERT_TRUE(write_mesh_key(key));
+  ASSERT_TRUE(one.reconfigure(configs[0]));
+  for (const Config& config : configs) {
     EXPECT_TRUE(Client(config).await_status([](const Json& status) {
       return tells(sensor_of(status, "mesh"), "net.key_file") &&
              status["network"].value("refused_seal_broken", 0) > 50;
     }));
   }
 
-  ASSERT_TRUE(two.reconfigure(with_new[1]));
-  expect_true_poses(with_new[0]);
-  EXPECT_TRUE(Client(with_new[0]).await_status([](const Json& status) {
+  ASSERT_TRUE(two.reconfigure(configs[1]));
+  expect_true_poses(configs[0]);
+  EXPECT_TRUE(Client(configs[0]).await_status([](const Json& status) {
     return sensor_of(status, "mesh").value("ok", false);
   }));
 }

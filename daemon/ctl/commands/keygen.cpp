@@ -10,10 +10,10 @@ namespace crepes {
 void add_keygen(CommandLine& line) {
   auto& file = line.keep<std::filesystem::path>();
   auto& json = line.keep<bool>();
-  CLI::App* sub = line.add("keygen",
-                           "Make the swarm's key: 32 random bytes, to be copied to every robot and "
-                           "named as net.key_file "
-                           "there. Datagrams between robots are sealed with it");
+  CLI::App* sub =
+      line.add("keygen",
+               "Make the swarm's key: 32 random bytes, to be copied to every robot and "
+               "named there as net.key_file. Datagrams between robots are sealed with it");
   sub->add_option("FILE", file, "a new file, readable by its owner alone")->required();
   add_json_flag(sub, json);
   line.run(sub, [&file, &json] {
