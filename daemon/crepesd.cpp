@@ -1,17 +1,18 @@
 /// The daemon: options, configuration, Runtime, wait.
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <iostream>
 #include <string>
 #include <utility>
 
-#include "daemon/config_file.hpp"
-#include "daemon/logging.hpp"
-#include "daemon/reload.hpp"
+#include "config/reading/config_file.hpp"
 #include "daemon/runtime.hpp"
-#include "daemon/signals.hpp"
+#include "daemon/service/logging.hpp"
+#include "daemon/service/reload.hpp"
+#include "daemon/service/signals.hpp"
+#include "daemon/service/watchdog.hpp"
 #include "daemon/version.hpp"
-#include "daemon/watchdog.hpp"
-#include "drivers/monotonic_clock.hpp"
+#include "drivers/base/monotonic_clock.hpp"
 
 namespace crepes {
 namespace {
@@ -19,6 +20,8 @@ namespace {
 constexpr int kDone = 0;
 constexpr int kBadInput = 1;
 constexpr int kBadUsage = 2;
+
+constexpr Duration kCheckPeriod = std::chrono::seconds{1};  // of the watchdog
 
 int print(const Result<std::string>& text) {
   (text ? std::cout << *text : std::cerr << text.error().message << '\n') << std::flush;
@@ -34,17 +37,18 @@ int run(const std::string& file) {
   Runtime runtime(std::move(*config), machine);
   Watchdog watchdog(runtime.heartbeats());
   log_message(LogLevel::kInfo, "running with " + file);
-  Watchdog::tell_ready();
-  for (Signal signal = signals.wait_a_second(); signal != Signal::kStop;
-       signal = signals.wait_a_second()) {
-    if (signal == Signal::kReload) {
-      reload(file, runtime, machine);
-      continue;
-    }
+  Watchdog::notify_ready();
+  Timestamp next_check = machine.now() + kCheckPeriod;
+  for (;;) {
+    const Signal signal = signals.wait_for(next_check - machine.now());
+    if (signal == Signal::kStop) break;
+    if (signal == Signal::kReload) reload(file, runtime, machine);
+    if (machine.now() < next_check) continue;  // reloads do not delay the watchdog
     for (const std::string& loop : watchdog.check())
       log_message(LogLevel::kError, loop + ": this loop makes no progress");
+    next_check = machine.now() + kCheckPeriod;
   }
-  Watchdog::tell_stopping();
+  Watchdog::notify_stopping();
   return kDone;
 }
 
@@ -58,9 +62,10 @@ int main(int argc, char** argv) {
   const auto add_file_option = [&](const std::string& name, const std::string& help) {
     return app.add_option(name, file, help)->expected(0, 1)->capture_default_str();
   };
-  add_file_option("--config", "run with this configuration, as without any option");
-  const auto* check = add_file_option("--check-config", "print every fault of it and exit");
-  const auto* dump = add_file_option("--dump-config", "print what its files make together, exit");
+  add_file_option("--config", "run with this configuration; the default without any option");
+  const auto* check =
+      add_file_option("--check-config", "print every fault of the configuration and exit");
+  const auto* dump = add_file_option("--dump-config", "print the merged configuration and exit");
   bool reference = false;
   app.add_flag("--write-reference", reference, "print a configuration with all keys and exit");
   app.set_version_flag("--version", std::string(crepes::kVersion));
@@ -73,6 +78,6 @@ int main(int argc, char** argv) {
   if (reference) return crepes::print(crepes::reference_config());
   if (*dump) return crepes::print(crepes::load_config(file).map(crepes::write_config));
   if (!*check) return crepes::run(file);
-  const auto praise = [&](const crepes::Config& /*config*/) { return file + ": good\n"; };
-  return crepes::print(crepes::load_config(file).map(praise));
+  const auto confirm = [&](const crepes::Config& /*config*/) { return file + ": good\n"; };
+  return crepes::print(crepes::load_config(file).map(confirm));
 }

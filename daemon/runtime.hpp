@@ -6,25 +6,29 @@
 #include <string>
 #include <vector>
 
-#include "daemon/config_change.hpp"
-#include "daemon/counters.hpp"
-#include "daemon/estimator_stage.hpp"
-#include "daemon/graph_stage.hpp"
-#include "daemon/net_stage.hpp"
-#include "daemon/recorder_stage.hpp"
-#include "daemon/sensor_stages.hpp"
-#include "daemon/watchdog.hpp"
-#include "daemon/worker.hpp"
+#include "config/reloading/config_change.hpp"
+#include "config/schema/config.hpp"
+#include "daemon/devices/camera_sensor.hpp"
+#include "daemon/devices/serial_sensors.hpp"
+#include "daemon/recording/recorder_stage.hpp"
+#include "daemon/service/watchdog.hpp"
+#include "daemon/stages/counters.hpp"
+#include "daemon/stages/estimator_stage.hpp"
+#include "daemon/stages/graph_stage.hpp"
+#include "daemon/stages/live_settings.hpp"
+#include "daemon/stages/net_stage.hpp"
+#include "daemon/stages/sensor_stage.hpp"
+#include "daemon/stages/vision_stage.hpp"
+#include "daemon/stages/worker.hpp"
 #include "drivers/sim/sim_clock.hpp"
 #include "drivers/sim/sim_serial.hpp"
 #include "drivers/sim/world.hpp"
 #include "estimator/core/clock.hpp"
-#include "estimator/core/config.hpp"
 
 namespace crepes {
 
-/// One robot, running from construction to destruction. Devices that fail do not end it: they are
-/// reopened, and told in STATUS.
+/// One robot, running from construction to destruction. A device that fails is reported in STATUS
+/// and opened again.
 class Runtime {
  public:
   /// `config` must be valid; `machine` must outlive this.
@@ -39,35 +43,36 @@ class Runtime {
   /// For the watchdog; valid while this lives.
   [[nodiscard]] std::vector<Heartbeat> heartbeats() const;
 
-  /// Applies what can change live, and tells in STATUS what cannot. An error, and nothing changes:
-  /// with what cannot change now the wanted settings would break a rule. For the thread that made
-  /// this, as is `tell_reload_refused`.
+  /// Applies the live settings, and reports in STATUS those that need a restart. Returns an error
+  /// and changes nothing if the result would break a rule. Only for the thread that constructed
+  /// this, like `report_refused_reload`.
   [[nodiscard]] Result<ConfigChange> reconfigure(Config wanted);
-  /// Says in STATUS why there are no other settings, though they were asked for.
-  void tell_reload_refused(const std::string& fault);
+  /// Publishes in STATUS why a reload was refused.
+  void report_refused_reload(const std::string& fault);
 
  private:
   struct CameraQueues {
-    FrameQueue frames{1, Overflow::kDropOldest};  // only the newest picture matters
-    FrameQueue used{2, Overflow::kDropOldest};    // memory on its way back to the camera
+    explicit CameraQueues(const VisionConfig& vision) : settings(vision) {}
+    LiveSettings<VisionConfig> settings;
+    FrameQueue frames{1, Overflow::kDropOldest};    // only the newest picture matters
+    FrameQueue recycled{2, Overflow::kDropOldest};  // buffers on their way back to the camera
   };
   struct Loop {
     std::string name;
-    std::vector<std::string> keys;  // a change of what begins with one of these concerns it
-    Counter turns;
-    SettingsQueue settings{1, Overflow::kDropOldest};
+    Counter iterations;
   };
 
   void open_simulation();
-  void start_sensor(Sensor sensor, std::vector<std::string> keys);
+  void update_settings();
+  void start_sensor(const std::string& name, const SensorSource& source);
   void start_camera(std::size_t index, const EventSink& sense);
   void use_simulated_devices(Config& wanted) const;
   /// A thread that runs `run(context, stop)`.
   template <class Run>
-  void start(const std::string& name, std::vector<std::string> keys, Run run);
+  void start(const std::string& name, Run run);
   [[nodiscard]] std::vector<QueueStatus> queue_status() const;
 
-  Config config_;  // as at the start: threads read it, nobody changes it
+  Config config_;  // as at the start: threads read it, and nothing changes it
   SimClock sim_clock_;
   const Clock& clock_;
 
@@ -80,14 +85,22 @@ class Runtime {
   std::deque<CameraQueues> cameras_;
   std::deque<PictureTap> picture_taps_;  // one a camera
 
+  // The settings of each stage, made from the configuration; see `update_settings`.
+  LiveSettings<EstimatorSettings> estimator_settings_;
+  LiveSettings<GraphConfig> graph_settings_;
+  LiveSettings<NetSettings> net_settings_;
+  LiveSettings<ImuSensorSettings> imu_settings_;
+  LiveSettings<UwbSensorSettings> uwb_settings_;
+  LiveSettings<Config> recorder_settings_;
+
   // The main thread's.
-  Config in_force_;
+  Config active_config_;
   ConfigStatus reload_status_;
 
   std::optional<SimWorld> world_;
   std::deque<SimSerial> sim_devices_;
   std::deque<Loop> loops_;
-  std::deque<Worker> workers_;  // last: joined before anything that they use dies
+  std::deque<Worker> workers_;  // last: joined before anything that they use is destroyed
 };
 
 }  // namespace crepes

@@ -10,13 +10,14 @@ namespace {
 constexpr double kSkewPrior = 50e-6;  // one sigma of a crystal against another
 constexpr double kMaxSkew = 200e-6;   // no crystal is worse
 constexpr double kTolerance = 10e-3;  // s; a clock that gains more at once has jumped
-constexpr double kMaxDelay = 1.0;     // s; nothing waits longer
-constexpr double kLook = 0.5;         // s
-constexpr double kBehind = 20e-3;     // s; when all of a look is later, the clock has stopped
-constexpr int kEnoughLooks = 2;
+constexpr double kMaxDelay = 1.0;     // s; no stamp is delayed longer
+constexpr double kWindow = 0.5;       // s
+constexpr double kBehind =
+    20e-3;  // s; if even the fastest of a window is later, the clock has stopped
+constexpr int kEnoughWindows = 2;
 constexpr Duration kLongestStep = std::chrono::hours{1};
 
-/// From one count to the next; negative where the counter went back.
+/// The step from one reading to the next; negative if the counter decreased.
 Duration step_between(DeviceTime from, DeviceTime to) {
   if (to.wrap_ns == 0) return Duration{static_cast<std::int64_t>(to.ns - from.ns)};
   const std::uint64_t ahead = (to.ns + (to.wrap_ns - from.ns)) % to.wrap_ns;
@@ -31,64 +32,66 @@ Timestamp DeviceClock::to_local(DeviceTime stamp, Timestamp arrival) {
 }
 
 Timestamp DeviceClock::map(DeviceTime stamp, Timestamp arrival) {
-  const std::optional<double> delay = course_ ? delay_of(stamp, arrival) : std::nullopt;
+  const std::optional<double> delay = segment_ ? delay_of(stamp, arrival) : std::nullopt;
   if (!delay) {
-    if (is_relied_on()) ++restarts_;
+    if (is_trusted()) ++restarts_;
     begin(stamp, arrival);
   }
-  return delay && is_relied_on() ? arrival - from_seconds(*delay) : arrival;
+  return delay && is_trusted() ? arrival - from_seconds(*delay) : arrival;
 }
 
-bool DeviceClock::is_relied_on() const { return course_ && course_->good_looks >= kEnoughLooks; }
+bool DeviceClock::is_trusted() const {
+  return segment_ && segment_->windows_kept >= kEnoughWindows;
+}
 
 void DeviceClock::begin(DeviceTime stamp, Timestamp arrival) {
-  course_ = Course{.origin = arrival, .last = stamp};
-  course_->bounds.offer({}, 0.0);
+  segment_ = Segment{.origin = arrival, .last = stamp};
+  segment_->bounds.offer({}, 0.0);
 }
 
 std::optional<double> DeviceClock::delay_of(DeviceTime stamp, Timestamp arrival) {
-  Course& course = *course_;
-  if (stamp.wrap_ns != course.last.wrap_ns) return std::nullopt;
-  const Duration step = step_between(course.last, stamp);
+  Segment& segment = *segment_;
+  if (stamp.wrap_ns != segment.last.wrap_ns) return std::nullopt;
+  const Duration step = step_between(segment.last, stamp);
   if (step < Duration::zero() || step > kLongestStep) return std::nullopt;
-  course.last = stamp;
-  course.elapsed += step;
+  segment.last = stamp;
+  segment.elapsed += step;
 
-  const double now = to_seconds(arrival - course.origin);
-  const OffsetBound bound{now, to_seconds(course.elapsed) - now};
-  if (bound.offset > course.at(now) + kTolerance) return std::nullopt;
-  if (course.bounds.offer(bound, course.skew)) refit(now);
-  const double delay = std::max(course.at(now) - bound.offset, 0.0);
-  if (delay > kMaxDelay || !look(now, delay)) return std::nullopt;
+  const double now = to_seconds(arrival - segment.origin);
+  const OffsetBound bound{now, to_seconds(segment.elapsed) - now};
+  if (bound.offset > segment.at(now) + kTolerance) return std::nullopt;
+  if (segment.bounds.offer(bound, segment.skew)) refit(now);
+  const double delay = std::max(segment.at(now) - bound.offset, 0.0);
+  if (delay > kMaxDelay || !keeps_pace(now, delay)) return std::nullopt;
   return delay;
 }
 
-/// Delays taken as exponential with mean mu, the most likely line above the bounds l_i is
+/// With exponential delays of mean mu, the most likely line above the bounds l_i is
 ///   max over k of  -max_i (l_i - k t_i) n / mu - k^2 / (2 sigma_k^2)
 /// with times from their mean.
 void DeviceClock::refit(double now) {
-  Course& course = *course_;
-  const std::vector<OffsetBound> bounds = course.bounds.bounds(now);
+  Segment& segment = *segment_;
+  const std::vector<OffsetBound> bounds = segment.bounds.bounds(now);
   double sum = 0.0;
   for (const OffsetBound& bound : bounds) sum += bound.t;
   const double center = sum / static_cast<double>(bounds.size());
-  const double guess = tightest(bounds, course.skew, center, +1);
-  const double scale = std::max(envelope_sigma(bounds, course.skew, center, guess, 0.0), 1e-7);
-  course.skew = maximizer(-kMaxSkew, kMaxSkew, [&](double k) {
+  const double guess = tightest(bounds, segment.skew, center, +1);
+  const double scale = std::max(envelope_sigma(bounds, segment.skew, center, guess, 0.0), 1e-7);
+  segment.skew = maximizer(-kMaxSkew, kMaxSkew, [&](double k) {
     return -tightest(bounds, k, center, +1) / scale - 0.5 * (k / kSkewPrior) * (k / kSkewPrior);
   });
-  course.center = center;
-  course.offset = tightest(bounds, course.skew, center, +1);
+  segment.center = center;
+  segment.offset = tightest(bounds, segment.skew, center, +1);
 }
 
-bool DeviceClock::look(double now, double delay) {
-  Course& course = *course_;
-  if (!course.least_delay) course.look_end = now + kLook;
-  const double least = std::min(course.least_delay.value_or(delay), delay);
-  course.least_delay = least;
-  if (now < course.look_end) return true;
-  course.least_delay.reset();
-  ++course.good_looks;
+bool DeviceClock::keeps_pace(double now, double delay) {
+  Segment& segment = *segment_;
+  if (!segment.least_delay) segment.window_end = now + kWindow;
+  const double least = std::min(segment.least_delay.value_or(delay), delay);
+  segment.least_delay = least;
+  if (now < segment.window_end) return true;
+  segment.least_delay.reset();
+  ++segment.windows_kept;
   return least <= kBehind;
 }
 

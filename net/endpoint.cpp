@@ -1,6 +1,7 @@
 #include "net/endpoint.hpp"
 
 #include <arpa/inet.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 
@@ -21,7 +22,7 @@ bool Endpoint::is_loopback() const {
 }
 
 bool Endpoint::is_unicast() const {
-  constexpr std::uint8_t kFirstMulticast4 = 224;  // from there on: multicast, reserved, broadcast
+  constexpr std::uint8_t kFirstMulticast4 = 224;  // this and above: multicast, reserved, broadcast
   constexpr std::array<std::uint8_t, 4> kLoopbackBroadcast{127, 255, 255, 255};
   if (port == 0) return false;
   if (!is_ipv4()) return address[0] != 0xFF && address != std::array<std::uint8_t, 16>{};
@@ -34,10 +35,10 @@ std::string Endpoint::to_string() const {
   std::array<char, INET6_ADDRSTRLEN> text{};
   if (is_ipv4()) {
     ::inet_ntop(AF_INET, &address[12], text.data(), text.size());
-    return std::string(text.data()) + ":" + std::to_string(port);
+    return fmt::format("{}:{}", text.data(), port);
   }
   ::inet_ntop(AF_INET6, address.data(), text.data(), text.size());
-  return "[" + std::string(text.data()) + "]:" + std::to_string(port);
+  return fmt::format("[{}]:{}", text.data(), port);
 }
 
 std::optional<Endpoint> Endpoint::parse(const std::string& address, std::uint16_t port) {

@@ -1,12 +1,12 @@
 #include "net/udp_socket.hpp"
 
 #include <arpa/inet.h>
+#include <fmt/format.h>
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -23,7 +23,7 @@
 namespace crepes {
 namespace {
 
-/// The sockets interface's own pun between address families.
+/// The conversion between address families that the sockets interface requires.
 const sockaddr* as_sockaddr(const void* address) { return static_cast<const sockaddr*>(address); }
 
 sockaddr_in to_ipv4(const Endpoint& endpoint) {
@@ -59,7 +59,7 @@ Endpoint to_endpoint(const sockaddr_storage& storage) {
   return endpoint;
 }
 
-/// Calls `use(address, length)` with the endpoint in the form of its family.
+/// Calls `use(address, length)` with the endpoint as the sockaddr of its family.
 template <class Use>
 auto with_sockaddr(const Endpoint& endpoint, Use use) {
   if (endpoint.is_ipv4()) {
@@ -88,8 +88,8 @@ std::string_view advice_for(int error) {
 }
 
 tl::unexpected<Error> fail_errno(const std::string& what, int error) {
-  return fail(ErrorCode::kIo, what + ": " + std::generic_category().message(error) +
-                                  std::string(advice_for(error)));
+  return fail(ErrorCode::kIo, fmt::format("{}: {}{}", what, std::generic_category().message(error),
+                                          advice_for(error)));
 }
 
 struct FreeInterfaces {
@@ -107,20 +107,25 @@ Result<Endpoint> broadcast_address(const std::string& interface, std::uint16_t p
     exists = true;
     if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET) continue;
     if ((entry->ifa_flags & IFF_UP) == 0)
-      return fail(ErrorCode::kIo, interface + ": interface is down; see `ip link`");
+      return fail(ErrorCode::kIo, fmt::format("{}: interface is down; see `ip link`", interface));
     if ((entry->ifa_flags & IFF_LOOPBACK) != 0) return Endpoint::ipv4({127, 255, 255, 255}, port);
-    if ((entry->ifa_flags & IFF_BROADCAST) == 0 || entry->ifa_broadaddr == nullptr)
-      return fail(ErrorCode::kIo, interface + ": interface cannot broadcast; name another");
+    if ((entry->ifa_flags & IFF_BROADCAST) == 0 || entry->ifa_broadaddr == nullptr) {
+      return fail(ErrorCode::kIo,
+                  fmt::format("{}: interface cannot broadcast; name another", interface));
+    }
     sockaddr_storage storage{};
     std::memcpy(&storage, entry->ifa_broadaddr, sizeof(sockaddr_in));
     Endpoint endpoint = to_endpoint(storage);
     endpoint.port = port;
     return endpoint;
   }
-  if (!exists)
-    return fail(ErrorCode::kNotFound, interface + ": no such interface; `ip link` lists them");
-  return fail(ErrorCode::kIo,
-              interface + ": interface has no IPv4 address; give it one, see `ip address`");
+  if (!exists) {
+    return fail(ErrorCode::kNotFound,
+                fmt::format("{}: no such interface; `ip link` lists them", interface));
+  }
+  return fail(
+      ErrorCode::kIo,
+      fmt::format("{}: interface has no IPv4 address; give it one, see `ip address`", interface));
 }
 
 int set_option(int fd, int level, int option) {
@@ -130,54 +135,43 @@ int set_option(int fd, int level, int option) {
 
 }  // namespace
 
-UdpSocket::UdpSocket(UdpSocket&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)), name_(std::move(other.name_)), local_(other.local_) {}
-
-UdpSocket& UdpSocket::operator=(UdpSocket&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  std::swap(name_, other.name_);
-  std::swap(local_, other.local_);
-  return *this;
-}
-
-UdpSocket::~UdpSocket() {
-  if (fd_ >= 0) ::close(fd_);
-}
-
 Result<UdpSocket> UdpSocket::open(const Endpoint& address, std::string name, bool broadcast) {
   const int family = address.is_ipv4() ? AF_INET : AF_INET6;
-  UdpSocket socket(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), std::move(name));
-  if (socket.fd_ < 0) return fail_errno(socket.name_, errno);
-  // As much as the kernel allows, twice its default: a burst waits there while others compute.
+  UdpSocket socket(UniqueFd(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)),
+                   std::move(name));
+  if (!socket.fd_) return fail_errno(socket.name_, errno);
+  // As large as the kernel allows, twice its default: it holds a burst while the thread is busy.
   constexpr int kBuffer = 1 << 20;
-  (void)::setsockopt(socket.fd_, SOL_SOCKET, SO_RCVBUF, &kBuffer, sizeof(kBuffer));
+  (void)::setsockopt(socket.fd_.get(), SOL_SOCKET, SO_RCVBUF, &kBuffer, sizeof(kBuffer));
   const bool ready =
-      (!broadcast || (set_option(socket.fd_, SOL_SOCKET, SO_REUSEADDR) == 0 &&
-                      set_option(socket.fd_, SOL_SOCKET, SO_BROADCAST) == 0)) &&
-      (family == AF_INET || set_option(socket.fd_, IPPROTO_IPV6, IPV6_V6ONLY) == 0) &&
+      (!broadcast || (set_option(socket.fd_.get(), SOL_SOCKET, SO_REUSEADDR) == 0 &&
+                      set_option(socket.fd_.get(), SOL_SOCKET, SO_BROADCAST) == 0)) &&
+      (family == AF_INET || set_option(socket.fd_.get(), IPPROTO_IPV6, IPV6_V6ONLY) == 0) &&
       with_sockaddr(address, [&](const sockaddr* to, socklen_t length) {
-        return ::bind(socket.fd_, to, length) == 0;
+        return ::bind(socket.fd_.get(), to, length) == 0;
       });
   if (!ready) return fail_errno(socket.name_, errno);
 
   sockaddr_storage bound{};
   socklen_t length = sizeof(bound);
-  if (::getsockname(socket.fd_, static_cast<sockaddr*>(static_cast<void*>(&bound)), &length) != 0)
+  if (::getsockname(socket.fd_.get(), static_cast<sockaddr*>(static_cast<void*>(&bound)),
+                    &length) != 0)
     return fail_errno(socket.name_, errno);
   socket.local_ = to_endpoint(bound);
   return socket;
 }
 
 Result<UdpSocket> UdpSocket::open_broadcast(const std::string& interface, std::uint16_t port) {
-  // Bound to the broadcast address itself it hears nothing else, and on this interface only.
+  // A socket bound to the broadcast address receives nothing else, and on this interface only.
   return broadcast_address(interface, port).and_then([&](const Endpoint& address) {
-    return open(address, interface + " (" + address.to_string() + ")", true);
+    return open(address, fmt::format("{} ({})", interface, address.to_string()), true);
   });
 }
 
 Result<UdpSocket> UdpSocket::bind(const std::string& address, std::uint16_t port) {
   const std::optional<Endpoint> endpoint = Endpoint::parse(address, port);
-  if (!endpoint) return fail(ErrorCode::kConfig, address + ": not a numeric IPv4 or IPv6 address");
+  if (!endpoint)
+    return fail(ErrorCode::kConfig, fmt::format("{}: not a numeric IPv4 or IPv6 address", address));
   return open(*endpoint, endpoint->to_string(), false);
 }
 
@@ -186,21 +180,21 @@ Result<void> UdpSocket::broadcast(std::span<const std::uint8_t> bytes) {
 }
 
 Result<void> UdpSocket::send_to(std::span<const std::uint8_t> bytes, const Endpoint& to) {
-  CREPES_EXPECT(fd_ >= 0, "the socket was moved away");
+  CREPES_EXPECT(fd_, "the socket was moved away");
   const ssize_t sent = with_sockaddr(to, [&](const sockaddr* address, socklen_t length) {
-    return ::sendto(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL, address, length);
+    return ::sendto(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, address, length);
   });
   if (sent >= 0) return {};
   const int error = errno;
-  auto failed = fail_errno(name_ + ": send to " + to.to_string(), error);
+  auto failed = fail_errno(fmt::format("{}: send to {}", name_, to.to_string()), error);
   if (error == EAGAIN || error == ENOBUFS) failed.value().code = ErrorCode::kBusy;
   return failed;
 }
 
 Result<std::optional<Datagram>> UdpSocket::receive(std::chrono::milliseconds timeout) {
-  CREPES_EXPECT(fd_ >= 0, "the socket was moved away");
-  if (timeout.count() > 0) {  // without one, recvfrom tells by itself that nothing is there
-    pollfd ready{.fd = fd_, .events = POLLIN, .revents = 0};
+  CREPES_EXPECT(fd_, "the socket was moved away");
+  if (timeout.count() > 0) {  // otherwise recvfrom alone reports that nothing is available
+    pollfd ready{.fd = fd_.get(), .events = POLLIN, .revents = 0};
     const int count = ::poll(&ready, 1, static_cast<int>(timeout.count()));
     if (count < 0 && errno != EINTR) return fail_errno(name_, errno);
     if (count <= 0) return std::nullopt;
@@ -210,11 +204,11 @@ Result<std::optional<Datagram>> UdpSocket::receive(std::chrono::milliseconds tim
   datagram.bytes.resize(kMaxDatagram);
   sockaddr_storage from{};
   socklen_t length = sizeof(from);
-  const ssize_t received = ::recvfrom(fd_, datagram.bytes.data(), datagram.bytes.size(), 0,
+  const ssize_t received = ::recvfrom(fd_.get(), datagram.bytes.data(), datagram.bytes.size(), 0,
                                       static_cast<sockaddr*>(static_cast<void*>(&from)), &length);
   if (received < 0) {
     if (errno == EAGAIN || errno == EINTR) return std::nullopt;
-    return fail_errno(name_ + ": receive", errno);
+    return fail_errno(fmt::format("{}: receive", name_), errno);
   }
   datagram.bytes.resize(static_cast<std::size_t>(received));
   datagram.from = to_endpoint(from);

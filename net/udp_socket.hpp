@@ -1,4 +1,4 @@
-/// UDP sockets that own their descriptor and say what went wrong and what to do.
+/// UDP sockets. Errors name the cause and the remedy.
 #pragma once
 
 #include <chrono>
@@ -6,58 +6,55 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "drivers/base/unique_fd.hpp"
 #include "estimator/core/result.hpp"
 #include "net/endpoint.hpp"
 
 namespace crepes {
 
 struct Datagram {
-  /// Cut at UdpSocket::kMaxDatagram; a longer one shows as exactly that many bytes.
+  /// Truncated at UdpSocket::kMaxDatagram bytes.
   std::vector<std::uint8_t> bytes;
   Endpoint from;
 };
 
 class UdpSocket {
  public:
-  /// More than any datagram that this project accepts.
+  /// Larger than any datagram that this project accepts.
   static constexpr std::size_t kMaxDatagram = 2048;
 
-  /// Sends to and hears the broadcast address of the interface (`lo`: 127.255.255.255, heard by all
-  /// processes of this machine). Several sockets may share the port; each hears all, itself too.
+  /// Sends to the broadcast address of the interface, and receives from it. `lo` means
+  /// 127.255.255.255, which all processes of this machine receive. Several sockets may share the
+  /// port: each receives every datagram, its own included.
   [[nodiscard]] static Result<UdpSocket> open_broadcast(const std::string& interface,
                                                         std::uint16_t port);
 
   /// A socket bound to one numeric IPv4 or IPv6 address; port 0 lets the system choose.
   [[nodiscard]] static Result<UdpSocket> bind(const std::string& address, std::uint16_t port);
 
-  UdpSocket(UdpSocket&& other) noexcept;
-  UdpSocket& operator=(UdpSocket&& other) noexcept;
-  UdpSocket(const UdpSocket&) = delete;
-  UdpSocket& operator=(const UdpSocket&) = delete;
-  ~UdpSocket();
-
-  /// To everyone on the interface; only for sockets of open_broadcast. kBusy when it is congested:
-  /// lost, as any datagram may be. After other errors, open again.
+  /// Sends to all hosts on the interface; only for sockets of open_broadcast. kBusy: the interface
+  /// is congested and the datagram is lost. After other errors, open the socket again.
   [[nodiscard]] Result<void> broadcast(std::span<const std::uint8_t> bytes);
-  /// Never waits: what the system cannot take now is an Error, kBusy.
+  /// Never blocks. kBusy: the system cannot send now.
   [[nodiscard]] Result<void> send_to(std::span<const std::uint8_t> bytes, const Endpoint& to);
   /// The next datagram, or nothing within `timeout`.
   [[nodiscard]] Result<std::optional<Datagram>> receive(std::chrono::milliseconds timeout);
 
   /// The address this socket is bound to.
   [[nodiscard]] const Endpoint& local() const { return local_; }
-  /// For poll(2) over several sockets; remains owned by this object.
-  [[nodiscard]] int descriptor() const { return fd_; }
+  /// For poll(2); this object keeps ownership.
+  [[nodiscard]] int descriptor() const { return fd_.get(); }
 
  private:
   [[nodiscard]] static Result<UdpSocket> open(const Endpoint& address, std::string name,
                                               bool broadcast);
-  UdpSocket(int fd, std::string name) : fd_(fd), name_(std::move(name)) {}
+  UdpSocket(UniqueFd fd, std::string name) : fd_(std::move(fd)), name_(std::move(name)) {}
 
-  int fd_ = -1;
-  std::string name_;  ///< how errors call it
+  UniqueFd fd_;
+  std::string name_;  ///< in error messages
   Endpoint local_;
 };
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Manuals that cannot go stale: crepesd.yaml(5) from the reference configuration, crepesctl(1) from the tool's own help.
+"""Makes the manuals: crepesd.yaml(5) from the reference configuration, crepesctl(1) from the tool's own help.
     manual.py configuration crepesd.yaml >crepesd.yaml.5
     manual.py tool path/to/crepesctl >crepesctl.1"""
 import re
@@ -22,10 +22,10 @@ class Key:
 
 
 def keys_of(reference):
-    """Every key of the reference once, with what the comment above it says. Lists stand for their first item."""
+    """Every key of the reference once, with the comment above it. Of a list, the first item counts."""
     parents, about, seen = [], [], set()
     for line in reference.splitlines():
-        # An optional list is a comment itself; its items' keys are as deep as anyone's.
+        # An optional list is a comment itself; the keys of its items are as deep as any others.
         line = re.sub(r"^( *)# {3,5}(\S)", r"\1    \2", line)
         depth, text = len(line) - len(line.lstrip()), line.strip()
         key = re.fullmatch(r"(?:# )?([A-Za-z_]\w*):(?: (.*))?", text) if not text.startswith("# ") or text.endswith(":") else None
@@ -45,15 +45,15 @@ def keys_of(reference):
 def configuration(file):
     out = heading("crepesd.yaml", 5, "File formats")
     out += ["crepesd.yaml \\- configuration of crepesd", ".SH DESCRIPTION",
-            "YAML. Unknown keys are errors. A key may be left out, unless it is required; then its default holds.",
+            "YAML. Unknown keys are errors. A key may be omitted unless it is required; its default then applies.",
             "Numbers in brackets are bounds.", '"Live" sections change with', ".BR \"systemctl reload crepesd\" ;",
-            '"restart" ones when the daemon starts anew.', ".B crepesd \\-\\-check\\-config", "tells every fault of a file.", ".SH KEYS"]
+            '"restart" ones when the daemon starts again.', ".B crepesd \\-\\-check\\-config", "prints every fault of a file.", ".SH KEYS"]
     for key in keys_of(open(file).read()):
         if "." not in key.path:
             out += [f".SS {roff(key.path)}", roff(key.about)]
             continue
         out += [".TP", f".B {roff(key.path)}", roff(key.about) or "\\&"]
-        # A member of the swarm is an example.
+        # The members of the swarm are examples.
         if key.default is not None and "required" not in key.about and not key.path.startswith("swarm.members."):
             out += [".br", f"Default: {roff(key.default)}"]
     return out + [".SH SEE ALSO", ".BR crepesd (8),", ".BR crepesctl (1)"]
@@ -64,21 +64,21 @@ def commands_in(help):
 
 
 def tool(program):
-    def told(*arguments):
+    def help_of(*arguments):
         return subprocess.run([program, *arguments, "--help"], check=True, capture_output=True, text=True).stdout.strip().replace(program, "crepesctl")
 
     out = heading("crepesctl", 1, "User commands")
     out += ["crepesctl \\- watch, set up and replay robots that localize each other", ".SH SYNOPSIS", ".B crepesctl", ".I COMMAND",
             "[options]", ".SH DESCRIPTION", "The tool around", ".BR crepesd (8).", ".SH COMMANDS"]
-    commands = commands_in(told())
+    commands = commands_in(help_of())
     assert commands
     for command in commands:
-        out += [f".SS {roff(command)}", ".EX", roff(told(command)), ".EE"]
-        if "Subcommands:" in told(command):
-            for inner in commands_in(told(command)):
-                out += [f".SS {roff(command)} {roff(inner)}", ".EX", roff(told(command, inner)), ".EE"]
-    return out + [".SH EXIT STATUS", "0 done, 1 the input is wrong (what and where on stderr) or there was no answer, 2 wrong usage.",
-                  ".SH JSON", "With \\-\\-json, standard output has JSON objects, one a line, and nothing else. Progress, what is refused and",
+        out += [f".SS {roff(command)}", ".EX", roff(help_of(command)), ".EE"]
+        if "Subcommands:" in help_of(command):
+            for inner in commands_in(help_of(command)):
+                out += [f".SS {roff(command)} {roff(inner)}", ".EX", roff(help_of(command, inner)), ".EE"]
+    return out + [".SH EXIT STATUS", "0 done; 1 wrong input, or no answer (the reason is on stderr); 2 wrong usage.",
+                  ".SH JSON", "With \\-\\-json, standard output contains only JSON objects, one per line. Progress, refused input and",
                   "errors go to standard error.",
                   ".SH SEE ALSO", ".BR crepesd (8),", ".BR crepesd.yaml (5)"]
 

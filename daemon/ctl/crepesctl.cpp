@@ -1,4 +1,4 @@
-/// The tool around the daemon. What it can do is in commands/.
+/// The command-line tool of the project. The subcommands are in commands/.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -20,8 +20,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", std::string(kVersion));
   app.require_subcommand(1);
   app.footer(
-      "Exit codes: 0 done; 1 the input is wrong, or nobody answered (what and where on stderr);\n"
-      "2 wrong usage.");
+      "Exit codes: 0 done; 1 wrong input, or no answer (the reason is on stderr); 2 wrong usage.");
   CommandLine line(app);
   for (const auto add : kCommands) add(line);
   try {

@@ -3,13 +3,13 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "net/subscription/json_parts.hpp"
+
 namespace crepes {
 
 using Json = nlohmann::ordered_json;
 
-std::string json_line(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
-}
+std::string json_line(const Json& json) { return dump(json) + "\n"; }
 
 void put_finite(Json& object, const char* key, double value) {
   if (std::isfinite(value)) object[key] = value;

@@ -1,6 +1,5 @@
-/// What `--json` puts on standard output: objects, each in a line of its own, and nothing else.
-/// What goes on meanwhile and what is refused goes to standard error; so does an error, in words,
-/// and the exit code tells of it. For the files that write such lines alone.
+/// The output of `--json`: objects on standard output, one a line, and nothing else. Progress,
+/// refused input and error messages go to standard error; the exit code reports success.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -8,10 +7,10 @@
 
 namespace crepes {
 
-/// Never throws: what is not UTF-8, as a file's name may be, is mended.
+/// Never throws. Text that is not UTF-8, as a file name may be, is repaired.
 [[nodiscard]] std::string json_line(const nlohmann::ordered_json& json);
 
-/// Unknown values are left out.
+/// Adds `value` if it is finite.
 void put_finite(nlohmann::ordered_json& object, const char* key, double value);
 
 }  // namespace crepes

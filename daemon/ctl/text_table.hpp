@@ -1,4 +1,4 @@
-/// Columns that line up in a terminal.
+/// Tables with aligned columns, for a terminal.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace crepes {
 /// Rows of cells; the first row is the header. The first column is flush left, all others right.
 [[nodiscard]] std::string text_table(const std::vector<std::vector<std::string>>& rows);
 
-/// `value` with so many decimals; "-" if it is not finite.
+/// `value` with `decimals` decimals; "-" if it is not finite.
 [[nodiscard]] std::string fixed(double value, int decimals);
 
 }  // namespace crepes

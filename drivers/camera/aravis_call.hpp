@@ -1,7 +1,8 @@
-/// Aravis tells of failures through a GError; the project through a Result.
+/// Converts the GError of an Aravis call to a Result.
 #pragma once
 
 #include <arv.h>
+#include <fmt/format.h>
 
 #include <string>
 #include <type_traits>
@@ -11,23 +12,24 @@
 
 namespace crepes {
 
-/// `call(GError**)`, with the error as ours: "what: why".
+/// Returns the result of `call(GError**)`, or the error as "what: reason".
 template <class Call>
-auto attempt(const std::string& what, Call call) -> Result<std::invoke_result_t<Call, GError**>> {
+auto call_aravis(const std::string& what, Call call)
+    -> Result<std::invoke_result_t<Call, GError**>> {
   GError* error = nullptr;
-  const auto told = [&] {
+  const auto failed = [&] {
     const bool absent = g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_NOT_FOUND) != 0;
-    std::string why = what + ": " + error->message;
+    std::string why = fmt::format("{}: {}", what, error->message);
     g_error_free(error);
     return fail(absent ? ErrorCode::kNotFound : ErrorCode::kIo, std::move(why));
   };
   if constexpr (std::is_void_v<std::invoke_result_t<Call, GError**>>) {
     call(&error);
-    if (error != nullptr) return told();
+    if (error != nullptr) return failed();
     return {};
   } else {
     auto value = call(&error);
-    if (error != nullptr) return told();
+    if (error != nullptr) return failed();
     return value;
   }
 }

@@ -1,6 +1,7 @@
 #include "drivers/camera/aravis_camera.hpp"
 
 #include <arv.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,9 +18,9 @@ namespace crepes {
 namespace {
 
 constexpr double kMicroseconds = 1e6;
-constexpr int kBuffers =
-    12;  // what is on its way, at 200 Hz within kRetention, and what is looked at
-constexpr guint kRetention = 20'000;  // us that a frame waits for packets that were lost
+constexpr int kAravisBuffers =
+    12;  // frames in transfer, at 200 Hz within kRetention, and frames in use
+constexpr guint kRetention = 20'000;  // us that a frame waits for lost packets
 
 struct Unref {
   void operator()(gpointer object) const { g_object_unref(object); }
@@ -32,9 +33,9 @@ bool is_network_stream(ArvStream* stream) { return ARV_IS_GV_STREAM(stream) != 0
 std::string text(const char* maybe) { return maybe != nullptr ? maybe : ""; }
 
 std::string described(unsigned int i) {
-  return text(arv_get_device_vendor(i)) + " " + text(arv_get_device_model(i)) + ", serial number " +
-         text(arv_get_device_serial_nbr(i)) + ", " + text(arv_get_device_protocol(i)) + " at " +
-         text(arv_get_device_address(i));
+  return fmt::format("{} {}, serial number {}, {} at {}", text(arv_get_device_vendor(i)),
+                     text(arv_get_device_model(i)), text(arv_get_device_serial_nbr(i)),
+                     text(arv_get_device_protocol(i)), text(arv_get_device_address(i)));
 }
 
 Result<std::string> the_only_camera() {
@@ -43,37 +44,37 @@ Result<std::string> the_only_camera() {
   if (found.empty()) return fail(ErrorCode::kNotFound, "no USB3 Vision or GigE Vision camera");
   std::string names;
   for (const FoundCamera& camera : found) names += (names.empty() ? "" : ", ") + camera.device;
-  return fail(ErrorCode::kConfig, "several cameras: set device to one of " + names);
+  return fail(ErrorCode::kConfig, fmt::format("several cameras: set device to one of {}", names));
 }
 
-/// A camera that runs. It lives as long as one of its buffers is away.
-class Session {
+/// A running camera. It lives until all of its buffers have been returned.
+class AravisSession {
  public:
-  static Result<std::shared_ptr<Session>> open(const std::string& device,
-                                               const CameraConfig& config) {
-    return attempt(device, [&](GError** e) { return arv_camera_new(device.c_str(), e); })
-        .and_then([&](ArvCamera* opened) -> Result<std::shared_ptr<Session>> {
-          auto session = std::make_shared<Session>(opened);
-          return set_up_aravis(opened, config).and_then([&] { return session->start(); }).map([&] {
-            return session;
-          });
+  static Result<std::shared_ptr<AravisSession>> open(const std::string& device,
+                                                     const CameraConfig& config) {
+    return call_aravis(device, [&](GError** e) { return arv_camera_new(device.c_str(), e); })
+        .and_then([&](ArvCamera* opened) -> Result<std::shared_ptr<AravisSession>> {
+          auto session = std::make_shared<AravisSession>(opened);
+          return configure_aravis(opened, config)
+              .and_then([&] { return session->start(); })
+              .map([&] { return session; });
         });
   }
 
-  explicit Session(ArvCamera* opened) : camera_(opened) {
+  explicit AravisSession(ArvCamera* opened) : camera_(opened) {
     g_signal_connect(arv_camera_get_device(opened), "control-lost",
                      G_CALLBACK(+[](ArvDevice*, gpointer lost) {
                        g_atomic_int_set(static_cast<gint*>(lost), 1);
                      }),
                      &lost_);
   }
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
-  Session(Session&&) = delete;
-  Session& operator=(Session&&) = delete;
-  ~Session() {
+  AravisSession(const AravisSession&) = delete;
+  AravisSession& operator=(const AravisSession&) = delete;
+  AravisSession(AravisSession&&) = delete;
+  AravisSession& operator=(AravisSession&&) = delete;
+  ~AravisSession() {
     static_cast<void>(
-        attempt("", [&](GError** e) { arv_camera_stop_acquisition(camera_.get(), e); }));
+        call_aravis("", [&](GError** e) { arv_camera_stop_acquisition(camera_.get(), e); }));
     stream_.reset();
     g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera_.get()), &lost_);
   }
@@ -84,24 +85,25 @@ class Session {
 
  private:
   Result<void> start() {
-    const Result<guint> payload = attempt(
+    const Result<guint> payload = call_aravis(
         "payload size", [&](GError** e) { return arv_camera_get_payload(camera_.get(), e); });
     if (!payload) return tl::unexpected(payload.error());
-    const auto made = attempt("stream", [&](GError** e) {
+    const auto made = call_aravis("stream", [&](GError** e) {
       return arv_camera_create_stream(camera_.get(), nullptr, nullptr, e);
     });
     if (!made) return tl::unexpected(made.error());
     stream_.reset(*made);
     if (is_network_stream(stream_.get())) {
-      // The kernel's default holds a tenth of a picture: packets would be lost. It cuts what it
-      // does not allow, see net.core.rmem_max.
+      // The kernel's default holds a tenth of an image: packets would be lost. The kernel limits
+      // the size to net.core.rmem_max.
       const auto three_frames = static_cast<gint>(std::min<guint>(3 * *payload, 1U << 30U));
       g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED,
                    "socket-buffer-size", three_frames, "frame-retention", kRetention, nullptr);
     }
-    for (int i = 0; i < kBuffers; ++i)
+    for (int i = 0; i < kAravisBuffers; ++i)
       arv_stream_push_buffer(stream_.get(), arv_buffer_new(*payload, nullptr));
-    return attempt("start", [&](GError** e) { arv_camera_start_acquisition(camera_.get(), e); });
+    return call_aravis("start",
+                       [&](GError** e) { arv_camera_start_acquisition(camera_.get(), e); });
   }
 
   Object<ArvCamera> camera_;
@@ -111,17 +113,17 @@ class Session {
 
 class AravisCamera final : public Camera {
  public:
-  AravisCamera(std::shared_ptr<Session> session, std::string device, const CameraConfig& config,
-               std::uint8_t index, const Clock& clock)
+  AravisCamera(std::shared_ptr<AravisSession> session, std::string device,
+               const CameraConfig& config, std::uint8_t index, const Clock& clock)
       : session_(std::move(session)),
         device_(std::move(device)),
         index_(index),
         clock_(clock),
-        latency_(from_seconds(config.latency_ms * 1e-3)) {
-    const double exposure_us = attempt("", [&](GError** e) {
+        latency_(from_seconds(config.device.latency_ms * 1e-3)) {
+    const double exposure_us = call_aravis("", [&](GError** e) {
                                  return arv_camera_get_exposure_time(session_->camera(), e);
                                }).value_or(0.0);
-    is_exposure_long_ = exposure_us * config.rate_hz > kMicroseconds;
+    is_exposure_long_ = exposure_us * config.calibration.rate_hz > kMicroseconds;
   }
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override {
@@ -140,8 +142,9 @@ class AravisCamera final : public Camera {
       }
       newest = buffer;
     }
-    if (newest != nullptr) return lend(newest);
-    if (session_->is_lost()) return fail(ErrorCode::kIo, device_ + ": the camera is gone");
+    if (newest != nullptr) return borrow(newest);
+    if (session_->is_lost())
+      return fail(ErrorCode::kIo, fmt::format("{}: the camera is gone", device_));
     return std::optional<Frame>{};
   }
 
@@ -165,9 +168,10 @@ class AravisCamera final : public Camera {
     constexpr double kTooMany = 0.05;
     if (is_exposure_long_) return "the exposure is longer than a frame at rate_hz: set exposure_us";
     if (incomplete_share_ < kTooMany) return std::nullopt;
-    return "one frame in " + std::to_string(std::lround(1.0 / incomplete_share_)) +
-           " comes incomplete: packets get lost; use jumbo frames and packet_size 9000, raise "
-           "net.core.rmem_max, or mend the cable";
+    return fmt::format(
+        "one frame in {} comes incomplete: packets get lost; use jumbo frames and packet_size "
+        "9000, raise net.core.rmem_max, or mend the cable",
+        std::lround(1.0 / incomplete_share_));
   }
 
  private:
@@ -176,12 +180,12 @@ class AravisCamera final : public Camera {
     const bool complete = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
     incomplete_share_ += kMemory * ((complete ? 0.0 : 1.0) - incomplete_share_);
     if (!complete) ++incomplete_;
-    sequence_.note(arv_buffer_get_frame_id(buffer));
+    sequence_.add(arv_buffer_get_frame_id(buffer));
     return complete;
   }
 
-  /// The buffer goes back to the stream when the frame ends.
-  [[nodiscard]] Result<std::optional<Frame>> lend(ArvBuffer* buffer) {
+  /// The frame's destructor returns the buffer to the stream.
+  [[nodiscard]] Result<std::optional<Frame>> borrow(ArvBuffer* buffer) {
     const Timestamp arrival = clock_.now();
     std::size_t size = 0;
     const void* data = arv_buffer_get_image_data(buffer, &size);
@@ -194,21 +198,24 @@ class AravisCamera final : public Camera {
     arv_buffer_get_image_padding(buffer, &padding, &ignored);
     frame.width = arv_buffer_get_image_width(buffer);
     frame.height = arv_buffer_get_image_height(buffer);
-    frame.lent_stride = std::ptrdiff_t{frame.width} + padding;
-    frame.lent = LentPixels(static_cast<const std::uint8_t*>(data),
-                            [session = session_, buffer](const std::uint8_t*) {
-                              arv_stream_push_buffer(session->stream(), buffer);
-                            });
+    frame.borrowed_stride = std::ptrdiff_t{frame.width} + padding;
+    frame.borrowed = BorrowedPixels(static_cast<const std::uint8_t*>(data),
+                                    [session = session_, buffer](const std::uint8_t*) {
+                                      arv_stream_push_buffer(session->stream(), buffer);
+                                    });
     if (const ArvPixelFormat format = arv_buffer_get_image_pixel_format(buffer);
-        format != ARV_PIXEL_FORMAT_MONO_8)
-      return fail(ErrorCode::kFormat, device_ + ": frames in another pixel format than Mono8");
-    if (static_cast<std::size_t>(frame.lent_stride) * static_cast<std::size_t>(frame.height) > size)
-      return fail(ErrorCode::kFormat, device_ + ": frames shorter than they claim");
+        format != ARV_PIXEL_FORMAT_MONO_8) {
+      return fail(ErrorCode::kFormat,
+                  fmt::format("{}: frames in another pixel format than Mono8", device_));
+    }
+    if (static_cast<std::size_t>(frame.borrowed_stride) * static_cast<std::size_t>(frame.height) >
+        size)
+      return fail(ErrorCode::kFormat, fmt::format("{}: frames shorter than they claim", device_));
     ++frames_;
     return std::optional(std::move(frame));
   }
 
-  std::shared_ptr<Session> session_;
+  std::shared_ptr<AravisSession> session_;
   std::string device_;
   std::uint8_t index_;
   const Clock& clock_;
@@ -226,9 +233,10 @@ class AravisCamera final : public Camera {
 
 Result<std::unique_ptr<Camera>> open_aravis_camera(const CameraConfig& config, std::uint8_t index,
                                                    const Clock& clock) {
-  const Result<std::string> device = config.device.empty() ? the_only_camera() : config.device;
+  const Result<std::string> device =
+      config.device.id.empty() ? the_only_camera() : config.device.id;
   if (!device) return tl::unexpected(device.error());
-  Result<std::shared_ptr<Session>> session = Session::open(*device, config);
+  Result<std::shared_ptr<AravisSession>> session = AravisSession::open(*device, config);
   if (!session) return tl::unexpected(session.error());
   return std::make_unique<AravisCamera>(std::move(*session), *device, config, index, clock);
 }

@@ -5,19 +5,19 @@
 #include <vector>
 
 #include "drivers/camera/camera.hpp"
+#include "drivers/camera/camera_config.hpp"
 #include "estimator/core/clock.hpp"
-#include "estimator/core/config.hpp"
 
 namespace crepes {
 
-/// Opens the camera that `config.device` names, sets it up and lets it run. May take some seconds,
-/// as may closing it when it is gone. Its frames lie where the driver received them. `clock` must
-/// outlive it.
+/// Opens the camera `config.device.id`, configures it and starts the stream. This may need several
+/// seconds, as may closing a camera that is gone. Frames remain in the driver's buffers. `clock`
+/// must outlive the camera.
 [[nodiscard]] Result<std::unique_ptr<Camera>> open_aravis_camera(const CameraConfig& config,
                                                                  std::uint8_t index,
                                                                  const Clock& clock);
 
-/// Asks USB and network; takes a second.
+/// Queries USB and network; needs a second.
 [[nodiscard]] std::vector<FoundCamera> find_aravis_cameras();
 
 }  // namespace crepes

@@ -1,5 +1,7 @@
 #include "drivers/camera/aravis_settings.hpp"
 
+#include <fmt/format.h>
+
 #include <string>
 
 #include "drivers/camera/aravis_call.hpp"
@@ -7,14 +9,14 @@
 namespace crepes {
 namespace {
 
-/// Whether the camera has a feature; one that cannot say so has not.
+/// Whether the camera has a feature; false if the query fails.
 template <class Ask>
 bool has(Ask ask, ArvCamera* camera) {
-  return attempt("", [&](GError** e) { return ask(camera, e); }).value_or(0) != 0;
+  return call_aravis("", [&](GError** e) { return ask(camera, e); }).value_or(0) != 0;
 }
 
 Result<void> set_pixel_format(ArvCamera* camera) {
-  return attempt(
+  return call_aravis(
              "pixel format Mono8",
              [&](GError** e) { arv_camera_set_pixel_format(camera, ARV_PIXEL_FORMAT_MONO_8, e); })
       .map_error([&](Error error) {
@@ -22,22 +24,21 @@ Result<void> set_pixel_format(ArvCamera* camera) {
         const char** names =
             arv_camera_dup_available_pixel_formats_as_strings(camera, &count, nullptr);
         error.message += "; the camera offers";
-        for (guint i = 0; i < count; ++i) error.message += std::string(" ") + names[i];
+        for (guint i = 0; i < count; ++i) error.message += fmt::format(" {}", names[i]);
         g_free(names);
         return error;
       });
 }
 
 Result<void> set_region(ArvCamera* camera, const CameraConfig& config) {
-  const int width = config.resolution[0];
-  const int height = config.resolution[1];
-  const int x = config.offset[0];
-  const int y = config.offset[1];
+  const int width = config.calibration.resolution[0];
+  const int height = config.calibration.resolution[1];
+  const int x = config.device.offset[0];
+  const int y = config.device.offset[1];
   const auto described_as = [](int a, int b, int c, int d) {
-    return "[" + std::to_string(a) + ", " + std::to_string(b) + "] at offset [" +
-           std::to_string(c) + ", " + std::to_string(d) + "]";
+    return fmt::format("[{}, {}] at offset [{}, {}]", a, b, c, d);
   };
-  const std::string wanted = "resolution " + described_as(width, height, x, y);
+  const std::string wanted = fmt::format("resolution {}", described_as(width, height, x, y));
   int sensor_width = 0;
   int sensor_height = 0;
   int is_width = 0;
@@ -50,43 +51,45 @@ Result<void> set_region(ArvCamera* camera, const CameraConfig& config) {
       arv_camera_set_region(camera, x, y, width, height, e);
     if (*e == nullptr) arv_camera_get_region(camera, &is_x, &is_y, &is_width, &is_height, e);
   };
-  if (Result<void> applied = attempt(wanted, apply); !applied) return applied;
+  if (Result<void> applied = call_aravis(wanted, apply); !applied) return applied;
   if (is_x == x && is_y == y && is_width == width && is_height == height) return {};
-  return fail(ErrorCode::kConfig, wanted + ": the camera, of " + std::to_string(sensor_width) +
-                                      " x " + std::to_string(sensor_height) + " pixels, delivers " +
-                                      described_as(is_width, is_height, is_x, is_y));
+  return fail(ErrorCode::kConfig,
+              fmt::format("{}: the camera, of {} x {} pixels, delivers {}", wanted, sensor_width,
+                          sensor_height, described_as(is_width, is_height, is_x, is_y)));
 }
 
 Result<void> set_trigger(ArvCamera* camera, const CameraConfig& config) {
-  if (config.trigger == CameraTrigger::kHardware) {
-    return attempt("trigger_source " + config.trigger_source, [&](GError** e) {
-      arv_camera_set_trigger(camera, config.trigger_source.c_str(), e);
-    });
+  if (config.device.trigger == CameraTrigger::kHardware) {
+    return call_aravis(fmt::format("trigger_source {}", config.device.trigger_source),
+                       [&](GError** e) {
+                         arv_camera_set_trigger(camera, config.device.trigger_source.c_str(), e);
+                       });
   }
   static_cast<void>(
-      attempt("", [&](GError** e) { arv_camera_clear_triggers(camera, e); }));  // may have none
-  return attempt("rate_hz",
-                 [&](GError** e) { arv_camera_set_frame_rate(camera, config.rate_hz, e); });
-}
-
-Result<void> set_light(ArvCamera* camera, const CameraConfig& config) {
-  if (config.exposure_us) {
-    const auto set = [&](GError** e) {
-      if (has(arv_camera_is_exposure_auto_available, camera))
-        arv_camera_set_exposure_time_auto(camera, ARV_AUTO_OFF, e);
-      if (*e == nullptr) arv_camera_set_exposure_time(camera, *config.exposure_us, e);
-    };
-    if (Result<void> done = attempt("exposure_us", set); !done) return done;
-  }
-  if (!config.gain) return {};
-  return attempt("gain", [&](GError** e) {
-    if (has(arv_camera_is_gain_auto_available, camera))
-      arv_camera_set_gain_auto(camera, ARV_AUTO_OFF, e);
-    if (*e == nullptr) arv_camera_set_gain(camera, *config.gain, e);
+      call_aravis("", [&](GError** e) { arv_camera_clear_triggers(camera, e); }));  // may have none
+  return call_aravis("rate_hz", [&](GError** e) {
+    arv_camera_set_frame_rate(camera, config.calibration.rate_hz, e);
   });
 }
 
-/// What a packet socket would miss: it hears nothing on loopback.
+Result<void> set_light(ArvCamera* camera, const CameraConfig& config) {
+  if (config.device.exposure_us) {
+    const auto set = [&](GError** e) {
+      if (has(arv_camera_is_exposure_auto_available, camera))
+        arv_camera_set_exposure_time_auto(camera, ARV_AUTO_OFF, e);
+      if (*e == nullptr) arv_camera_set_exposure_time(camera, *config.device.exposure_us, e);
+    };
+    if (Result<void> done = call_aravis("exposure_us", set); !done) return done;
+  }
+  if (!config.device.gain) return {};
+  return call_aravis("gain", [&](GError** e) {
+    if (has(arv_camera_is_gain_auto_available, camera))
+      arv_camera_set_gain_auto(camera, ARV_AUTO_OFF, e);
+    if (*e == nullptr) arv_camera_set_gain(camera, *config.device.gain, e);
+  });
+}
+
+/// Whether the camera is on loopback, where a packet socket receives nothing.
 bool is_loopback(ArvCamera* camera) {
   GSocketAddress* address =
       arv_gv_device_get_device_address(ARV_GV_DEVICE(arv_camera_get_device(camera)));
@@ -100,25 +103,25 @@ Result<void> set_packets(ArvCamera* camera, int packet_size) {
     arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   if (packet_size == 0) return {};
   arv_camera_gv_set_packet_size_adjustment(camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
-  return attempt("packet_size",
-                 [&](GError** e) { arv_camera_gv_set_packet_size(camera, packet_size, e); });
+  return call_aravis("packet_size",
+                     [&](GError** e) { arv_camera_gv_set_packet_size(camera, packet_size, e); });
 }
 
 }  // namespace
 
-Result<void> set_up_aravis(ArvCamera* camera, const CameraConfig& config) {
-  // A program that crashed may have left it running.
-  static_cast<void>(attempt("", [&](GError** e) { arv_camera_stop_acquisition(camera, e); }));
+Result<void> configure_aravis(ArvCamera* camera, const CameraConfig& config) {
+  // A program that crashed may have left the stream running.
+  static_cast<void>(call_aravis("", [&](GError** e) { arv_camera_stop_acquisition(camera, e); }));
   return set_pixel_format(camera)
       .and_then([&] { return set_region(camera, config); })
       .and_then([&] {
-        return attempt("acquisition mode", [&](GError** e) {
+        return call_aravis("acquisition mode", [&](GError** e) {
           arv_camera_set_acquisition_mode(camera, ARV_ACQUISITION_MODE_CONTINUOUS, e);
         });
       })
       .and_then([&] { return set_trigger(camera, config); })
       .and_then([&] { return set_light(camera, config); })
-      .and_then([&] { return set_packets(camera, config.packet_size); });
+      .and_then([&] { return set_packets(camera, config.device.packet_size); });
 }
 
 }  // namespace crepes

@@ -1,4 +1,4 @@
-/// Frames that are not what a camera was set to deliver, and a camera that repeats itself.
+/// Detects frames with a wrong resolution or rate, and a camera that repeats its images.
 #pragma once
 
 #include <cstdint>
@@ -7,25 +7,25 @@
 #include <vector>
 
 #include "drivers/camera/camera.hpp"
-#include "estimator/core/config.hpp"
+#include "drivers/camera/camera_config.hpp"
 
 namespace crepes {
 
-/// Looks at every frame in order. Pure.
+/// Receives every frame in order. Pure.
 class FrameHealth {
  public:
   explicit FrameHealth(const CameraConfig& config);
 
-  /// An error where the camera must be opened anew: another resolution, or the same picture for a
+  /// An error if the camera must be opened again: another resolution, or the same image for a
   /// second.
   [[nodiscard]] Result<void> check(const Frame& frame);
 
-  /// One sentence on what is wrong with a stream that can be used, if anything.
+  /// One sentence on what is wrong with a usable stream, if anything.
   [[nodiscard]] std::optional<std::string> diagnosis() const;
 
  private:
   [[nodiscard]] bool repeats_the_last(const Frame& frame);
-  void note_gap(Duration gap);
+  void record_interval(Duration gap);
 
   std::array<int, 2> resolution_;
   double rate_hz_;
@@ -36,8 +36,8 @@ class FrameHealth {
   std::uint64_t gaps_ = 0;
 
   Timestamp unchanged_since_{};
-  std::vector<std::uint8_t> some_rows_;  ///< of the last picture
-  std::vector<std::uint8_t> all_rows_;   ///< of the last picture, if its some_rows_ repeated
+  std::vector<std::uint8_t> some_rows_;  ///< of the last image
+  std::vector<std::uint8_t> all_rows_;   ///< of the last image, if its some_rows_ repeated
 };
 
 }  // namespace crepes

@@ -1,4 +1,4 @@
-/// Frames that are missing, told by the numbers of those that came.
+/// Counts missing frames by the sequence numbers of the received ones.
 #pragma once
 
 #include <cstdint>
@@ -6,12 +6,12 @@
 
 namespace crepes {
 
-/// Counts what is missing between frames that their device numbers one by one. A number that goes
-/// back, or leaps far ahead, is a counter that wrapped or began anew: nothing is missing then that
-/// could be told, but for GigE Vision's 16 bit, which wrap to 1. Pure.
+/// The device numbers its frames consecutively. A number that decreases or jumps far ahead means
+/// that the counter wrapped or restarted; missing frames are then unknown. The exception is the
+/// 16-bit counter of GigE Vision, which wraps to 1. Pure.
 class FrameSequence {
  public:
-  void note(std::uint64_t number) {
+  void add(std::uint64_t number) {
     constexpr std::uint64_t kLast16Bit = 0xffff;
     constexpr std::uint64_t kFurthest = 1000;
     if (last_) {

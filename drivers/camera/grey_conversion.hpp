@@ -1,4 +1,4 @@
-/// Grey levels of more than 8 bits to such of 8.
+/// Conversion of grey levels to 8 bits.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +8,9 @@
 
 namespace crepes {
 
-/// Writes the upper 8 of `bits` significant bits of each little-endian 16-bit level to `grey`, row
-/// by row without gaps. `rows` must hold `height` rows of `stride` bytes; the last may end with
-/// its last level.
+/// Writes the upper 8 of the `bits` significant bits of each little-endian 16-bit level to `grey`,
+/// row by row without padding. `rows` must hold `height` rows of `stride` bytes; the last row needs
+/// no padding.
 inline void narrow_to_8_bits(std::span<const std::uint8_t> rows, int width, int height,
                              std::size_t stride, int bits, std::vector<std::uint8_t>& grey) {
   const auto columns = static_cast<std::size_t>(width);
@@ -22,7 +22,7 @@ inline void narrow_to_8_bits(std::span<const std::uint8_t> rows, int width, int 
     std::uint8_t* out = &grey[y * columns];
     for (std::size_t x = 0; x < columns; ++x) {
       const int level = in[2 * x] | in[2 * x + 1] << 8;
-      // What is above white is noise in bits that should be zero.
+      // A level above white has noise in bits that should be zero.
       out[x] = static_cast<std::uint8_t>((level < white ? level : white) >> shift);
     }
   }

@@ -1,14 +1,16 @@
 #include "drivers/camera/image_folder.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <opencv2/core/mat.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 #include <utility>
 
-#include "drivers/sleep.hpp"
+#include "drivers/base/number_text.hpp"
+#include "drivers/base/sleep.hpp"
 
 namespace crepes {
 namespace {
@@ -19,10 +21,8 @@ std::optional<std::pair<Timestamp, std::string>> parse_row(std::string_view row)
   const std::size_t comma = row.find(',');
   if (comma == std::string_view::npos) return std::nullopt;
   std::int64_t ns = 0;
-  const char* const end = row.data() + comma;
-  const auto [stop, status] = std::from_chars(row.data(), end, ns);
   const std::string_view name = row.substr(comma + 1);
-  if (status != std::errc{} || stop != end || name.empty() ||
+  if (!parse_number(row.substr(0, comma), ns).empty() || name.empty() ||
       name.find(',') != std::string_view::npos) {
     return std::nullopt;
   }
@@ -34,12 +34,13 @@ std::optional<std::pair<Timestamp, std::string>> parse_row(std::string_view row)
 Result<Frame> read_gray_image(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) {
-    return fail(ErrorCode::kNotFound, file.string() + ": no such picture");
+    return fail(ErrorCode::kNotFound, fmt::format("{}: no such picture", file.string()));
   }
   try {
     const cv::Mat image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
     if (image.empty()) {
-      return fail(ErrorCode::kFormat, file.string() + ": not a picture that can be read");
+      return fail(ErrorCode::kFormat,
+                  fmt::format("{}: not a picture that can be read", file.string()));
     }
     Frame frame{.width = image.cols, .height = image.rows, .pixels = {}};
     frame.pixels.reserve(image.total());
@@ -48,30 +49,32 @@ Result<Frame> read_gray_image(const std::filesystem::path& file) {
     }
     return frame;
   } catch (const cv::Exception& e) {
-    return fail(ErrorCode::kFormat, file.string() + ": " + e.what());
+    return fail(ErrorCode::kFormat, fmt::format("{}: {}", file.string(), e.what()));
   }
 }
 
 Result<std::vector<RecordedPicture>> read_picture_list(const std::filesystem::path& csv,
                                                        const std::filesystem::path& pictures) {
   std::ifstream in(csv);
-  if (!in) return fail(ErrorCode::kNotFound, csv.string() + ": cannot be read");
+  if (!in) return fail(ErrorCode::kNotFound, fmt::format("{}: cannot be read", csv.string()));
   std::vector<RecordedPicture> list;
   std::string row;
   for (int line = 1; std::getline(in, row); ++line) {
     if (row.starts_with('#')) continue;
     const auto refuse = [&](const std::string& why) {
-      return fail(ErrorCode::kFormat, csv.string() + ":" + std::to_string(line) + ": " + why);
+      return fail(ErrorCode::kFormat, fmt::format("{}:{}: {}", csv.string(), line, why));
     };
     const auto parsed = parse_row(row);
     if (!parsed) return refuse("expected `t_ns,file name`");
     if (!list.empty() && parsed->first <= list.back().stamp) return refuse("time goes back");
     std::filesystem::path file = pictures / parsed->second;
     std::error_code ignored;
-    if (!std::filesystem::exists(file, ignored)) return refuse(file.string() + " is missing");
+    if (!std::filesystem::exists(file, ignored))
+      return refuse(fmt::format("{} is missing", file.string()));
     list.push_back({parsed->first, std::move(file)});
   }
-  if (list.empty()) return fail(ErrorCode::kFormat, csv.string() + ": names no pictures");
+  if (list.empty())
+    return fail(ErrorCode::kFormat, fmt::format("{}: names no pictures", csv.string()));
   return list;
 }
 
@@ -87,7 +90,7 @@ Result<std::unique_ptr<Camera>> FolderCamera::open(const std::filesystem::path& 
 Result<std::optional<Frame>> FolderCamera::read_once(std::chrono::milliseconds timeout) {
   if (next_ == pictures_.size()) {
     return fail(ErrorCode::kNotFound,
-                pictures_.back().file.parent_path().string() + ": no more pictures");
+                fmt::format("{}: no more pictures", pictures_.back().file.parent_path().string()));
   }
   const RecordedPicture& picture = pictures_[next_];
   const Timestamp due = begin_ + (picture.stamp - pictures_.front().stamp);

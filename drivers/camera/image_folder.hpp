@@ -1,4 +1,4 @@
-/// Recorded pictures.
+/// Recorded images in a folder.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace crepes {
 
-/// The picture in a file, in grey and without a stamp. Errors name the file.
+/// The image in a file, in grey and without a stamp. Errors name the file.
 [[nodiscard]] Result<Frame> read_gray_image(const std::filesystem::path& file);
 
 struct RecordedPicture {
@@ -19,15 +19,15 @@ struct RecordedPicture {
   std::filesystem::path file;
 };
 
-/// What a list of pictures names: rows `t_ns,file name` after a `#` header,
-/// the files in `pictures`. Refuses rows that do not parse, stamps that go back and missing files.
+/// Reads a list of images: rows `t_ns,file name` after a `#` header; the files are in `pictures`.
+/// Refuses rows that do not parse, stamps that decrease and missing files.
 [[nodiscard]] Result<std::vector<RecordedPicture>> read_picture_list(
     const std::filesystem::path& csv, const std::filesystem::path& pictures);
 
-/// Shows a folder's pictures once, at their recorded pace, as if they were taken now.
+/// Plays the images of a folder once, at their recorded rate, as if they were taken now.
 class FolderCamera final : public Camera {
  public:
-  /// `folder` holds the pictures; data.csv stands beside it. `clock` must outlive this.
+  /// `folder` holds the images; data.csv is beside it. `clock` must outlive this.
   [[nodiscard]] static Result<std::unique_ptr<Camera>> open(const std::filesystem::path& folder,
                                                             std::uint8_t camera,
                                                             const Clock& clock);
@@ -42,7 +42,7 @@ class FolderCamera final : public Camera {
   std::vector<RecordedPicture> pictures_;
   std::uint8_t camera_;
   const Clock& clock_;
-  Timestamp begin_;  ///< when the first picture is due
+  Timestamp begin_;  ///< when the first image is due
   std::size_t next_ = 0;
 };
 

@@ -1,5 +1,7 @@
 #include "drivers/camera/mindvision_camera.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string_view>
@@ -18,7 +20,7 @@ constexpr int kHardwareTrigger = 2;
 
 Result<void> check(int code, const std::string& what) {
   if (code == 0) return {};
-  return fail(ErrorCode::kIo, what + ": the library's error " + std::to_string(code));
+  return fail(ErrorCode::kIo, fmt::format("{}: the library's error {}", what, code));
 }
 
 std::string serial_of(const MindVisionDevice& device) {
@@ -26,7 +28,7 @@ std::string serial_of(const MindVisionDevice& device) {
   return {text.begin(), std::find(text.begin(), text.end(), '\0')};
 }
 
-/// The camera that is asked for among those that are plugged in.
+/// The requested camera among the connected ones.
 Result<MindVisionDevice> find_device(const MindVisionLibrary& library, const std::string& serial) {
   std::vector<MindVisionDevice> devices(16);
   auto count = static_cast<int>(devices.size());
@@ -42,30 +44,32 @@ Result<MindVisionDevice> find_device(const MindVisionLibrary& library, const std
   if (found != devices.end() && !serial.empty()) return *found;
   std::string names;
   for (const auto& device : devices) names += (names.empty() ? "" : ", ") + serial_of(device);
-  return serial.empty()
-             ? fail(ErrorCode::kConfig, "several cameras: set device to one of " + names)
-             : fail(ErrorCode::kNotFound, serial + ": no such camera; there is " + names);
+  return serial.empty() ? fail(ErrorCode::kConfig,
+                               fmt::format("several cameras: set device to one of {}", names))
+                        : fail(ErrorCode::kNotFound,
+                               fmt::format("{}: no such camera; there is {}", serial, names));
 }
 
-/// A camera that runs. It lives as long as one of its buffers is away.
-class Session {
+/// A running camera. It lives until all of its buffers have been returned.
+class MindVisionSession {
  public:
-  Session(const MindVisionLibrary& library, int handle) : library_(library), handle_(handle) {}
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
-  Session(Session&&) = delete;
-  Session& operator=(Session&&) = delete;
-  ~Session() { library_.close(handle_); }
+  MindVisionSession(const MindVisionLibrary& library, int handle)
+      : library_(library), handle_(handle) {}
+  MindVisionSession(const MindVisionSession&) = delete;
+  MindVisionSession& operator=(const MindVisionSession&) = delete;
+  MindVisionSession(MindVisionSession&&) = delete;
+  MindVisionSession& operator=(MindVisionSession&&) = delete;
+  ~MindVisionSession() { library_.close(handle_); }
 
-  static Result<std::shared_ptr<Session>> open(const MindVisionLibrary& library,
-                                               MindVisionDevice device,
-                                               const CameraConfig& config) {
+  static Result<std::shared_ptr<MindVisionSession>> open(const MindVisionLibrary& library,
+                                                         MindVisionDevice device,
+                                                         const CameraConfig& config) {
     int handle = 0;
-    if (Result<void> done =
-            check(library.open(&device, kAsItIs, kAsItIs, &handle), "camera " + serial_of(device));
+    if (Result<void> done = check(library.open(&device, kAsItIs, kAsItIs, &handle),
+                                  fmt::format("camera {}", serial_of(device)));
         !done)
       return tl::unexpected(done.error());
-    auto session = std::make_shared<Session>(library, handle);
+    auto session = std::make_shared<MindVisionSession>(library, handle);
     return session->set_up(config).map([&] { return session; });
   }
 
@@ -76,18 +80,19 @@ class Session {
 
  private:
   [[nodiscard]] Result<void> set_up(const CameraConfig& config) const {
-    const bool free = config.trigger == CameraTrigger::kFree;
+    const bool free = config.device.trigger == CameraTrigger::kFree;
     return check(library_.set_trigger_mode(handle_, free ? kFreeRunning : kHardwareTrigger),
                  "trigger")
         .and_then([&]() -> Result<void> {
           if (!free) return {};
-          const auto rate_hz = static_cast<int>(std::lround(config.rate_hz));
+          const auto rate_hz = static_cast<int>(std::lround(config.calibration.rate_hz));
           return check(library_.set_frame_rate(handle_, rate_hz), "rate_hz");
         })
         .and_then([&]() -> Result<void> {
-          if (!config.exposure_us) return {};
+          if (!config.device.exposure_us) return {};
           return check(library_.set_auto_exposure(handle_, 0), "exposure_us").and_then([&] {
-            return check(library_.set_exposure_us(handle_, *config.exposure_us), "exposure_us");
+            return check(library_.set_exposure_us(handle_, *config.device.exposure_us),
+                         "exposure_us");
           });
         })
         .and_then([&] { return check(library_.play(handle_), "start"); });
@@ -99,13 +104,13 @@ class Session {
 
 class MindVisionCamera final : public Camera {
  public:
-  MindVisionCamera(std::shared_ptr<Session> session, const CameraConfig& config, std::uint8_t index,
-                   const Clock& clock)
+  MindVisionCamera(std::shared_ptr<MindVisionSession> session, const CameraConfig& config,
+                   std::uint8_t index, const Clock& clock)
       : session_(std::move(session)),
         index_(index),
         clock_(clock),
-        latency_(from_seconds(config.latency_ms * 1e-3)),
-        period_us_(1e6 / config.rate_hz) {}
+        latency_(from_seconds(config.device.latency_ms * 1e-3)),
+        period_us_(1e6 / config.calibration.rate_hz) {}
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override {
     std::optional<Frame> newest;
@@ -141,14 +146,13 @@ class MindVisionCamera final : public Camera {
     if (Result<void> read = check(code, "the camera is gone"); !read)
       return tl::unexpected(read.error());
     Frame frame{.camera = index_, .width = head.width, .height = head.height};
-    frame.lent = LentPixels(pixels, [session = session_, pixels](const std::uint8_t*) {
+    frame.borrowed = BorrowedPixels(pixels, [session = session_, pixels](const std::uint8_t*) {
       session->release_frame(pixels);
     });
-    frame.lent_stride = head.width;
+    frame.borrowed_stride = head.width;
     if (head.media_type != MindVisionLibrary::kMono8) {
-      return fail(ErrorCode::kFormat, "frames of media type " + std::to_string(head.media_type) +
-                                          " instead of MONO8, " +
-                                          std::to_string(MindVisionLibrary::kMono8));
+      return fail(ErrorCode::kFormat, fmt::format("frames of media type {} instead of MONO8, {}",
+                                                  head.media_type, MindVisionLibrary::kMono8));
     }
     if (head.width <= 0 || head.height <= 0 ||
         std::int64_t{head.width} * head.height > std::int64_t{head.bytes})
@@ -162,7 +166,7 @@ class MindVisionCamera final : public Camera {
     return std::optional(std::move(frame));
   }
 
-  std::shared_ptr<Session> session_;
+  std::shared_ptr<MindVisionSession> session_;
   std::uint8_t index_;
   const Clock& clock_;
   Duration latency_;
@@ -178,13 +182,13 @@ class MindVisionCamera final : public Camera {
 
 Result<std::unique_ptr<Camera>> open_mindvision_camera(const CameraConfig& config,
                                                        std::uint8_t index, const Clock& clock) {
-  const Result<MindVisionLibrary> library = MindVisionLibrary::load(config.library);
+  const Result<MindVisionLibrary> library = MindVisionLibrary::load(config.device.library);
   if (!library) return tl::unexpected(library.error());
-  Result<std::shared_ptr<Session>> session =
+  Result<std::shared_ptr<MindVisionSession>> session =
       check(library->init(kEnglish), "CameraSdkInit")
-          .and_then([&] { return find_device(*library, config.device); })
+          .and_then([&] { return find_device(*library, config.device.id); })
           .and_then([&](const MindVisionDevice& device) {
-            return Session::open(*library, device, config);
+            return MindVisionSession::open(*library, device, config);
           });
   if (!session) return tl::unexpected(session.error());
   return std::make_unique<MindVisionCamera>(std::move(*session), config, index, clock);

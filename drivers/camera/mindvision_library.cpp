@@ -1,11 +1,12 @@
 #include "drivers/camera/mindvision_library.hpp"
 
 #include <dlfcn.h>
+#include <fmt/format.h>
 
 namespace crepes {
 namespace {
 
-/// Looks functions up until one is not there.
+/// Looks up functions until one is missing.
 class Symbols {
  public:
   explicit Symbols(void* library) : library_(library) {}
@@ -14,7 +15,7 @@ class Symbols {
   void find(const char* name, Function*& function) {
     void* const found = ::dlsym(library_, name);
     if (found == nullptr && missing_.empty()) missing_ = name;
-    // POSIX: dlsym's answer is a function where a function was asked for.
+    // POSIX guarantees that the result of dlsym can be converted to a function pointer.
     function = reinterpret_cast<Function*>(found);  // NOLINT(*-reinterpret-cast)
   }
   [[nodiscard]] const std::string& missing() const { return missing_; }
@@ -27,14 +28,14 @@ class Symbols {
 }  // namespace
 
 Result<MindVisionLibrary> MindVisionLibrary::load(const std::string& file) {
-  // Never unloaded: it runs threads of its own.
+  // Never unloaded, because it runs its own threads.
   void* const handle = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
   if (handle == nullptr) {
     const std::string why = ::dlerror();  // NOLINT(concurrency-mt-unsafe): glibc's is one a thread
     return fail(ErrorCode::kNotFound,
-                "MindVision's library cannot be loaded: install the vendor's SDK, or set library "
-                "to its file (" +
-                    why + ")");
+                fmt::format("MindVision's library cannot be loaded: install the vendor's SDK, or "
+                            "set library to its file ({})",
+                            why));
   }
   MindVisionLibrary library;
   Symbols symbols(handle);
@@ -50,8 +51,8 @@ Result<MindVisionLibrary> MindVisionLibrary::load(const std::string& file) {
   symbols.find("CameraSetFrameRate", library.set_frame_rate);
   symbols.find("CameraSetTriggerMode", library.set_trigger_mode);
   if (!symbols.missing().empty()) {
-    return fail(ErrorCode::kFormat,
-                file + ": no library of MindVision, " + symbols.missing() + " is not in it");
+    return fail(ErrorCode::kFormat, fmt::format("{}: no library of MindVision, {} is not in it",
+                                                file, symbols.missing()));
   }
   return library;
 }

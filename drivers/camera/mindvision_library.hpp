@@ -1,4 +1,4 @@
-/// The vendor's library of MindVision cameras: what we use of its C interface.
+/// The part of the MindVision library's C interface that this project uses.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace crepes {
 
-/// What the library says of a camera that is plugged in; texts end in a zero.
+/// The library's description of a connected camera; texts are null-terminated.
 struct MindVisionDevice {
   std::array<char, 32> series;
   std::array<char, 32> product;
@@ -24,7 +24,7 @@ struct MindVisionDevice {
 };
 static_assert(sizeof(MindVisionDevice) == 260);
 
-/// What the library says of a frame.
+/// The library's frame header.
 struct MindVisionFrame {
   std::uint32_t media_type;
   std::uint32_t bytes;
@@ -40,13 +40,13 @@ struct MindVisionFrame {
 };
 static_assert(sizeof(MindVisionFrame) == 64);
 
-/// The functions of the library; each gives 0 or the code of an error.
+/// The functions of the library. Each returns 0 or an error code.
 struct MindVisionLibrary {
   static constexpr std::uint32_t kMono8 = 0x01080001;
-  static constexpr int kTimeOut = -12;   ///< no frame in time
-  static constexpr int kLostData = -26;  ///< a frame came in part
+  static constexpr int kTimeOut = -12;   ///< no frame within the timeout
+  static constexpr int kLostData = -26;  ///< an incomplete frame
 
-  /// Loads the file, once for the process. The error says what to install.
+  /// Loads the file, once in the process. The error says what to install.
   [[nodiscard]] static Result<MindVisionLibrary> load(const std::string& file);
 
   int (*init)(int language) = nullptr;

@@ -1,5 +1,6 @@
 #include "drivers/camera/v4l2_camera.hpp"
 
+#include <fmt/format.h>
 #include <linux/videodev2.h>
 
 #include <algorithm>
@@ -18,7 +19,7 @@ namespace crepes {
 namespace {
 
 constexpr std::uint32_t kCapture = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-constexpr std::uint32_t kBuffers = 8;
+constexpr std::uint32_t kV4l2Buffers = 8;
 constexpr double kExposureUnit = 100.0;  // us, of V4L2_CID_EXPOSURE_ABSOLUTE
 
 struct GreyFormat {
@@ -35,40 +36,40 @@ std::string name_of(std::uint32_t format) {
 }
 
 tl::unexpected<Error> refusal(const std::string& what, int error) {
-  return fail(ErrorCode::kIo, what + ": " + std::generic_category().message(error));
+  return fail(ErrorCode::kIo, fmt::format("{}: {}", what, std::generic_category().message(error)));
 }
 
-/// A device that runs. It lives as long as one of its buffers is away.
-class Session {
+/// A running device. It lives until all of its buffers have been returned.
+class V4l2Session {
  public:
-  Session(std::unique_ptr<V4l2Device> device, std::string name)
+  V4l2Session(std::unique_ptr<V4l2Device> device, std::string name)
       : device_(std::move(device)), name_(std::move(name)) {}
 
   Result<void> start(const CameraConfig& config) {
     return check_abilities()
         .and_then([&] { return set_region(config); })
         .and_then([&] { return set_format(config); })
-        .and_then([&] { return set_rate(config.rate_hz); })
+        .and_then([&] { return set_rate(config.calibration.rate_hz); })
         .and_then([&] { return set_light(config); })
         .and_then([&] { return run(); });
   }
 
   [[nodiscard]] bool wait(std::chrono::milliseconds timeout) { return device_->wait(timeout); }
 
-  /// A buffer with a frame; none when none is there.
+  /// The next buffer with a frame; empty if there is none.
   Result<std::optional<v4l2_buffer>> fetch() {
     v4l2_buffer buffer = empty_buffer(0);
-    const int error = device_->request(VIDIOC_DQBUF, &buffer);
+    const int error = device_->ioctl(VIDIOC_DQBUF, &buffer);
     if (error == EAGAIN) return std::optional<v4l2_buffer>{};
-    if (error != 0) return refusal(name_ + ": the camera is gone", error);
+    if (error != 0) return refusal(fmt::format("{}: the camera is gone", name_), error);
     if (buffer.index >= buffers_.size())
-      return fail(ErrorCode::kIo, name_ + ": a buffer that does not exist");
+      return fail(ErrorCode::kIo, fmt::format("{}: a buffer that does not exist", name_));
     return std::optional(buffer);
   }
-  /// Lets the device fill the buffer anew. Where it does not, the next fetch says why.
-  void give_back(std::uint32_t index) {
+  /// Queues the buffer for the device again. If that fails, the next fetch returns the error.
+  void requeue(std::uint32_t index) {
     v4l2_buffer buffer = empty_buffer(index);
-    static_cast<void>(device_->request(VIDIOC_QBUF, &buffer));
+    static_cast<void>(device_->ioctl(VIDIOC_QBUF, &buffer));
   }
 
   [[nodiscard]] std::span<const std::uint8_t> memory(std::uint32_t index) const {
@@ -81,10 +82,10 @@ class Session {
     return std::size_t{format_.bytesperline} * (format_.height - 1) +
            std::size_t{format_.width} * (bits_ > 8 ? 2 : 1);
   }
-  /// What the device says of its exposure; 0 where it says nothing.
+  /// The device's exposure; 0 if it does not report one.
   [[nodiscard]] double exposure_us() {
     v4l2_control control{.id = V4L2_CID_EXPOSURE_ABSOLUTE, .value = 0};
-    return device_->request(VIDIOC_G_CTRL, &control) == 0 ? kExposureUnit * control.value : 0.0;
+    return device_->ioctl(VIDIOC_G_CTRL, &control) == 0 ? kExposureUnit * control.value : 0.0;
   }
 
  private:
@@ -98,31 +99,31 @@ class Session {
 
   Result<void> check_abilities() {
     v4l2_capability ability{};
-    if (const int error = device_->request(VIDIOC_QUERYCAP, &ability); error != 0)
-      return refusal(name_ + ": no video device", error);
+    if (const int error = device_->ioctl(VIDIOC_QUERYCAP, &ability); error != 0)
+      return refusal(fmt::format("{}: no video device", name_), error);
     constexpr std::uint32_t kNeeded = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
     const std::uint32_t able = (ability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
                                    ? ability.device_caps
                                    : ability.capabilities;
     if ((able & kNeeded) == kNeeded) return {};
-    return fail(ErrorCode::kConfig, name_ + ": a video device that captures no frames");
+    return fail(ErrorCode::kConfig,
+                fmt::format("{}: a video device that captures no frames", name_));
   }
 
   Result<void> set_region(const CameraConfig& config) {
-    if (config.offset == std::array{0, 0}) return {};
+    if (config.device.offset == std::array{0, 0}) return {};
     v4l2_selection region{};
     region.type = kCapture;
     region.target = V4L2_SEL_TGT_CROP;
-    region.r = {config.offset[0], config.offset[1],
-                static_cast<std::uint32_t>(config.resolution[0]),
-                static_cast<std::uint32_t>(config.resolution[1])};
+    region.r = {config.device.offset[0], config.device.offset[1],
+                static_cast<std::uint32_t>(config.calibration.resolution[0]),
+                static_cast<std::uint32_t>(config.calibration.resolution[1])};
     const v4l2_rect wanted = region.r;
-    if (const int error = device_->request(VIDIOC_S_SELECTION, &region); error != 0)
-      return refusal(name_ + ": offset", error);
+    if (const int error = device_->ioctl(VIDIOC_S_SELECTION, &region); error != 0)
+      return refusal(fmt::format("{}: offset", name_), error);
     if (region.r.left == wanted.left && region.r.top == wanted.top) return {};
-    return fail(ErrorCode::kConfig, name_ + ": offset: the device takes [" +
-                                        std::to_string(region.r.left) + ", " +
-                                        std::to_string(region.r.top) + "] instead");
+    return fail(ErrorCode::kConfig, fmt::format("{}: offset: the device takes [{}, {}] instead",
+                                                name_, region.r.left, region.r.top));
   }
 
   Result<void> set_format(const CameraConfig& config) {
@@ -130,31 +131,30 @@ class Session {
     for (const GreyFormat& wanted : kFormats) {
       v4l2_format format{};
       format.type = kCapture;
-      format.fmt.pix.width = static_cast<std::uint32_t>(config.resolution[0]);
-      format.fmt.pix.height = static_cast<std::uint32_t>(config.resolution[1]);
+      format.fmt.pix.width = static_cast<std::uint32_t>(config.calibration.resolution[0]);
+      format.fmt.pix.height = static_cast<std::uint32_t>(config.calibration.resolution[1]);
       format.fmt.pix.pixelformat = wanted.code;
       format.fmt.pix.field = V4L2_FIELD_NONE;
-      const int error = device_->request(VIDIOC_S_FMT, &format);
+      const int error = device_->ioctl(VIDIOC_S_FMT, &format);
       if (error == EBUSY) return refusal(name_, error);
       if (error != 0) continue;
       format_ = format.fmt.pix;
       bits_ = wanted.bits;
       if (is_as(config, wanted)) return {};
-      offers = name_of(format_.pixelformat) + " of [" + std::to_string(format_.width) + ", " +
-               std::to_string(format_.height) + "]";
-      if (format_.pixelformat == wanted.code) break;  // grey, in another size
+      offers = fmt::format("; the device offers {} of [{}, {}]", name_of(format_.pixelformat),
+                           format_.width, format_.height);
+      if (format_.pixelformat == wanted.code) break;  // grey, with another size
     }
-    return fail(ErrorCode::kConfig, name_ + ": no GREY, Y16, Y12 or Y10 of [" +
-                                        std::to_string(config.resolution[0]) + ", " +
-                                        std::to_string(config.resolution[1]) + "]" +
-                                        (offers.empty() ? "" : "; the device offers " + offers));
+    return fail(ErrorCode::kConfig, fmt::format("{}: no GREY, Y16, Y12 or Y10 of [{}, {}]{}", name_,
+                                                config.calibration.resolution[0],
+                                                config.calibration.resolution[1], offers));
   }
 
   [[nodiscard]] bool is_as(const CameraConfig& config, const GreyFormat& wanted) const {
     const std::uint32_t bytes = wanted.bits > 8 ? 2 : 1;
     return format_.pixelformat == wanted.code &&
-           format_.width == static_cast<std::uint32_t>(config.resolution[0]) &&
-           format_.height == static_cast<std::uint32_t>(config.resolution[1]) &&
+           format_.width == static_cast<std::uint32_t>(config.calibration.resolution[0]) &&
+           format_.height == static_cast<std::uint32_t>(config.calibration.resolution[1]) &&
            format_.bytesperline >= bytes * format_.width;
   }
 
@@ -164,48 +164,49 @@ class Session {
     parameters.type = kCapture;
     parameters.parm.capture.timeperframe = {
         kMilli, static_cast<std::uint32_t>(std::lround(rate_hz * kMilli))};
-    const int error = device_->request(VIDIOC_S_PARM, &parameters);
-    if (error == 0 || error == ENOTTY || error == EINVAL) return {};  // a fixed rate shows itself
-    return refusal(name_ + ": rate_hz", error);
+    const int error = device_->ioctl(VIDIOC_S_PARM, &parameters);
+    if (error == 0 || error == ENOTTY || error == EINVAL)
+      return {};  // FrameHealth reports a wrong rate
+    return refusal(fmt::format("{}: rate_hz", name_), error);
   }
 
   Result<void> set_light(const CameraConfig& config) {
-    if (config.exposure_us) {
+    if (config.device.exposure_us) {
       static_cast<void>(set(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL));  // may have none
-      const auto units = std::max(1L, std::lround(*config.exposure_us / kExposureUnit));
+      const auto units = std::max(1L, std::lround(*config.device.exposure_us / kExposureUnit));
       if (const int error = set(V4L2_CID_EXPOSURE_ABSOLUTE, static_cast<int>(units)); error != 0)
-        return refusal(name_ + ": exposure_us", error);
+        return refusal(fmt::format("{}: exposure_us", name_), error);
     }
-    if (!config.gain) return {};
+    if (!config.device.gain) return {};
     static_cast<void>(set(V4L2_CID_AUTOGAIN, 0));  // may have none
-    const int error = set(V4L2_CID_GAIN, static_cast<int>(std::lround(*config.gain)));
-    return error == 0 ? Result<void>{} : refusal(name_ + ": gain", error);
+    const int error = set(V4L2_CID_GAIN, static_cast<int>(std::lround(*config.device.gain)));
+    return error == 0 ? Result<void>{} : refusal(fmt::format("{}: gain", name_), error);
   }
 
   int set(std::uint32_t id, int value) {
     v4l2_control control{.id = id, .value = value};
-    return device_->request(VIDIOC_S_CTRL, &control);
+    return device_->ioctl(VIDIOC_S_CTRL, &control);
   }
 
   Result<void> run() {
     v4l2_requestbuffers wanted{};
-    wanted.count = kBuffers;
+    wanted.count = kV4l2Buffers;
     wanted.type = kCapture;
     wanted.memory = V4L2_MEMORY_MMAP;
-    if (const int error = device_->request(VIDIOC_REQBUFS, &wanted); error != 0)
-      return refusal(name_ + ": buffers", error);
+    if (const int error = device_->ioctl(VIDIOC_REQBUFS, &wanted); error != 0)
+      return refusal(fmt::format("{}: buffers", name_), error);
     for (std::uint32_t i = 0; i < wanted.count; ++i) {
       v4l2_buffer buffer = empty_buffer(i);
-      if (const int error = device_->request(VIDIOC_QUERYBUF, &buffer); error != 0)
-        return refusal(name_ + ": buffers", error);
+      if (const int error = device_->ioctl(VIDIOC_QUERYBUF, &buffer); error != 0)
+        return refusal(fmt::format("{}: buffers", name_), error);
       buffers_.push_back(device_->map(buffer.length, buffer.m.offset));
       if (buffers_.back().size() < frame_size())
-        return fail(ErrorCode::kIo, name_ + ": buffers that hold no frame");
-      give_back(i);
+        return fail(ErrorCode::kIo, fmt::format("{}: buffers that hold no frame", name_));
+      requeue(i);
     }
     std::uint32_t type = kCapture;
-    const int error = device_->request(VIDIOC_STREAMON, &type);
-    return error == 0 ? Result<void>{} : refusal(name_ + ": start", error);
+    const int error = device_->ioctl(VIDIOC_STREAMON, &type);
+    return error == 0 ? Result<void>{} : refusal(fmt::format("{}: start", name_), error);
   }
 
   std::unique_ptr<V4l2Device> device_;  // closing it stops the stream
@@ -217,13 +218,13 @@ class Session {
 
 class V4l2Camera final : public Camera {
  public:
-  V4l2Camera(std::shared_ptr<Session> session, const CameraConfig& config, std::uint8_t index,
+  V4l2Camera(std::shared_ptr<V4l2Session> session, const CameraConfig& config, std::uint8_t index,
              const Clock& clock)
       : session_(std::move(session)),
         index_(index),
         clock_(clock),
-        latency_(from_seconds(config.latency_ms * 1e-3)),
-        is_exposure_long_(session_->exposure_us() * config.rate_hz > 1e6) {}
+        latency_(from_seconds(config.device.latency_ms * 1e-3)),
+        is_exposure_long_(session_->exposure_us() * config.calibration.rate_hz > 1e6) {}
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override {
     if (!session_->wait(timeout)) return std::optional<Frame>{};
@@ -232,14 +233,14 @@ class V4l2Camera final : public Camera {
       const Result<std::optional<v4l2_buffer>> next = session_->fetch();
       if (!next) return tl::unexpected(next.error());
       if (!*next) break;
-      sequence_.note((*next)->sequence);
+      sequence_.add((*next)->sequence);
       if (!is_whole(**next)) {
-        session_->give_back((*next)->index);
+        session_->requeue((*next)->index);
         continue;
       }
       if (newest) {
         ++superseded_;
-        session_->give_back(newest->index);
+        session_->requeue(newest->index);
       }
       newest = *next;
     }
@@ -269,14 +270,14 @@ class V4l2Camera final : public Camera {
     return false;
   }
 
-  /// When it was there: as the kernel says, if by our clock and plausible.
+  /// The arrival: the kernel's stamp, if it is on our clock and plausible.
   [[nodiscard]] Timestamp arrival_of(const v4l2_buffer& buffer) const {
     const Timestamp now = clock_.now();
     if ((buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
       return now;
-    const Timestamp told{std::chrono::seconds(buffer.timestamp.tv_sec) +
-                         std::chrono::microseconds(buffer.timestamp.tv_usec)};
-    return told <= now && now - told < std::chrono::seconds(1) ? told : now;
+    const Timestamp stamped{std::chrono::seconds(buffer.timestamp.tv_sec) +
+                            std::chrono::microseconds(buffer.timestamp.tv_usec)};
+    return stamped <= now && now - stamped < std::chrono::seconds(1) ? stamped : now;
   }
 
   Frame frame_of(const v4l2_buffer& buffer) {
@@ -291,16 +292,17 @@ class V4l2Camera final : public Camera {
       frame.pixels = std::exchange(spare_, {});
       narrow_to_8_bits(memory, frame.width, frame.height, format.bytesperline, session_->bits(),
                        frame.pixels);
-      session_->give_back(buffer.index);
+      session_->requeue(buffer.index);
       return frame;
     }
-    frame.lent_stride = static_cast<std::ptrdiff_t>(format.bytesperline);
-    frame.lent = LentPixels(memory.data(), [session = session_, index = buffer.index](
-                                               const std::uint8_t*) { session->give_back(index); });
+    frame.borrowed_stride = static_cast<std::ptrdiff_t>(format.bytesperline);
+    frame.borrowed =
+        BorrowedPixels(memory.data(), [session = session_, index = buffer.index](
+                                          const std::uint8_t*) { session->requeue(index); });
     return frame;
   }
 
-  std::shared_ptr<Session> session_;
+  std::shared_ptr<V4l2Session> session_;
   std::uint8_t index_;
   const Clock& clock_;
   Duration latency_;
@@ -314,10 +316,17 @@ class V4l2Camera final : public Camera {
 
 }  // namespace
 
-Result<std::unique_ptr<Camera>> run_v4l2_camera(std::unique_ptr<V4l2Device> device,
-                                                const CameraConfig& config, std::uint8_t index,
-                                                const Clock& clock) {
-  auto session = std::make_shared<Session>(std::move(device), config.device);
+Result<std::unique_ptr<Camera>> open_v4l2_camera(const CameraConfig& config, std::uint8_t index,
+                                                 const Clock& clock) {
+  return open_v4l2_device(config.device.id).and_then([&](std::unique_ptr<V4l2Device> device) {
+    return start_v4l2_camera(std::move(device), config, index, clock);
+  });
+}
+
+Result<std::unique_ptr<Camera>> start_v4l2_camera(std::unique_ptr<V4l2Device> device,
+                                                  const CameraConfig& config, std::uint8_t index,
+                                                  const Clock& clock) {
+  auto session = std::make_shared<V4l2Session>(std::move(device), config.device.id);
   if (Result<void> started = session->start(config); !started)
     return tl::unexpected(started.error());
   return std::make_unique<V4l2Camera>(std::move(session), config, index, clock);

@@ -1,6 +1,7 @@
 #include "drivers/camera/v4l2_device.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <linux/videodev2.h>
 #include <poll.h>
 #include <sys/ioctl.h>
@@ -13,8 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/base/unique_fd.hpp"
 #include "drivers/serial/device_name.hpp"
-#include "drivers/unique_fd.hpp"
 
 namespace crepes {
 namespace {
@@ -30,7 +31,7 @@ class KernelDevice final : public V4l2Device {
     for (const auto& [start, length] : mapped_) ::munmap(start, length);
   }
 
-  [[nodiscard]] int request(unsigned long code, void* argument) override {
+  [[nodiscard]] int ioctl(unsigned long code, void* argument) override {
     int answer = 0;
     do {
       answer = ::ioctl(fd_.get(), code, argument);
@@ -56,11 +57,11 @@ class KernelDevice final : public V4l2Device {
   std::vector<std::pair<void*, std::size_t>> mapped_;
 };
 
-/// Its name, if it captures frames.
+/// The name of the device, if it captures frames.
 std::optional<std::string> name_of_camera(const std::string& path) {
   const Result<std::unique_ptr<V4l2Device>> device = open_v4l2_device(path);
   v4l2_capability ability{};
-  if (!device || (*device)->request(VIDIOC_QUERYCAP, &ability) != 0) return std::nullopt;
+  if (!device || (*device)->ioctl(VIDIOC_QUERYCAP, &ability) != 0) return std::nullopt;
   if ((ability.device_caps & V4L2_CAP_VIDEO_CAPTURE) == 0) return std::nullopt;
   const auto* const card = ability.card;
   return std::string(card, std::find(card, card + sizeof(ability.card), 0));
@@ -73,7 +74,7 @@ Result<std::unique_ptr<V4l2Device>> open_v4l2_device(const std::string& path) {
   if (fd) return std::make_unique<KernelDevice>(std::move(fd));
   const int error = errno;
   return fail(error == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo,
-              path + ": " + std::generic_category().message(error));
+              fmt::format("{}: {}", path, std::generic_category().message(error)));
 }
 
 std::vector<FoundCamera> find_v4l2_cameras(const std::filesystem::path& dev) {
@@ -83,7 +84,7 @@ std::vector<FoundCamera> find_v4l2_cameras(const std::filesystem::path& dev) {
     const std::string path = entry.path();
     if (!entry.path().filename().string().starts_with("video")) continue;
     if (const auto name = name_of_camera(path))
-      found.push_back({steady_name_of(path, dev / "v4l" / "by-id").value_or(path), *name});
+      found.push_back({by_id_link_of(path, dev / "v4l" / "by-id").value_or(path), *name});
   }
   return found;
 }

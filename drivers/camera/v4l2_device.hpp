@@ -1,4 +1,4 @@
-/// What we ask of the kernel about a video device, and nothing else.
+/// The system calls on a video device.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,7 @@
 
 namespace crepes {
 
-/// An open device; closed by its destructor. Requests may come from any thread.
+/// An open device; the destructor closes it. Thread-safe.
 class V4l2Device {
  public:
   V4l2Device() = default;
@@ -25,18 +25,18 @@ class V4l2Device {
   V4l2Device& operator=(V4l2Device&&) = delete;
   virtual ~V4l2Device() = default;
 
-  /// An ioctl; 0, or errno.
-  [[nodiscard]] virtual int request(unsigned long code, void* argument) = 0;
-  /// A buffer of the device, mapped for as long as this lives; empty where it cannot be.
+  /// ioctl(2). Returns 0 or errno.
+  [[nodiscard]] virtual int ioctl(unsigned long code, void* argument) = 0;
+  /// Maps a buffer of the device for the lifetime of this object; empty on failure.
   [[nodiscard]] virtual std::span<const std::uint8_t> map(std::size_t length,
                                                           std::size_t offset) = 0;
-  /// Whether there is something to fetch, a frame or an error, within `timeout`.
+  /// Whether a frame or an error is available within `timeout`.
   [[nodiscard]] virtual bool wait(std::chrono::milliseconds timeout) = 0;
 };
 
 [[nodiscard]] Result<std::unique_ptr<V4l2Device>> open_v4l2_device(const std::string& path);
 
-/// The devices in `dev` that capture frames, by their steady names where they have one.
+/// The devices in `dev` that capture frames, by their persistent links where they have one.
 [[nodiscard]] std::vector<FoundCamera> find_v4l2_cameras(const std::filesystem::path& dev);
 
 }  // namespace crepes

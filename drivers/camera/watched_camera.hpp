@@ -1,24 +1,24 @@
-/// A device's frames, with its faults told.
+/// A camera with fault detection.
 #pragma once
 
 #include <memory>
 #include <utility>
 
 #include "drivers/camera/camera.hpp"
+#include "drivers/camera/camera_config.hpp"
 #include "drivers/camera/frame_health.hpp"
 #include "estimator/core/clock.hpp"
-#include "estimator/core/config.hpp"
 
 namespace crepes {
 
-/// Ends the stream of a camera that stands still, hangs or delivers another resolution.
+/// Ends the stream of a camera that stalls, repeats an image or delivers another resolution.
 class WatchedCamera final : public Camera {
  public:
   /// `clock` must outlive this.
   WatchedCamera(std::unique_ptr<Camera> camera, const CameraConfig& config, const Clock& clock)
       : camera_(std::move(camera)),
         health_(config),
-        is_free_running_(config.trigger == CameraTrigger::kFree),
+        is_free_running_(config.device.trigger == CameraTrigger::kFree),
         clock_(clock),
         last_frame_(clock.now()) {}
 

@@ -1,4 +1,4 @@
-/// Samples that reach us several at a time.
+/// Stamps of samples that arrive in bundles.
 #pragma once
 
 #include <algorithm>
@@ -10,16 +10,16 @@
 
 namespace crepes {
 
-/// An adapter or a busy machine hands over samples in bundles, all stamped with one arrival. That
-/// is right for the newest only; those before it were measured a period apart. Stamps of a sensor's
-/// own clock stay as they are.
+/// An adapter or a busy machine delivers several samples at once, all stamped with one arrival.
+/// Only the newest stamp is right; the earlier samples were measured one period apart. Stamps of a
+/// sensor's own clock are not changed.
 class BundleSpacing {
  public:
-  /// `period` is the time from sample to sample of the device.
+  /// `period` is the sampling period of the device.
   explicit BundleSpacing(Duration period) : period_(period) {}
 
-  /// Moves all stamps of `bundle`, read at once and oldest first, but the newest back: in order,
-  /// and after what the bundle before it was stamped with. Where they differ, each is its own.
+  /// `bundle` holds the samples of one read, oldest first. Moves all stamps except the newest back:
+  /// in order, and after the stamps of the previous bundle. Stamps that differ are kept.
   void apply(std::span<ImuSample> bundle) {
     if (bundle.empty()) return;
     const Timestamp newest = bundle.back().stamp;

@@ -1,9 +1,9 @@
 #include "drivers/imu/hipnuc.hpp"
 
 #include <chrono>
-#include <numbers>
 
 #include "drivers/serial/byte_fields.hpp"
+#include "estimator/core/constants.hpp"
 
 namespace crepes {
 namespace {
@@ -12,7 +12,7 @@ constexpr std::size_t kPayload = 6;
 constexpr std::size_t kHi91Length = 76;
 constexpr std::uint8_t kHi91 = 0x91;
 
-/// CRC-16 with the polynomial 0x1021, most significant bit first, started with 0.
+/// CRC-16 with polynomial 0x1021, most significant bit first, initial value 0.
 std::uint16_t crc_of(Bytes bytes, std::uint16_t crc) {
   for (const std::uint8_t byte : bytes) {
     crc = static_cast<std::uint16_t>(crc ^ byte << 8U);
@@ -41,12 +41,10 @@ FrameCheck Hipnuc::examine(Bytes bytes) {
 }
 
 ImuReading Hipnuc::read(Bytes frame) {
-  constexpr double kGravity = 9.80665;
-  constexpr double kDegree = std::numbers::pi / 180.0;
   if (frame.size() != kPayload + kHi91Length || frame[kPayload] != kHi91) return {};
   return {.verdict = ImuVerdict::kSample,
-          .gyro_radps = vector_at<float>(frame, kPayload + 24) * kDegree,
-          .accel_mps2 = vector_at<float>(frame, kPayload + 12) * kGravity,
+          .gyro_radps = vector_at<float>(frame, kPayload + 24) * kRadPerDeg,
+          .accel_mps2 = vector_at<float>(frame, kPayload + 12) * kGravityMps2,
           .time = DeviceTime::ticks(unsigned_at(frame, kPayload + 8, 4),
                                     std::chrono::milliseconds{1}, 32)};
 }

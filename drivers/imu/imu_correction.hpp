@@ -1,20 +1,20 @@
-/// From what a sensor says to what the body does.
+/// Applies calibration and mounting to IMU samples.
 #pragma once
 
 #include <Eigen/Core>
 
-#include "estimator/core/config.hpp"
+#include "drivers/imu/imu_config.hpp"
 #include "estimator/core/measurements.hpp"
 
 namespace crepes {
 
-/// The one place where samples get the calibration and the mounting of the configuration:
+/// The only place that applies the configured calibration and mounting:
 ///   v_B = R_B_S T K (v_S - b),  S the sensor,  for rates and specific force alike
 /// (Tedaldi, Pretto, Menegatti: A robust and easy to implement method for IMU calibration without
 /// external equipments, ICRA 2014).
 class ImuCorrection {
  public:
-  explicit ImuCorrection(const ImuConfig& config)
+  explicit ImuCorrection(const ImuDeviceConfig& config)
       : gyro_(triad(config.gyroscope, config.T_body_imu)),
         accel_(triad(config.accelerometer, config.T_body_imu)) {}
 

@@ -1,4 +1,4 @@
-/// Samples that are missing, and a sensor that repeats itself.
+/// Detects missing samples and a sensor that repeats its values.
 #pragma once
 
 #include <algorithm>
@@ -11,20 +11,20 @@
 
 namespace crepes {
 
-/// Looks at every sample in order; what it says is for people, but for stuck samples, which are
-/// to be thrown away. Pure.
+/// Receives every sample in order. Stuck samples must be discarded; the rest is diagnosis for
+/// users. Pure.
 class ImuHealth {
  public:
   struct Counts {
-    std::uint64_t dropped = 0;  ///< samples whose time passed without them
-    std::uint64_t stuck = 0;    ///< samples refused because nothing had changed for too long
+    std::uint64_t dropped = 0;  ///< samples that are missing
+    std::uint64_t stuck = 0;    ///< samples refused because the values had not changed for too long
   };
 
-  /// `period` is the time from sample to sample that the device should keep.
+  /// `period` is the expected sampling period.
   explicit ImuHealth(Duration period) : period_(period) {}
 
-  /// Whether the sample may be used. Noise alone turns some bit of six numbers over: the same
-  /// numbers for half a second are a sensor that hangs.
+  /// Whether the sample may be used. Noise always changes some bit of the six numbers; equal
+  /// numbers for half a second mean that the sensor hangs.
   [[nodiscard]] bool accept(const ImuSample& sample) {
     const std::optional<ImuSample> before = last_;
     last_ = sample;
@@ -32,7 +32,7 @@ class ImuHealth {
       unchanged_since_ = sample.stamp;
       return true;
     }
-    note_gap(sample.stamp - before->stamp);
+    record_interval(sample.stamp - before->stamp);
     if (sample.gyro_radps != before->gyro_radps || sample.accel_mps2 != before->accel_mps2)
       unchanged_since_ = sample.stamp;
     if (!is_stuck()) return true;
@@ -60,9 +60,9 @@ class ImuHealth {
     return last_->stamp - unchanged_since_ >= kLongest;
   }
 
-  void note_gap(Duration gap) {
+  void record_interval(Duration gap) {
     constexpr double kMemory = 1.0 / kEnoughGaps;
-    constexpr double kLongestGap = 10.0;  // periods: one that is longer is no matter of rate
+    constexpr double kLongestGap = 10.0;  // periods: longer gaps say nothing about the rate
     const double periods = to_seconds(gap) / to_seconds(period_);
     if (periods > 1.5) counts_.dropped += static_cast<std::uint64_t>(std::lround(periods)) - 1;
     mean_gap_s_ +=

@@ -1,4 +1,4 @@
-/// What one frame of an inertial sensor says, and the parser that most protocols share.
+/// The content of one frame of an inertial sensor, and the parser that most protocols share.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,13 +17,13 @@ namespace crepes {
 
 enum class ImuVerdict : std::uint8_t {
   kSample,
-  kOther,      ///< a frame that has nothing to do with rates and acceleration
-  kPartial,    ///< a rate without the acceleration of the same moment, or the other way round
-  kUnscaled,   ///< numbers without a unit
-  kSaturated,  ///< at the end of the sensor's scale
+  kOther,      ///< a frame without rate or acceleration
+  kPartial,    ///< a rate without the acceleration of the same time, or the reverse
+  kUnscaled,   ///< raw numbers without a unit
+  kSaturated,  ///< at the end of the sensor's range
 };
 
-/// In the sensor's axes; +9.81 up at rest.
+/// In the sensor's axes; acceleration is +9.81 upwards at rest.
 struct ImuReading {
   ImuVerdict verdict = ImuVerdict::kOther;
   Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
@@ -31,7 +31,8 @@ struct ImuReading {
   std::optional<DeviceTime> time = std::nullopt;  ///< of sensors that have a clock
 };
 
-/// No number, beyond every sensor's scale, or an accelerometer that says exactly nothing.
+/// False for values that are not finite or beyond every sensor's range, and for exactly zero
+/// acceleration.
 [[nodiscard]] inline bool is_plausible(const ImuReading& reading) {
   constexpr double kMostRate = 80.0;           // rad/s
   constexpr double kMostAcceleration = 650.0;  // m/s^2
@@ -41,7 +42,7 @@ struct ImuReading {
          !reading.accel_mps2.isZero(0.0);
 }
 
-/// Totals by what became of readings.
+/// Totals of readings by outcome.
 struct ImuCounts {
   std::uint64_t samples = 0;
   std::uint64_t partial = 0;
@@ -51,10 +52,10 @@ struct ImuCounts {
   std::uint64_t clock_restarts = 0;  ///< of the sensor's own clock
 };
 
-/// Hands on what `reading` holds, if it is a sample, and counts it. The stamp is the sensor's own
-/// where it has a clock.
-inline void take(const ImuReading& reading, Timestamp arrival, DeviceClock& clock,
-                 ImuCounts& counts, const std::function<void(const ImuSample&)>& sink) {
+/// Counts `reading` and forwards it to `sink` if it is a sample. The stamp comes from the sensor's
+/// clock if it has one.
+inline void forward_sample(const ImuReading& reading, Timestamp arrival, DeviceClock& clock,
+                           ImuCounts& counts, const std::function<void(const ImuSample&)>& sink) {
   const Timestamp stamp = clock.to_local(reading.time, arrival);
   counts.clock_restarts = clock.restarts();
   if (reading.verdict == ImuVerdict::kOther) return;
@@ -73,14 +74,14 @@ inline void take(const ImuReading& reading, Timestamp arrival, DeviceClock& cloc
 }
 
 /// One frame is one reading:  `static ImuReading read(Bytes frame)`,  a pure function. `kNoSamples`
-/// says what to do when frames come but no samples.
+/// is the advice when frames arrive without samples.
 template <class Protocol>
 concept ImuProtocolFormat = FrameProtocol<Protocol> && requires(Bytes frame) {
   { Protocol::read(frame) } -> std::same_as<ImuReading>;
   { Protocol::kNoSamples } -> std::convertible_to<std::string_view>;
 };
 
-/// The parser of a protocol of which every frame stands for itself.
+/// The parser of a protocol whose frames are independent.
 template <ImuProtocolFormat Protocol>
 class ImuFrameParser {
  public:
@@ -91,10 +92,12 @@ class ImuFrameParser {
   [[nodiscard]] static FrameCheck examine(Bytes bytes) { return Protocol::examine(bytes); }
 
   void parse(Bytes frame, Timestamp arrival, const std::function<void(const ImuSample&)>& sink) {
-    take(Protocol::read(frame), arrival, clock_, counts_, sink);
+    forward_sample(Protocol::read(frame), arrival, clock_, counts_, sink);
   }
 
-  [[nodiscard]] static std::string why_nothing() { return std::string(Protocol::kNoSamples); }
+  [[nodiscard]] static std::string no_measurement_reason() {
+    return std::string(Protocol::kNoSamples);
+  }
   [[nodiscard]] const ImuCounts& counts() const { return counts_; }
 
  private:

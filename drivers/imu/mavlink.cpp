@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "drivers/serial/byte_fields.hpp"
+#include "estimator/core/constants.hpp"
 
 namespace crepes {
 namespace {
@@ -13,7 +14,7 @@ constexpr std::uint8_t kVersion1 = 0xfe;
 constexpr std::uint8_t kVersion2 = 0xfd;
 constexpr std::size_t kChecksum = 2;
 constexpr std::size_t kSignature = 13;
-constexpr double kMilliGravity = 9.80665e-3;
+constexpr double kMilliGravity = 1e-3 * kGravityMps2;
 
 enum MessageId : std::uint32_t {
   kHeartbeat = 0,
@@ -26,7 +27,7 @@ enum MessageId : std::uint32_t {
   kScaledImu2 = 116,
 };
 
-/// `length` in version 1; version 2 adds fields up to `extended` and cuts trailing zeros.
+/// `length` in version 1; version 2 adds fields up to `extended` and omits trailing zeros.
 struct Message {
   MessageId id;
   std::size_t length;
@@ -90,16 +91,16 @@ bool can_have(const Message& message, Bytes bytes, std::size_t length) {
                                : length >= 1 && length <= message.extended;
 }
 
-/// Forward, right, down to forward, left, up.
+/// From forward, right, down to forward, left, up.
 Eigen::Vector3d turned(const Eigen::Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
 
-/// Integers of which the last value means: at least so much.
+/// Integers whose extreme values mean saturation.
 bool is_saturated(const Eigen::Vector3d& raw) {
   return raw.minCoeff() <= -0x8000 || raw.maxCoeff() >= 0x7fff;
 }
 
 ImuReading highres(Bytes payload) {
-  constexpr std::uint32_t kAllSix = 0x3fU;  // of the field that says what is new
+  constexpr std::uint32_t kAllSix = 0x3fU;  // of the field that lists updated values
   if ((unsigned_at(payload, 60, 2) & kAllSix) != kAllSix) return {.verdict = ImuVerdict::kPartial};
   constexpr std::uint64_t kMicrosecond = 1000;  // ns
   return {.verdict = ImuVerdict::kSample,
@@ -118,7 +119,7 @@ ImuReading scaled(Bytes payload) {
           .time = DeviceTime::ticks(unsigned_at(payload, 0, 4), std::chrono::milliseconds{1}, 32)};
 }
 
-/// The smaller, the better; empty: no samples in it.
+/// Smaller is better; empty: the message holds no samples.
 std::optional<int> rank_of(std::uint32_t id) {
   constexpr std::array kBestFirst{kHighresImu, kScaledImu, kScaledImu2};
   const auto* const found = std::ranges::find(kBestFirst, id);
@@ -134,7 +135,8 @@ FrameCheck Mavlink::examine(Bytes bytes) {
   const Header header = header_of(bytes);
   const Message* message = message_of(header.id);
   if (message == nullptr || !can_have(*message, bytes, header.payload)) return {};
-  if (bytes[0] == kVersion2 && (bytes[2] & ~1U) != 0) return {};  // to be refused if not understood
+  if (bytes[0] == kVersion2 && (bytes[2] & ~1U) != 0)
+    return {};  // incompatible flags: must be refused if unknown
   if (bytes.size() < header.frame()) return {FrameKind::kIncomplete};
   const std::size_t end = header.size + header.payload;
   if (crc_of(bytes.subspan(1, end - 1), message->crc_extra) != unsigned_at(bytes, end, kChecksum))
@@ -144,7 +146,7 @@ FrameCheck Mavlink::examine(Bytes bytes) {
 
 ImuReading Mavlink::read(Bytes frame) {
   const Header header = header_of(frame);
-  std::array<std::uint8_t, 255> payload{};  // zeros that were cut are back
+  std::array<std::uint8_t, 255> payload{};  // restores omitted zeros
   std::ranges::copy(frame.subspan(header.size, header.payload), payload.begin());
   if (header.id == kHighresImu) return highres(payload);
   if (header.id == kScaledImu || header.id == kScaledImu2) return scaled(payload);
@@ -156,7 +158,7 @@ bool MavlinkParser::is_chosen(Bytes frame, Timestamp arrival) {
   constexpr Duration kGone = std::chrono::seconds(1);
   const Header header = header_of(frame);
   const std::optional<int> rank = rank_of(header.id);
-  if (!rank) return true;  // no rival: to be counted
+  if (!rank) return true;  // no sample: only counted
   const bool is_same = source_ && *rank == source_->rank && header.sender == source_->sender;
   const bool is_better = !source_ || *rank < source_->rank || arrival - source_->heard > kGone;
   if (is_same || is_better) source_ = Source{*rank, header.sender, arrival};
@@ -165,10 +167,11 @@ bool MavlinkParser::is_chosen(Bytes frame, Timestamp arrival) {
 
 void MavlinkParser::parse(Bytes frame, Timestamp arrival,
                           const std::function<void(const ImuSample&)>& sink) {
-  if (is_chosen(frame, arrival)) take(Mavlink::read(frame), arrival, clock_, counts_, sink);
+  if (is_chosen(frame, arrival))
+    forward_sample(Mavlink::read(frame), arrival, clock_, counts_, sink);
 }
 
-std::string MavlinkParser::why_nothing() const {
+std::string MavlinkParser::no_measurement_reason() const {
   return std::string(counts_.unscaled > 0 ? Mavlink::kOnlyRaw : Mavlink::kNoSamples);
 }
 

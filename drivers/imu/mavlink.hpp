@@ -13,8 +13,8 @@
 namespace crepes {
 
 /// Versions 1 and 2. HIGHRES_IMU, SCALED_IMU and SCALED_IMU2 hold samples; their axes (x forward,
-/// y right, z down) are turned to ours (x forward, y left, z up). RAW_IMU is refused: its numbers
-/// have no unit.
+/// y right, z down) are converted to ours (x forward, y left, z up). RAW_IMU is refused: its
+/// numbers have no unit.
 struct Mavlink {
   static constexpr std::size_t kMaxFrame = 10 + 255 + 2 + 13;  ///< version 2, signed
   static constexpr std::string_view kNoSamples =
@@ -25,13 +25,13 @@ struct Mavlink {
       "MAVLink with RAW_IMU only, whose numbers have no unit; have the autopilot send HIGHRES_IMU "
       "(105) or SCALED_IMU (26)";
 
-  /// Messages of kinds unknown here cannot be checked and count as skipped bytes.
+  /// Messages of unknown kinds cannot be checked and count as skipped bytes.
   [[nodiscard]] static FrameCheck examine(Bytes bytes);
   [[nodiscard]] static ImuReading read(Bytes frame);
 };
 
-/// Several messages may tell the same movement: the best one is taken (HIGHRES_IMU, SCALED_IMU,
-/// SCALED_IMU2), of one sender; another only when that one has been silent for a second.
+/// Several messages may report the same motion. The best kind is used (HIGHRES_IMU, then
+/// SCALED_IMU, then SCALED_IMU2), from one sender. Another is used only after a second of silence.
 class MavlinkParser {
  public:
   using Measurement = ImuSample;
@@ -41,12 +41,12 @@ class MavlinkParser {
   [[nodiscard]] static FrameCheck examine(Bytes bytes) { return Mavlink::examine(bytes); }
   void parse(Bytes frame, Timestamp arrival, const std::function<void(const ImuSample&)>& sink);
 
-  [[nodiscard]] std::string why_nothing() const;
+  [[nodiscard]] std::string no_measurement_reason() const;
   [[nodiscard]] const ImuCounts& counts() const { return counts_; }
 
  private:
   struct Source {
-    int rank = 0;  ///< the smaller, the better
+    int rank = 0;  ///< smaller is better
     std::uint64_t sender = 0;
     Timestamp heard{};
   };

@@ -3,20 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "drivers/serial/byte_fields.hpp"
+#include "estimator/core/constants.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr std::uint8_t kHeader = 0x55;
-constexpr std::uint8_t kAcceleration = 0x51;
-constexpr std::uint8_t kRate = 0x52;
+constexpr std::uint8_t kWitMotionHeader = 0x55;
+constexpr std::uint8_t kAccelerationFrame = 0x51;
+constexpr std::uint8_t kRateFrame = 0x52;
 constexpr std::size_t kOne = WitMotion::kMaxFrame / 2;
 constexpr double kFullScale = 32768.0;
-constexpr double kAccelerationUnit = 16.0 * 9.80665 / kFullScale;             // m/s^2
-constexpr double kRateUnit = 2000.0 * std::numbers::pi / 180.0 / kFullScale;  // rad/s
+constexpr double kAccelerationUnit = 16.0 * kGravityMps2 / kFullScale;  // m/s^2
+constexpr double kRateUnit = radians(2000.0) / kFullScale;              // rad/s
 
 using Raw = Eigen::Vector3i;
 
@@ -27,7 +27,7 @@ bool is_saturated(const Raw& raw) { return raw.minCoeff() == -0x8000 || raw.maxC
 void encode(std::span<std::uint8_t> frame, std::uint8_t type, const Eigen::Vector3d& value,
             double unit) {
   constexpr long kCelsius25 = 2500;
-  frame[0] = kHeader;
+  frame[0] = kWitMotionHeader;
   frame[1] = type;
   for (Eigen::Index i = 0; i < 4; ++i) {
     const long word =
@@ -39,16 +39,16 @@ void encode(std::span<std::uint8_t> frame, std::uint8_t type, const Eigen::Vecto
   frame[10] = byte_sum(frame.first(10));
 }
 
-/// Whether a sample begins in it: then its own end is missing, and the sum is right by chance, as
-/// one in 256 is.
+/// Whether a sample begins inside the frame. Then the frame is truncated and its checksum is valid
+/// by chance (one in 256).
 bool begins_inside(Bytes frame) {
-  constexpr std::array<std::uint8_t, 2> kBeginning{kHeader, kAcceleration};
+  constexpr std::array<std::uint8_t, 2> kBeginning{kWitMotionHeader, kAccelerationFrame};
   return std::search(frame.begin() + 1, frame.end(), kBeginning.begin(), kBeginning.end()) !=
          frame.end();
 }
 
 FrameCheck examine_one(Bytes bytes) {
-  if (bytes[0] != kHeader) return {};
+  if (bytes[0] != kWitMotionHeader) return {};
   if (bytes.size() < 2) return {FrameKind::kIncomplete};
   if (bytes[1] < 0x50 || bytes[1] > 0x5f) return {};
   if (bytes.size() < kOne) return {FrameKind::kIncomplete};
@@ -61,9 +61,9 @@ FrameCheck examine_one(Bytes bytes) {
 
 FrameCheck WitMotion::examine(Bytes bytes) {
   const FrameCheck first = examine_one(bytes);
-  if (first.kind != FrameKind::kComplete || bytes[1] != kAcceleration) return first;
+  if (first.kind != FrameKind::kComplete || bytes[1] != kAccelerationFrame) return first;
   const Bytes rest = bytes.subspan(kOne);
-  constexpr std::array<std::uint8_t, 2> kBeginning{kHeader, kRate};
+  constexpr std::array<std::uint8_t, 2> kBeginning{kWitMotionHeader, kRateFrame};
   const std::size_t known = std::min(rest.size(), kBeginning.size());
   if (!std::ranges::equal(rest.first(known), std::span(kBeginning).first(known))) return first;
   if (rest.size() < kOne) return {FrameKind::kIncomplete};
@@ -72,7 +72,7 @@ FrameCheck WitMotion::examine(Bytes bytes) {
 }
 
 ImuReading WitMotion::read(Bytes frame) {
-  const bool is_half = frame[1] == kAcceleration || frame[1] == kRate;
+  const bool is_half = frame[1] == kAccelerationFrame || frame[1] == kRateFrame;
   if (frame.size() < kMaxFrame)
     return {.verdict = is_half ? ImuVerdict::kPartial : ImuVerdict::kOther};
   const Raw accel = raw_of(frame);
@@ -86,8 +86,8 @@ ImuReading WitMotion::read(Bytes frame) {
 std::array<std::uint8_t, 22> encode_witmotion(const Eigen::Vector3d& gyro_radps,
                                               const Eigen::Vector3d& accel_mps2) {
   std::array<std::uint8_t, 22> bytes{};
-  encode(std::span(bytes).first(11), kAcceleration, accel_mps2, kAccelerationUnit);
-  encode(std::span(bytes).last(11), kRate, gyro_radps, kRateUnit);
+  encode(std::span(bytes).first(11), kAccelerationFrame, accel_mps2, kAccelerationUnit);
+  encode(std::span(bytes).last(11), kRateFrame, gyro_radps, kRateUnit);
   return bytes;
 }
 

@@ -10,8 +10,8 @@
 
 namespace crepes {
 
-/// A sample is an acceleration frame (51) and the rate frame (52) that follows it without a gap:
-/// both together count as one frame here. Halves that stand alone are of two samples.
+/// A sample is an acceleration frame (51) and the rate frame (52) that follows without a gap. Both
+/// together count as one frame here. A single half is not a sample.
 struct WitMotion {
   static constexpr std::size_t kMaxFrame = 22;
   static constexpr std::string_view kNoSamples =
@@ -24,7 +24,7 @@ struct WitMotion {
 
 using WitMotionParser = ImuFrameParser<WitMotion>;
 
-/// The two frames of one sample. What the sensor cannot express saturates, as it does there.
+/// The two frames of one sample. Values beyond the range saturate, as in the sensor.
 [[nodiscard]] std::array<std::uint8_t, 22> encode_witmotion(const Eigen::Vector3d& gyro_radps,
                                                             const Eigen::Vector3d& accel_mps2);
 

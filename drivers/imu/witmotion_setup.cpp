@@ -1,10 +1,12 @@
 #include "drivers/imu/witmotion_setup.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string>
 #include <utility>
 
-#include "drivers/sleep.hpp"
+#include "drivers/base/sleep.hpp"
 
 namespace crepes {
 namespace {
@@ -25,8 +27,9 @@ WitMotionCommand set(Register target, std::uint8_t value) {
 Result<std::vector<WitMotionCommand>> witmotion_setup(int rate_hz) {
   const auto* const rate = std::ranges::find(kRates, rate_hz, &std::pair<int, std::uint8_t>::first);
   if (rate == kRates.end()) {
-    return fail(ErrorCode::kUsage, "the sensor has 10, 20, 50, 100 or 200 samples a second, not " +
-                                       std::to_string(rate_hz));
+    return fail(
+        ErrorCode::kUsage,
+        fmt::format("the sensor has 10, 20, 50, 100 or 200 samples a second, not {}", rate_hz));
   }
   return std::vector<WitMotionCommand>{kUnlock, set(kOutputs, kAccelerationAndRate),
                                        set(kRate, rate->second), set(kSave, 0)};

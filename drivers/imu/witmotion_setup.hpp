@@ -1,4 +1,4 @@
-/// Setting up WitMotion inertial sensors.
+/// Configuration commands for WitMotion inertial sensors.
 #pragma once
 
 #include <array>
@@ -13,11 +13,11 @@ namespace crepes {
 
 using WitMotionCommand = std::array<std::uint8_t, 5>;
 
-/// Unlock; send acceleration and rate and nothing else, so that the line can carry them; `rate_hz`;
-/// save. Refuses rates that the sensor does not have.
+/// Unlock; output acceleration and rate only, so that the line's rate is sufficient; set `rate_hz`;
+/// save. Refuses rates that the sensor does not support.
 [[nodiscard]] Result<std::vector<WitMotionCommand>> witmotion_setup(int rate_hz);
 
-/// The sensor takes one command at a time: waits `pause` after each.
+/// The sensor executes one command at a time: waits `pause` after each.
 [[nodiscard]] Result<void> send_commands(SerialPort& port,
                                          const std::vector<WitMotionCommand>& commands,
                                          std::chrono::milliseconds pause);

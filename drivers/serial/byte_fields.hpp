@@ -1,4 +1,4 @@
-/// Numbers inside frames. The caller has checked that the bytes are there.
+/// Reads numbers from frames. The caller has checked the length.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +24,7 @@ namespace crepes {
   return value;
 }
 
-/// A number as it lies in memory, but for the order of its bytes.
+/// A number with the object representation of T, in the given byte order.
 template <class T>
 [[nodiscard]] T field_at(Bytes bytes, std::size_t at, std::endian order = std::endian::little) {
   const std::uint64_t value = unsigned_at(bytes, at, sizeof(T), order);
@@ -37,7 +37,7 @@ template <class T>
   }
 }
 
-/// Three numbers in a row.
+/// Three consecutive numbers.
 template <class T>
 [[nodiscard]] Eigen::Vector3d vector_at(Bytes bytes, std::size_t at,
                                         std::endian order = std::endian::little) {
@@ -52,8 +52,8 @@ template <class T>
   return static_cast<std::uint8_t>(std::accumulate(bytes.begin(), bytes.end(), 0U));
 }
 
-/// Whether the frame's own beginning stands in it a second time. A frame cut short and the next one
-/// can have the right sum together (one in 256 does), which would be a wrong value.
+/// Whether the first bytes of the frame occur in it again. A truncated frame and the next one can
+/// together have a valid checksum (one in 256), which would yield a wrong value.
 [[nodiscard]] inline bool begins_twice(Bytes frame) {
   constexpr std::size_t kBeginning = 4;
   for (std::size_t at = 1; at + 1 < frame.size(); ++at) {

@@ -1,5 +1,7 @@
 #include "drivers/serial/device_name.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <fstream>
 #include <system_error>
@@ -9,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The entries of a directory that may change or vanish meanwhile.
+/// Visits the entries of a directory that may change or disappear meanwhile.
 template <class OnEntry>
 void for_each_entry(const fs::path& directory, OnEntry on_entry) {
   std::error_code failed;
@@ -20,7 +22,7 @@ void for_each_entry(const fs::path& directory, OnEntry on_entry) {
   }
 }
 
-/// Where all links end; empty: nowhere.
+/// The path after resolving all links; empty if it does not exist.
 fs::path target_of(const fs::path& path) {
   std::error_code failed;
   fs::path target = fs::canonical(path, failed);
@@ -38,7 +40,7 @@ bool has_open(const fs::path& process, const fs::path& device) {
 
 }  // namespace
 
-std::optional<std::string> steady_name_of(const std::string& device, const fs::path& by_id) {
+std::optional<std::string> by_id_link_of(const std::string& device, const fs::path& by_id) {
   const fs::path target = target_of(device);
   std::optional<std::string> name;
   for_each_entry(by_id, [&](const fs::path& link) {
@@ -47,7 +49,7 @@ std::optional<std::string> steady_name_of(const std::string& device, const fs::p
   return name;
 }
 
-std::optional<std::string> holder_of(const std::string& device) {
+std::optional<std::string> process_using(const std::string& device) {
   const fs::path target = target_of(device);
   std::optional<std::string> holder;
   for_each_entry("/proc", [&](const fs::path& process) {
@@ -56,24 +58,24 @@ std::optional<std::string> holder_of(const std::string& device) {
     if (!has_open(process, target)) return;
     std::string name;
     std::ifstream(process / "comm") >> name;
-    holder = name + " (" + id + ")";
+    holder = fmt::format("{} ({})", name, id);
   });
   return holder;
 }
 
-std::string DeviceName::to_open() const {
-  if (!steady_) return configured_;
-  // Adapters without a serial number share one link. Where it points at another one now, the
+std::string DeviceName::path_to_open() const {
+  if (!by_id_link_) return configured_;
+  // Adapters without a serial number share one link. If it now refers to another adapter, the
   // configured device is the one without a link.
-  const bool shared = !target_of(*steady_).empty() && !target_of(configured_).empty() &&
-                      !steady_name_of(configured_, by_id_);
-  return shared ? configured_ : *steady_;
+  const bool shared = !target_of(*by_id_link_).empty() && !target_of(configured_).empty() &&
+                      !by_id_link_of(configured_, by_id_);
+  return shared ? configured_ : *by_id_link_;
 }
 
-void DeviceName::remember() {
+void DeviceName::remember_link() {
   std::error_code failed;
-  if (steady_ || fs::is_symlink(configured_, failed)) return;
-  steady_ = steady_name_of(configured_, by_id_);
+  if (by_id_link_ || fs::is_symlink(configured_, failed)) return;
+  by_id_link_ = by_id_link_of(configured_, by_id_);
 }
 
 }  // namespace crepes

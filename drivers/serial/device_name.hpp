@@ -1,4 +1,4 @@
-/// Finding a serial device again after it was unplugged.
+/// Persistent names of devices: finds a serial device again after it was unplugged.
 #pragma once
 
 #include <filesystem>
@@ -8,31 +8,31 @@
 
 namespace crepes {
 
-/// Where udev keeps a link to every serial device under a name that stays the same.
+/// The directory of udev's persistent links to serial devices.
 inline constexpr const char* kSerialById = "/dev/serial/by-id";
 
-/// The link in `by_id` that points at `device`.
-[[nodiscard]] std::optional<std::string> steady_name_of(const std::string& device,
-                                                        const std::filesystem::path& by_id);
+/// The link in `by_id` that refers to `device`.
+[[nodiscard]] std::optional<std::string> by_id_link_of(const std::string& device,
+                                                       const std::filesystem::path& by_id);
 
-/// The program that has `device` open, as "name (process)"; empty where none can be seen.
-[[nodiscard]] std::optional<std::string> holder_of(const std::string& device);
+/// The process that has `device` open, as "name (id)"; empty if none is visible.
+[[nodiscard]] std::optional<std::string> process_using(const std::string& device);
 
-/// What to open for a configured device: its path, and once it has been open the same device,
-/// whatever the kernel calls it now.
+/// The path of a configured device. After the device was open once, the same device is found again
+/// even if the kernel has given it another name.
 class DeviceName {
  public:
   DeviceName(std::string configured, std::filesystem::path by_id)
       : configured_(std::move(configured)), by_id_(std::move(by_id)) {}
 
-  [[nodiscard]] std::string to_open() const;
-  /// To be called when what `to_open` said is open.
-  void remember();
+  [[nodiscard]] std::string path_to_open() const;
+  /// Call when `path_to_open()` has been opened.
+  void remember_link();
 
  private:
   std::string configured_;
   std::filesystem::path by_id_;
-  std::optional<std::string> steady_;
+  std::optional<std::string> by_id_link_;
 };
 
 }  // namespace crepes

@@ -1,4 +1,4 @@
-/// Finds frames in a byte stream; touches no device.
+/// Finds frames in a byte stream. Accesses no device.
 #pragma once
 
 #include <concepts>
@@ -13,12 +13,12 @@ namespace crepes {
 
 using Bytes = std::span<const std::uint8_t>;
 
-/// What stands at the beginning of some bytes.
+/// The kind of frame at the beginning of some bytes.
 enum class FrameKind : std::uint8_t {
-  kNone,         ///< nothing that this protocol sends
-  kIncomplete,   ///< a frame so far, more bytes will tell
-  kBadChecksum,  ///< a frame but for its checksum
-  kForeign,      ///< what this device sends when it is set up for something else
+  kNone,         ///< no frame of this protocol
+  kIncomplete,   ///< valid so far; needs more bytes
+  kBadChecksum,  ///< a frame with a wrong checksum
+  kForeign,      ///< a frame of this device in another mode of operation
   kComplete,     ///< a frame of `length` bytes
 };
 
@@ -29,12 +29,12 @@ struct FrameCheck {
 
 template <class Protocol>
 concept FrameProtocol = requires(Bytes bytes) {
-  /// Told from at least one byte; never kIncomplete on kMaxFrame bytes or more.
+  /// Needs at least one byte. Never kIncomplete for kMaxFrame bytes or more.
   { Protocol::examine(bytes) } -> std::same_as<FrameCheck>;
   { Protocol::kMaxFrame } -> std::convertible_to<std::size_t>;
 };
 
-/// Totals since the start; `..._in_a_row` since the last good frame.
+/// Totals since the start; `..._in_a_row` since the last valid frame.
 struct DecoderCounts {
   std::uint64_t frames = 0;
   std::uint64_t skipped_bytes = 0;
@@ -43,12 +43,12 @@ struct DecoderCounts {
   std::uint64_t foreign_in_a_row = 0;
 };
 
-/// Frames come out whole and in order, however the stream is cut. After a false start it resumes
-/// one byte further, so that no corrupt byte costs a frame that it is not part of.
+/// Returns whole frames in order, regardless of how the stream is divided into chunks. After a
+/// false start it resumes one byte later, so that a corrupt byte destroys only its own frame.
 template <FrameProtocol Protocol>
 class FrameDecoder {
  public:
-  /// Calls `on_frame(Bytes)` for every frame that `chunk` completes.
+  /// Calls `on_frame(Bytes)` for each frame that `chunk` completes.
   template <class OnFrame>
   void feed(Bytes chunk, OnFrame&& on_frame) {
     pending_.insert(pending_.end(), chunk.begin(), chunk.end());

@@ -1,7 +1,8 @@
 #include "drivers/serial/line_settings.hpp"
 
-// The kernel's own header has termios2, which takes a rate as a number; <termios.h> would clash.
+// The kernel's header has termios2, with rates as numbers. It conflicts with <termios.h>.
 #include <asm/termbits.h>
+#include <fmt/format.h>
 #include <linux/serial.h>
 #include <sys/ioctl.h>
 
@@ -13,10 +14,10 @@ namespace crepes {
 namespace {
 
 tl::unexpected<Error> io_error(const std::string& name) {
-  return fail(ErrorCode::kIo, name + ": " + std::generic_category().message(errno));
+  return fail(ErrorCode::kIo, fmt::format("{}: {}", name, std::generic_category().message(errno)));
 }
 
-/// USB adapters save up bytes for up to 16 ms otherwise. Those that never do (cdc_acm) refuse.
+/// Otherwise USB adapters buffer bytes for up to 16 ms. Adapters that never do (cdc_acm) refuse.
 void prefer_low_latency(int fd) {
   serial_struct serial{};
   if (::ioctl(fd, TIOCGSERIAL, &serial) != 0) return;
@@ -40,13 +41,13 @@ Result<void> set_raw_line(int fd, int baud, const std::string& name) {
   settings.c_cc[VTIME] = 0;
   if (::ioctl(fd, TCSETS2, &settings) != 0) return io_error(name);
 
-  // The adapter's next best rate is taken without complaint, and told.
+  // The driver selects the nearest supported rate without an error, and reports it.
   termios2 taken{};
   if (::ioctl(fd, TCGETS2, &taken) != 0) return io_error(name);
   const long off = std::labs(static_cast<long>(taken.c_ospeed) - baud);
   if (50 * off > baud) {
-    return fail(ErrorCode::kIo, name + ": the device makes " + std::to_string(taken.c_ospeed) +
-                                    " baud of " + std::to_string(baud));
+    return fail(ErrorCode::kIo,
+                fmt::format("{}: the device makes {} baud of {}", name, taken.c_ospeed, baud));
   }
   if (::ioctl(fd, TIOCEXCL) != 0) return io_error(name);
   prefer_low_latency(fd);

@@ -1,4 +1,4 @@
-/// How a serial line is set: the kernel's side of it.
+/// Terminal settings of a serial line.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace crepes {
 
-/// Raw, 8N1, no flow control, at any rate that the adapter can make, within 2 %; then keeps other
-/// programs out, has the adapter hand bytes on at once where it can, and throws away what was
-/// received before. Errors begin with `name`.
+/// Raw mode, 8N1, no flow control, at any rate that the adapter supports within 2 %. Also locks out
+/// other programs, requests low latency from the adapter and discards bytes received earlier.
+/// Errors begin with `name`.
 [[nodiscard]] Result<void> set_raw_line(int fd, int baud, const std::string& name);
 
 }  // namespace crepes

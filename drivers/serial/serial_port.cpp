@@ -1,6 +1,7 @@
 #include "drivers/serial/serial_port.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <poll.h>
 #include <sys/file.h>
 
@@ -17,11 +18,12 @@ namespace {
 tl::unexpected<Error> io_error(const std::string& path, int error) {
   const ErrorCode code = error == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo;
   const char* const hint = error == EACCES ? "; is the user in the group dialout?" : "";
-  return fail(code, path + ": " + std::generic_category().message(error) + hint);
+  return fail(code, fmt::format("{}: {}{}", path, std::generic_category().message(error), hint));
 }
 
 tl::unexpected<Error> busy(const std::string& path) {
-  return fail(ErrorCode::kIo, path + ": in use by " + holder_of(path).value_or("another program"));
+  return fail(ErrorCode::kIo, fmt::format("{}: in use by {}", path,
+                                          process_using(path).value_or("another program")));
 }
 
 }  // namespace
@@ -29,7 +31,7 @@ tl::unexpected<Error> busy(const std::string& path) {
 Result<SerialPort> SerialPort::open(const std::string& path, int baud) {
   UniqueFd fd{::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)};
   if (!fd) return errno == EBUSY ? busy(path) : io_error(path, errno);
-  // TIOCEXCL keeps out programs that do not lock; the lock keeps out those that run as root.
+  // TIOCEXCL excludes programs that do not lock; the lock excludes programs that run as root.
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) {
     const int error = errno;
     fd = UniqueFd();
@@ -51,7 +53,7 @@ Result<Bytes> SerialPort::read_some(std::chrono::milliseconds timeout) {
     return Bytes{};
   }
   if (count < 0 && errno != EIO && errno != EAGAIN) return io_error(path_, errno);
-  return fail(ErrorCode::kIo, path_ + ": hung up");
+  return fail(ErrorCode::kIo, fmt::format("{}: hung up", path_));
 }
 
 Result<void> SerialPort::write_all(Bytes bytes, std::chrono::milliseconds timeout) {
@@ -59,7 +61,7 @@ Result<void> SerialPort::write_all(Bytes bytes, std::chrono::milliseconds timeou
     pollfd waiting{.fd = fd_.get(), .events = POLLOUT, .revents = 0};
     const int ready = ::poll(&waiting, 1, static_cast<int>(timeout.count()));
     if (ready < 0 && errno != EINTR) return io_error(path_, errno);
-    if (ready == 0) return fail(ErrorCode::kIo, path_ + ": takes no bytes");
+    if (ready == 0) return fail(ErrorCode::kIo, fmt::format("{}: takes no bytes", path_));
     const ssize_t count = ::write(fd_.get(), bytes.data(), bytes.size());
     if (count < 0 && errno != EAGAIN && errno != EINTR) return io_error(path_, errno);
     if (count > 0) bytes = bytes.subspan(static_cast<std::size_t>(count));

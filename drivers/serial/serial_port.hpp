@@ -1,4 +1,4 @@
-/// A serial device, raw.
+/// A serial port in raw mode.
 #pragma once
 
 #include <array>
@@ -7,24 +7,24 @@
 #include <string>
 #include <utility>
 
+#include "drivers/base/unique_fd.hpp"
 #include "drivers/serial/frame_decoder.hpp"
-#include "drivers/unique_fd.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
 
-/// A terminal device in raw mode, 8N1, no flow control, at any rate, kept from other programs.
+/// A terminal device in raw mode: 8N1, no flow control, any rate, exclusive.
 class SerialPort {
  public:
-  /// What was received before is thrown away. Errors name the device and the cause, and who has it
-  /// open; kNotFound: there is no such device now.
+  /// Discards bytes received earlier. Errors name the device, the cause and the process that has it
+  /// open. kNotFound: the device does not exist now.
   [[nodiscard]] static Result<SerialPort> open(const std::string& path, int baud);
 
-  /// The bytes that are there, or that come within `timeout`; empty when none came. Valid until
-  /// the next call. An error means that the device is gone: open it anew.
+  /// The bytes that are available or arrive within `timeout`; empty if none do. Valid until the
+  /// next call. An error means that the device is gone: open it again.
   [[nodiscard]] Result<Bytes> read_some(std::chrono::milliseconds timeout);
 
-  /// Sends all of `bytes`, or says why not; waits at most `timeout` each time the line is full.
+  /// Sends all of `bytes`, or returns an error. Waits at most `timeout` each time the line is full.
   [[nodiscard]] Result<void> write_all(Bytes bytes, std::chrono::milliseconds timeout);
 
   [[nodiscard]] const std::string& path() const { return path_; }

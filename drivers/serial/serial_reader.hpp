@@ -1,5 +1,7 @@
-/// From a serial device to measurements.
+/// Reads measurements from a serial device.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/recognize.hpp"
+#include "drivers/detect_protocol.hpp"
 #include "drivers/serial/frame_decoder.hpp"
 #include "drivers/serial/serial_port.hpp"
 #include "estimator/core/clock.hpp"
@@ -17,7 +19,7 @@
 
 namespace crepes {
 
-/// The newest bytes of a stream, to tell what it is.
+/// The newest bytes of a stream, for `detect_protocol`.
 class RecentBytes {
  public:
   void add(Bytes chunk) {
@@ -35,8 +37,8 @@ class RecentBytes {
 /// Reads one device. A `Parser` is a FrameProtocol that turns whole frames into measurements:
 ///   using Measurement = ...;
 ///   void parse(Bytes frame, Timestamp arrival, const std::function<void(const Measurement&)>&);
-///   std::string why_nothing() const;               when frames hold no measurement
-///   static constexpr std::string_view kForeignMeaning;   what FrameKind::kForeign tells
+///   std::string no_measurement_reason() const;     when frames hold no measurement
+///   static constexpr std::string_view kForeignMeaning;   the meaning of FrameKind::kForeign
 template <class Parser>
 class SerialReader {
  public:
@@ -52,8 +54,8 @@ class SerialReader {
         last_frame_(clock.now()),
         last_measurement_(last_frame_) {}
 
-  /// Waits for bytes and hands on what they complete, stamped with their arrival. An error means
-  /// that the device is gone.
+  /// Waits for bytes and forwards the measurements that they complete, stamped with their arrival.
+  /// An error means that the device is gone.
   [[nodiscard]] Result<void> read_once(std::chrono::milliseconds timeout) {
     const Result<Bytes> chunk = port_.read_some(timeout);
     if (!chunk) return tl::unexpected(chunk.error());
@@ -69,7 +71,8 @@ class SerialReader {
     return {};
   }
 
-  /// One sentence on what is wrong with what comes in, if anything; silence is not judged here.
+  /// One sentence on what is wrong with the received bytes, if anything. Silence is not judged
+  /// here.
   [[nodiscard]] std::optional<std::string> diagnosis() const {
     constexpr std::uint64_t kEnoughForeign = 3;
     constexpr std::uint64_t kEnoughBytes = 64;
@@ -77,23 +80,23 @@ class SerialReader {
     const Timestamp now = clock_.now();
     const DecoderCounts& counts = decoder_.counts();
     if (counts.foreign_in_a_row >= kEnoughForeign) {
-      return port_.path() + ": " + std::string(Parser::kForeignMeaning);
+      return fmt::format("{}: {}", port_.path(), Parser::kForeignMeaning);
     }
     if (now - last_frame_ >= kPatience) {
       if (counts.skipped_in_a_row < kEnoughBytes) return std::nullopt;
-      return port_.path() + ": " + what_else_comes();
+      return fmt::format("{}: {}", port_.path(), describe_unknown_bytes());
     }
     if (counts.frames == 0 || now - last_measurement_ < kPatience) return std::nullopt;
-    return port_.path() + ": " + parser_.why_nothing();
+    return fmt::format("{}: {}", port_.path(), parser_.no_measurement_reason());
   }
 
   [[nodiscard]] const DecoderCounts& counts() const { return decoder_.counts(); }
   [[nodiscard]] const Parser& parser() const { return parser_; }
 
  private:
-  [[nodiscard]] std::string what_else_comes() const {
-    const std::optional<SpokenProtocol> spoken = recognize(recent_.get());
-    return spoken ? "another kind of device: it speaks " + std::string(name_of(*spoken))
+  [[nodiscard]] std::string describe_unknown_bytes() const {
+    const std::optional<SerialProtocol> spoken = detect_protocol(recent_.get());
+    return spoken ? fmt::format("another kind of device: it speaks {}", name_of(*spoken))
                   : "bytes without a valid frame; wrong baud rate or another kind of device?";
   }
 

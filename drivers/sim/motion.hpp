@@ -8,7 +8,9 @@
 
 namespace crepes {
 
-inline constexpr double kGravityMps2 = 9.81;
+/// Of the simulated world. Recordings were made with it: changing it to the standard value would
+/// change all of them.
+inline constexpr double kWorldGravityMps2 = 9.81;
 
 /// One coordinate over time: a line plus sines.
 struct Wave {
@@ -25,22 +27,22 @@ struct Wave {
   [[nodiscard]] double derivative(double t_s, int order) const;
 };
 
-/// What a body does at one instant.
+/// The state of a body at one time.
 struct BodyState {
   Pose T_W_B;
   Eigen::Vector3d v_W_B = Eigen::Vector3d::Zero();    ///< velocity [m/s], world axes
   Eigen::Vector3d a_W_B = Eigen::Vector3d::Zero();    ///< acceleration [m/s^2], world axes
   Eigen::Vector3d w_W_B_B = Eigen::Vector3d::Zero();  ///< angular rate [rad/s], body axes
 
-  /// What an ideal accelerometer feels: +9.81 up at rest [m/s^2], body axes.
+  /// The output of an ideal accelerometer: +9.81 upwards at rest [m/s^2], body axes.
   [[nodiscard]] Eigen::Vector3d specific_force() const {
-    return T_W_B.q.conjugate() * (a_W_B + kGravityMps2 * Eigen::Vector3d::UnitZ());
+    return T_W_B.q.conjugate() * (a_W_B + kWorldGravityMps2 * Eigen::Vector3d::UnitZ());
   }
 };
 
 enum class AttitudeRule {
-  kEuler,   ///< yaw, pitch and roll as given: hands, wheels
-  kThrust,  ///< the body's z follows the specific force, yaw as given: multirotors
+  kEuler,   ///< yaw, pitch and roll as given: hand-held robots, wheels
+  kThrust,  ///< z along the specific force, yaw as given: multirotors
 };
 
 /// A body's motion as a function of time.

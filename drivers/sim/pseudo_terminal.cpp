@@ -1,6 +1,7 @@
 #include "drivers/sim/pseudo_terminal.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <poll.h>
 #include <termios.h>
 
@@ -12,18 +13,19 @@
 namespace crepes {
 
 Result<PseudoTerminal> PseudoTerminal::open() {
-  const auto give_up = [] {
-    return fail(ErrorCode::kIo, "pseudo-terminal: " + std::generic_category().message(errno));
+  const auto io_error = [] {
+    return fail(ErrorCode::kIo,
+                fmt::format("pseudo-terminal: {}", std::generic_category().message(errno)));
   };
   UniqueFd master{::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)};
-  if (!master || ::grantpt(master.get()) != 0 || ::unlockpt(master.get()) != 0) return give_up();
+  if (!master || ::grantpt(master.get()) != 0 || ::unlockpt(master.get()) != 0) return io_error();
   std::array<char, 128> path{};
-  if (::ptsname_r(master.get(), path.data(), path.size()) != 0) return give_up();
-  // Raw from the start: what comes before the other end is opened must not be echoed.
+  if (::ptsname_r(master.get(), path.data(), path.size()) != 0) return io_error();
+  // Raw mode before the other end is opened: bytes received until then must not be echoed.
   termios settings{};
-  if (::tcgetattr(master.get(), &settings) != 0) return give_up();
+  if (::tcgetattr(master.get(), &settings) != 0) return io_error();
   ::cfmakeraw(&settings);
-  if (::tcsetattr(master.get(), TCSANOW, &settings) != 0) return give_up();
+  if (::tcsetattr(master.get(), TCSANOW, &settings) != 0) return io_error();
   return PseudoTerminal(std::move(master), path.data());
 }
 

@@ -1,4 +1,4 @@
-/// A serial line without a wire.
+/// A simulated serial line.
 #pragma once
 
 #include <chrono>
@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/unique_fd.hpp"
+#include "drivers/base/unique_fd.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
 
-/// The device's end of a serial line; the other end is a terminal that a SerialPort can open.
-/// Destruction hangs up.
+/// The device's end of a serial line; the other end is a terminal that a SerialPort can open. The
+/// destructor hangs up.
 class PseudoTerminal {
  public:
   [[nodiscard]] static Result<PseudoTerminal> open();
@@ -23,11 +23,11 @@ class PseudoTerminal {
   /// Path of the other end.
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// Never waits: returns how many of the bytes were taken. The rest is lost, as on a wire that
-  /// nobody listens to.
+  /// Never blocks. Returns the number of bytes that were written. The rest is lost, as on a line
+  /// without a receiver.
   std::size_t write(std::span<const std::uint8_t> bytes);
 
-  /// What was sent from the other end, waiting at most `timeout` for it; empty when nothing was.
+  /// The bytes sent from the other end; waits at most `timeout`; empty if there are none.
   [[nodiscard]] std::vector<std::uint8_t> read(std::chrono::milliseconds timeout);
 
  private:

@@ -1,5 +1,7 @@
 #include "drivers/sim/ring_renderer.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,21 +9,23 @@
 #include <string>
 #include <utility>
 
+#include "estimator/core/constants.hpp"
+
 namespace crepes {
 namespace {
 
 constexpr double kRingRadius = 0.03;  // m
 constexpr int kLeds = 6;
-constexpr double kExposure = 0.0005;        // s
-constexpr double kBlur = 0.8;               // px, one sigma of an LED's image
-constexpr double kPeakAtOneMeter = 7500.0;  // grey levels of one LED; a pixel ends at 255
-constexpr double kFaintest = 0.3;           // grey levels that still count
-constexpr double kMisalignment = 0.15 * std::numbers::pi / 180.0;  // rad, one sigma an axis
-constexpr double kOscillatorPpm = 20.0;                            // one sigma
+constexpr double kExposure = 0.0005;             // s
+constexpr double kBlur = 0.8;                    // px, one sigma of an LED's image
+constexpr double kPeakAtOneMeter = 7500.0;       // grey levels of one LED; pixels saturate at 255
+constexpr double kFaintest = 0.3;                // grey levels; fainter light is ignored
+constexpr double kMisalignment = radians(0.15);  // rad, one sigma an axis
+constexpr double kOscillatorPpm = 20.0;          // one sigma
 constexpr float kDarkLevel = 10.0F;
 constexpr double kPixelNoise = 1.5;        // grey levels, one sigma
 constexpr std::size_t kGrain = 1U << 14U;  // a power of two
-constexpr std::size_t kMostLent = 8;
+constexpr std::size_t kMaxLoaned = 8;
 
 constexpr std::uint64_t kCameraKey = 0x63616dU;
 constexpr std::uint64_t kBoardKey = 0x6c6564U;
@@ -30,7 +34,7 @@ std::uint8_t to_grey(float level) {
   return static_cast<std::uint8_t>(std::clamp(level + 0.5F, 0.0F, 255.0F));
 }
 
-/// How far from its center a blob still counts [px].
+/// Radius of a blob [px].
 int reach_of(double peak) {
   return static_cast<int>(std::ceil(kBlur * std::sqrt(2.0 * std::log(peak / kFaintest))));
 }
@@ -38,16 +42,16 @@ int reach_of(double peak) {
 }  // namespace
 
 Result<RingRenderer> RingRenderer::make(const SimWorld& world, RobotId robot,
-                                        const SwarmConfig& swarm, const CameraConfig& camera,
+                                        const SwarmConfig& swarm, const CameraCalibration& camera,
                                         std::uint8_t index) {
   const auto model = CameraModel::from(camera);
   if (!model) return tl::unexpected(model.error());
   RingRenderer renderer(world, robot, *model, camera, index);
   for (const MemberConfig& member : swarm.members) {
     if (!world.contains(member.id)) {
-      return fail(ErrorCode::kConfig, "simulated board of robot " +
-                                          std::to_string(member.id.value) +
-                                          ": the scenario has no such robot");
+      return fail(ErrorCode::kConfig,
+                  fmt::format("simulated board of robot {}: the scenario has no such robot",
+                              member.id.value));
     }
     if (member.id == robot) continue;
     auto code = BlinkCode::from(member, swarm);
@@ -61,7 +65,7 @@ Result<RingRenderer> RingRenderer::make(const SimWorld& world, RobotId robot,
 }
 
 RingRenderer::RingRenderer(const SimWorld& world, RobotId robot, CameraModel model,
-                           const CameraConfig& camera, std::uint8_t index)
+                           const CameraCalibration& camera, std::uint8_t index)
     : world_(world),
       robot_(robot),
       model_(std::move(model)),
@@ -73,7 +77,7 @@ RingRenderer::RingRenderer(const SimWorld& world, RobotId robot, CameraModel mod
   for (std::size_t i = 0; i < kGrain; ++i) {
     grain_[i] = static_cast<float>(kPixelNoise * noise_.gaussian(100 + i));
   }
-  // Rows begin at different places in the grain, so that no pattern repeats in sight.
+  // Rows start at different positions in the grain, so that no pattern is visible.
   const auto width = static_cast<std::size_t>(model_.width());
   for (std::size_t row = 0; row < static_cast<std::size_t>(model_.height()); ++row) {
     const auto shift = static_cast<std::size_t>(kGrain * noise_.uniform(row));
@@ -134,7 +138,7 @@ std::vector<RingRenderer::Blob> RingRenderer::blobs_of(const Board& board, doubl
     const double angle = 2.0 * std::numbers::pi * led / kLeds;
     const Eigen::Vector3d offset(0.0, kRingRadius * std::cos(angle), kRingRadius * std::sin(angle));
     const Eigen::Vector3d p_C = T_C_N * (board.p_body_led + offset);
-    // The LEDs look forward, and weaken towards the side.
+    // The LEDs face forward; their intensity decreases towards the side.
     const double forward = -(T_C_N.q * Eigen::Vector3d::UnitX()).dot(p_C.normalized());
     if (forward <= 0.0) continue;
     const double peak =
@@ -200,31 +204,31 @@ Frame RingRenderer::render(double t_s) {
               .width = model_.width(),
               .height = model_.height(),
               .pixels = clean_pixels()};
-  Lent lent{frame.pixels.data(), {}};
+  LoanedFrame loaned{frame.pixels.data(), {}};
   for (const Board& board : boards_) {
     const std::vector<Blob> blobs = blobs_of(board, t_s);
-    if (!blobs.empty()) lent.touched.push_back(draw(blobs, frame.pixels));
+    if (!blobs.empty()) loaned.touched.push_back(draw(blobs, frame.pixels));
   }
-  // A frame that was never given back may have left its memory to this one.
-  std::erase_if(lent_, [&](const Lent& other) { return other.pixels == lent.pixels; });
-  if (lent_.size() == kMostLent) lent_.erase(lent_.begin());
-  lent_.push_back(std::move(lent));
+  // The memory of this frame may be that of an earlier frame that was never recycled.
+  std::erase_if(loaned_, [&](const LoanedFrame& other) { return other.pixels == loaned.pixels; });
+  if (loaned_.size() == kMaxLoaned) loaned_.erase(loaned_.begin());
+  loaned_.push_back(std::move(loaned));
   return frame;
 }
 
 void RingRenderer::recycle(Frame frame) {
-  const auto lent = std::find_if(lent_.begin(), lent_.end(), [&](const Lent& candidate) {
-    return candidate.pixels == frame.pixels.data();
-  });
-  if (lent == lent_.end() || frame.pixels.size() != background_.size()) return;
-  for (const Rectangle& box : lent->touched) {
+  const auto loaned = std::find_if(
+      loaned_.begin(), loaned_.end(),
+      [&](const LoanedFrame& candidate) { return candidate.pixels == frame.pixels.data(); });
+  if (loaned == loaned_.end() || frame.pixels.size() != background_.size()) return;
+  for (const Rectangle& box : loaned->touched) {
     for (int row = box.top; row < box.bottom; ++row) {
       const std::ptrdiff_t line = static_cast<std::ptrdiff_t>(row) * model_.width();
       std::copy(background_.begin() + line + box.left, background_.begin() + line + box.right,
                 frame.pixels.begin() + line + box.left);
     }
   }
-  lent_.erase(lent);
+  loaned_.erase(loaned);
   clean_.push_back(std::move(frame.pixels));
 }
 

@@ -1,4 +1,4 @@
-/// Pictures of LED boards.
+/// Rendered images of LED boards.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,43 +9,44 @@
 #include "drivers/camera/camera.hpp"
 #include "drivers/sim/seeded_noise.hpp"
 #include "drivers/sim/world.hpp"
-#include "estimator/core/config.hpp"
+#include "estimator/core/camera_calibration.hpp"
 #include "estimator/core/result.hpp"
+#include "estimator/core/swarm_config.hpp"
 #include "estimator/vision/camera_model.hpp"
 #include "estimator/vision/id_library.hpp"
 
 namespace crepes {
 
-/// Draws what one camera of one robot sees: every other board as a ring of six LEDs that blinks to
-/// its code on its own oscillator, over a sensor's noise. Only the pixels near a ring are touched;
+/// Renders the image of one camera of one robot. Every other board is a ring of six LEDs that
+/// blinks its code on its own oscillator, over sensor noise. Only pixels near a ring are written;
 /// the rest of a recycled frame still holds the background.
 class RingRenderer {
  public:
-  /// Refuses a camera or codes that do not work, and members without a robot in the world.
-  /// `world` must outlive this.
+  /// Refuses invalid cameras and codes, and members without a robot in the world. `world` must
+  /// outlive this.
   [[nodiscard]] static Result<RingRenderer> make(const SimWorld& world, RobotId robot,
                                                  const SwarmConfig& swarm,
-                                                 const CameraConfig& camera, std::uint8_t index);
+                                                 const CameraCalibration& camera,
+                                                 std::uint8_t index);
 
-  /// The picture at world time `t_s`, unstamped.
+  /// The image at world time `t_s`, unstamped.
   [[nodiscard]] Frame render(double t_s);
-  /// Takes back a frame of `render` whose pixels have not been changed.
+  /// Accepts a frame of `render` for reuse; its pixels must be unchanged.
   void recycle(Frame frame);
 
-  /// A lit board in view, as a flawless detector would find it.
+  /// A lit board in view, as an ideal detector reports it.
   struct View {
     RobotId robot{};
     Spot spot;
   };
   [[nodiscard]] std::vector<View> views(double t_s) const;
 
-  /// The pixel that sees a point of the world, if nothing is in the way. With the camera's own
-  /// misalignment.
+  /// The pixel of a world point, if it is not occluded. Includes the camera's true misalignment.
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p_W,
                                                        double t_s) const;
 
-  /// The pixel where the center of a board's ring appears, if the camera looks at it unhindered,
-  /// lit or not. This is truth: with the camera's own misalignment.
+  /// The true pixel of the center of a board's ring, lit or not, if it is in view and not occluded.
+  /// Includes the camera's true misalignment.
   [[nodiscard]] std::optional<Eigen::Vector2d> project_ring(RobotId neighbor, double t_s) const;
 
  private:
@@ -59,18 +60,18 @@ class RingRenderer {
   struct Rectangle {
     int left, top, right, bottom;  ///< right and bottom excluded
   };
-  struct Lent {
-    const std::uint8_t* pixels;  ///< tells the frame
+  struct LoanedFrame {
+    const std::uint8_t* pixels;  ///< identifies the frame
     std::vector<Rectangle> touched;
   };
-  /// An LED as the camera sees it.
+  /// The image of an LED.
   struct Blob {
     Eigen::Vector2d center;
     double peak;  ///< grey levels above the background
   };
 
-  RingRenderer(const SimWorld& world, RobotId robot, CameraModel model, const CameraConfig& camera,
-               std::uint8_t index);
+  RingRenderer(const SimWorld& world, RobotId robot, CameraModel model,
+               const CameraCalibration& camera, std::uint8_t index);
 
   [[nodiscard]] std::vector<Blob> blobs_of(const Board& board, double t_s) const;
   [[nodiscard]] Rectangle draw(const std::vector<Blob>& blobs, std::vector<std::uint8_t>& pixels);
@@ -80,14 +81,14 @@ class RingRenderer {
   RobotId robot_;
   CameraModel model_;
   std::uint8_t index_;
-  Pose T_C_B_;  ///< the true one
+  Pose T_C_B_;  ///< true value
   SeededNoise noise_;
   std::vector<Board> boards_;
   std::vector<std::uint8_t> background_;
   std::vector<float> grain_;  ///< noise to draw from, in grey levels
   std::vector<float> light_;  ///< scratch of draw()
   std::uint64_t frame_ = 0;
-  std::vector<Lent> lent_;                        ///< frames that are away, oldest first
+  std::vector<LoanedFrame> loaned_;               ///< frames that are away, oldest first
   std::vector<std::vector<std::uint8_t>> clean_;  ///< came back and show the background
 };
 

@@ -1,4 +1,4 @@
-/// Random numbers that are a function of where they are used, so that processes agree on them.
+/// Random numbers as a function of key and index, so that processes agree on them.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,8 +9,8 @@
 
 namespace crepes {
 
-/// An endless sequence of random numbers, addressed by index: same key, same sequence. Hashed with
-/// SplitMix64 (Steele, Lea, Flood 2014).
+/// An unlimited sequence of random numbers, addressed by index: equal keys yield equal sequences.
+/// Hashed with SplitMix64 (Steele, Lea, Flood 2014).
 class SeededNoise {
  public:
   SeededNoise(std::initializer_list<std::uint64_t> key) {

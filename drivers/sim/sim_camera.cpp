@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "drivers/sleep.hpp"
+#include "drivers/base/sleep.hpp"
 
 namespace crepes {
 
-SimCamera::SimCamera(RingRenderer renderer, const CameraConfig& config, const SimClock& clock)
+SimCamera::SimCamera(RingRenderer renderer, const CameraCalibration& config, const SimClock& clock)
     : renderer_(std::move(renderer)),
       clock_(clock),
       rate_hz_(config.rate_hz),

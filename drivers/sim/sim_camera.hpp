@@ -9,12 +9,12 @@
 
 namespace crepes {
 
-/// Takes a picture of the world at a steady rate, stamped with the shutter's time on the robot's
-/// clock. When the reader falls behind, frames are missed, not queued.
+/// Renders images of the world at a steady rate, stamped with the exposure time on the robot's
+/// clock. If the reader falls behind, frames are missed, not queued.
 class SimCamera final : public Camera {
  public:
   /// `clock` must outlive this.
-  SimCamera(RingRenderer renderer, const CameraConfig& config, const SimClock& clock);
+  SimCamera(RingRenderer renderer, const CameraCalibration& config, const SimClock& clock);
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override;
   void recycle(Frame frame) override { renderer_.recycle(std::move(frame)); }

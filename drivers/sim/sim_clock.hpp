@@ -1,8 +1,8 @@
 /// The time of a simulated world, and the clock of one robot in it.
 #pragma once
 
+#include "drivers/sim/sim_config.hpp"
 #include "estimator/core/clock.hpp"
-#include "estimator/core/config.hpp"
 
 namespace crepes {
 
@@ -24,12 +24,12 @@ class SimClock final : public Clock {
     return to_seconds(machine_.now().time_since_epoch() - epoch_);
   }
 
-  /// What this robot's clock shows at a world time.
+  /// The time on this robot's clock at a world time.
   [[nodiscard]] Timestamp local_time(double world_s) const {
     return Timestamp{from_seconds(world_s * rate_ + offset_s_)};
   }
 
-  /// The world time at which this robot's clock shows `local` [s].
+  /// The world time at which this robot's clock reads `local` [s].
   [[nodiscard]] double world_time_s(Timestamp local) const {
     return (to_seconds(local.time_since_epoch()) - offset_s_) / rate_;
   }

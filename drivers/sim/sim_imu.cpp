@@ -11,7 +11,7 @@ namespace {
 constexpr std::uint64_t kGyro = 0x6779726fU;
 constexpr std::uint64_t kAccel = 0x616363656cU;
 
-// What rotors add to each sample, one sigma.
+// Noise of each sample from rotors, one sigma.
 constexpr double kGyroVibration = 0.0052;  // rad/s
 constexpr double kAccelVibration = 0.2;    // m/s^2
 
@@ -33,7 +33,7 @@ Eigen::Vector3d SimTriad::measure(const Eigen::Vector3d& truth, double dt_s) {
   return truth + scale_ * truth + bias_ + sigmas_.noise * source_.gaussian3(drawn_++);
 }
 
-SimImu::SimImu(const SimWorld& world, RobotId robot, const ImuConfig& config)
+SimImu::SimImu(const SimWorld& world, RobotId robot, const ImuNoise& config)
     : world_(world),
       robot_(robot),
       period_s_(1.0 / config.update_rate),
@@ -53,7 +53,7 @@ double SimImu::sample_noise(double density, double vibration) const {
 }
 
 std::vector<std::uint8_t> SimImu::sample(double t_s) {
-  // A sensor that integrates inside sends the mean since its last sample.
+  // An integrating sensor sends the mean since its last sample.
   const BodyState body = world_.state(robot_, t_s - 0.5 * period_s_);
   const auto bytes = encode_witmotion(gyro_.measure(body.w_W_B_B, period_s_),
                                       accel_.measure(body.specific_force(), period_s_));

@@ -7,7 +7,7 @@
 
 #include "drivers/sim/seeded_noise.hpp"
 #include "drivers/sim/world.hpp"
-#include "estimator/core/config.hpp"
+#include "estimator/core/sensor_noise.hpp"
 
 namespace crepes {
 
@@ -18,7 +18,7 @@ class SimTriad {
     double bias;
     double random_walk;  ///< of the bias [unit/s/sqrt(Hz)]
     double noise;        ///< of one sample
-    double scale;        ///< of each element of S: scales, and axes that are not quite orthogonal
+    double scale;        ///< of each element of S: scale errors and non-orthogonality
   };
 
   SimTriad(SeededNoise source, const Sigmas& sigmas);
@@ -32,14 +32,14 @@ class SimTriad {
   std::uint64_t drawn_ = 0;
 };
 
-/// One robot's sensor: WitMotion bytes with the errors that `config` says it has, and
-/// the vibration of its rotors.
+/// One robot's sensor: WitMotion bytes with the errors that `config` describes, and the vibration
+/// of its rotors.
 class SimImu {
  public:
   /// `world` must outlive this.
-  SimImu(const SimWorld& world, RobotId robot, const ImuConfig& config);
+  SimImu(const SimWorld& world, RobotId robot, const ImuNoise& config);
 
-  /// The bytes of one sample at world time `t_s`; times must not go back.
+  /// The bytes of one sample at world time `t_s`; times must not decrease.
   [[nodiscard]] std::vector<std::uint8_t> sample(double t_s);
 
  private:

@@ -12,16 +12,16 @@
 
 namespace crepes {
 
-/// Sends what a device says at a steady rate into a pseudo-terminal. A sample shows the world at
-/// the moment it is sent; samples whose time has passed are missed, not sent late.
+/// Sends the output of a device at a steady rate through a pseudo-terminal. A sample is measured
+/// when it is sent. Samples whose time has passed are missed, not sent late.
 class SimSerial {
  public:
-  /// What the device sends at a world time [s].
+  /// The output of the device at a world time [s].
   using Device = std::function<std::vector<std::uint8_t>(double)>;
 
   [[nodiscard]] static Result<SimSerial> open(Device device, double rate_hz);
 
-  /// What a SerialPort is to open.
+  /// The path for SerialPort.
   [[nodiscard]] const std::string& path() const { return line_.path(); }
   /// World time of the next sample [s]; in the past before the first call of `run_until`.
   [[nodiscard]] double next_due_s() const { return static_cast<double>(next_) / rate_hz_; }

@@ -1,5 +1,7 @@
 #include "drivers/sim/sim_uwb.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -15,11 +17,12 @@ constexpr std::uint64_t kSingle = 0x73696e676c65U;
 constexpr double kPairBias = 0.045;  // m, one sigma
 constexpr double kOutlierShare = 0.005;
 constexpr double kThroughBias = 0.3;    // m, least
-constexpr double kThroughSpread = 0.4;  // m, mean of what comes on top
+constexpr double kThroughSpread = 0.4;  // m, mean of the additional bias
 constexpr double kThroughLoss = 12.0;   // dB on the first path
 
-/// What both modules of a pair have in common at `t_s`: a constant, and a part that wanders.
-double pair_bias(const SimWorld& world, RobotId a, RobotId b, const UwbConfig& config, double t_s) {
+/// The bias that both modules of a pair share at `t_s`: a constant and a varying part.
+double pair_bias(const SimWorld& world, RobotId a, RobotId b, const RangeNoise& config,
+                 double t_s) {
   const auto [low, high] = std::minmax(a, b);
   const SeededNoise noise{kPair, static_cast<std::uint64_t>(world.seed()), low.value, high.value};
   const double phase = 2.0 * std::numbers::pi * noise.uniform(2);
@@ -30,16 +33,17 @@ double pair_bias(const SimWorld& world, RobotId a, RobotId b, const UwbConfig& c
 }  // namespace
 
 Result<SimUwb> SimUwb::make(const SimWorld& world, RobotId robot, const SwarmConfig& swarm,
-                            const UwbConfig& config) {
+                            const RangeNoise& config) {
   SimUwb uwb(world, config);
   bool is_member = false;
   for (const MemberConfig& member : swarm.members) {
-    const std::string who = "simulated UWB module of robot " + std::to_string(member.id.value);
+    const std::string who = fmt::format("simulated UWB module of robot {}", member.id.value);
     if (!world.contains(member.id)) {
-      return fail(ErrorCode::kConfig, who + ": the scenario has no such robot");
+      return fail(ErrorCode::kConfig, fmt::format("{}: the scenario has no such robot", who));
     }
     const int id = member.uwb_id.value_or(member.id.value);
-    if (id > UINT8_MAX) return fail(ErrorCode::kConfig, who + ": NodeFrame3 ids end at 255");
+    if (id > UINT8_MAX)
+      return fail(ErrorCode::kConfig, fmt::format("{}: NodeFrame3 ids end at 255", who));
     const Module module{member.id, static_cast<std::uint8_t>(id), member.p_body_uwb};
     if (member.id == robot) {
       uwb.self_ = module;

@@ -6,17 +6,17 @@
 #include <numbers>
 
 #include "drivers/sim/seeded_noise.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/core/contract.hpp"
 
 namespace crepes {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180.0;
 constexpr double kLineStep = 4.0;  // m, along the corridor
 constexpr double kLineSide = 1.5;  // m, from its middle
 
-/// Draws the sines of one robot: amplitudes as asked, frequencies within +-20 %, any phase.
+/// Draws the sines of one robot: given amplitudes, frequencies within +-20 %, random phases.
 class WaveSource {
  public:
   WaveSource(int seed, RobotId robot)
@@ -43,35 +43,35 @@ class WaveSource {
   std::uint64_t next_ = 0;
 };
 
-/// A multirotor around a place.
+/// A multirotor near a place.
 Motion hovering(WaveSource waves, double x, double y, double height, double yaw) {
   return {.rule = AttitudeRule::kThrust,
           .x = waves.wander(x, 0.6, 0.17),
           .y = waves.wander(y, 0.6, 0.17),
           .z = waves.wander(height, 0.35, 0.13),
-          .yaw = waves.wander(yaw, 20.0 * kDegree, 0.12),
+          .yaw = waves.wander(yaw, 20.0 * kRadPerDeg, 0.12),
           .pitch = {},
           .roll = {}};
 }
 
-/// Around a place at distance `radius` from the center in direction `bearing`, looking inwards.
+/// Around a place at distance `radius` from the center in direction `bearing`, facing inwards.
 Motion multirotor(WaveSource waves, double radius, double bearing, double height) {
   return hovering(waves, radius * std::cos(bearing), radius * std::sin(bearing), height,
                   bearing + kPi);
 }
 
-/// On level ground, otherwise as a multirotor.
+/// On level ground; otherwise like a multirotor.
 Motion ground_robot(WaveSource waves, double radius, double bearing) {
   return {.rule = AttitudeRule::kEuler,
           .x = waves.wander(radius * std::cos(bearing), 0.5, 0.09),
           .y = waves.wander(radius * std::sin(bearing), 0.5, 0.09),
           .z = {.offset = 0.3},
-          .yaw = waves.wander(bearing + kPi, 20.0 * kDegree, 0.1),
+          .yaw = waves.wander(bearing + kPi, 20.0 * kRadPerDeg, 0.1),
           .pitch = {},
           .roll = {}};
 }
 
-/// Carried around a circle of 4 m across, looking inwards, swung about all axes.
+/// Carried around a circle with a diameter of 4 m, facing inwards, rotating about all axes.
 Motion hand_held(WaveSource waves, double bearing) {
   constexpr double kRadius = 2.0;
   constexpr double kTurn = 0.5;  // rad/s
@@ -79,20 +79,20 @@ Motion hand_held(WaveSource waves, double bearing) {
                 .x = waves.wander(0.0, 0.15, 0.6),
                 .y = waves.wander(0.0, 0.15, 0.6),
                 .z = waves.wander(1.4, 0.25, 0.5),
-                .yaw = waves.wander(bearing + kPi, 45.0 * kDegree, 0.8),
-                .pitch = waves.wander(0.0, 25.0 * kDegree, 0.9),
-                .roll = waves.wander(0.0, 35.0 * kDegree, 0.7)};
+                .yaw = waves.wander(bearing + kPi, 45.0 * kRadPerDeg, 0.8),
+                .pitch = waves.wander(0.0, 25.0 * kRadPerDeg, 0.9),
+                .roll = waves.wander(0.0, 35.0 * kRadPerDeg, 0.7)};
   motion.x.sines.push_back({kRadius, kTurn, bearing + kPi / 2.0});  // radius cos(bearing + turn t)
   motion.y.sines.push_back({kRadius, kTurn, bearing});
   motion.yaw.slope_ps = kTurn;
   return motion;
 }
 
-/// Still, standing almost level about a place.
+/// At rest near a place, almost level.
 Motion resting(WaveSource waves, double x, double y, double z, double yaw) {
   const auto near = [&waves](double place) { return Wave{.offset = waves.within(place, 0.1)}; };
   const auto askew = [&waves](double angle) {
-    return Wave{.offset = waves.within(angle, 2.0 * kDegree)};
+    return Wave{.offset = waves.within(angle, 2.0 * kRadPerDeg)};
   };
   return {.rule = AttitudeRule::kEuler,
           .x = near(x),
@@ -134,7 +134,7 @@ std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
       return motions;
     }
     case SimScenario::kLine: {
-      // From side to side of a corridor, each looking across it, at those before and behind.
+      // On alternating sides of a corridor; each faces across it and sees its two neighbors.
       std::map<RobotId, Motion> motions;
       for (std::uint16_t id = 1; id <= 4; ++id) {
         const double side = id % 2 == 1 ? -1.0 : 1.0;
@@ -151,9 +151,9 @@ std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
 }
 
 std::vector<Pillar> pillars_of(SimScenario scenario) {
-  // Neighbors next to each other on the circle always see past it, the others now and then.
+  // Adjacent robots on the circle always see past the pillar, the others only at times.
   if (scenario == SimScenario::kOccluded) return {{.radius_m = 1.0}};
-  // Opposite the second and the third: each sees the next one in the line, and nobody else, ever.
+  // Opposite the second and the third: each robot sees only the next one in the line.
   if (scenario == SimScenario::kLine) {
     return {{.center_W = {kLineStep, -kLineSide}, .radius_m = 1.3},
             {.center_W = {2.0 * kLineStep, kLineSide}, .radius_m = 1.3}};

@@ -6,18 +6,18 @@
 #include <vector>
 
 #include "drivers/sim/motion.hpp"
-#include "estimator/core/config.hpp"
+#include "drivers/sim/sim_config.hpp"
 #include "estimator/core/measurements.hpp"
 
 namespace crepes {
 
-/// A vertical cylinder without end that hides robots from each other.
+/// A vertical cylinder of infinite height that occludes robots from each other.
 struct Pillar {
   Eigen::Vector2d center_W = Eigen::Vector2d::Zero();
   double radius_m = 0.0;
 };
 
-/// The robots of a scenario, ids 1..n, in a z-up world W. Immutable: may be shared by threads.
+/// The robots of a scenario, ids 1..n, in a z-up world W. Immutable: threads may share it.
 class SimWorld {
  public:
   /// Uses `scenario` and `seed` only.
@@ -30,12 +30,12 @@ class SimWorld {
   /// Truth at world time `t_s`; the robot must exist.
   [[nodiscard]] BodyState state(RobotId robot, double t_s) const;
   [[nodiscard]] Pose T_W_B(RobotId robot, double t_s) const { return state(robot, t_s).T_W_B; }
-  /// A multirotor: it vibrates.
+  /// Whether it is a multirotor: its IMU vibrates.
   [[nodiscard]] bool has_rotors(RobotId robot) const;
   /// The pose of `neighbor` as seen by `observer`.
   [[nodiscard]] Pose T_B_N(RobotId observer, RobotId neighbor, double t_s) const;
 
-  /// Whether something stands between two points.
+  /// Whether the line between two points is occluded.
   [[nodiscard]] bool is_occluded(const Eigen::Vector3d& p_W_from,
                                  const Eigen::Vector3d& p_W_to) const;
 

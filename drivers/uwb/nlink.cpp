@@ -1,5 +1,7 @@
 #include "drivers/uwb/nlink.hpp"
 
+#include <fmt/format.h>
+
 namespace crepes {
 
 UwbModules uwb_modules_of(const SwarmConfig& swarm) {
@@ -45,14 +47,16 @@ void NlinkParser::parse(Bytes frame, Timestamp arrival,
   }
 }
 
-std::string NlinkParser::why_nothing() const {
+std::string NlinkParser::no_measurement_reason() const {
   if (!has_ranges(last_kind_)) {
-    return "the module sends " + std::string(name_of(last_kind_)) +
-           ", which has no ranges; choose NodeFrame3 with NAssistant";
+    return fmt::format(
+        "the module sends {}, which has no ranges; choose NodeFrame3 with NAssistant",
+        name_of(last_kind_));
   }
   if (stranger_) {
-    return "ranges only to modules that no member carries, such as " + std::to_string(*stranger_) +
-           "; see swarm.members, uwb_id";
+    return fmt::format(
+        "ranges only to modules that no member carries, such as {}; see swarm.members, uwb_id",
+        *stranger_);
   }
   return "the module answers but gives no range to any member; are the others on, and in the same "
          "mode and channel?";

@@ -12,26 +12,26 @@
 
 #include "drivers/device_clock.hpp"
 #include "drivers/uwb/nlink_frame.hpp"
-#include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/swarm_config.hpp"
 
 namespace crepes {
 
-/// Which robot carries which module.
+/// The robot that carries each module.
 using UwbModules = std::map<std::uint32_t, RobotId>;
 
-/// A member without `uwb_id` carries the module of its own number.
+/// A member without `uwb_id` carries the module with its robot id.
 [[nodiscard]] UwbModules uwb_modules_of(const SwarmConfig& swarm);
 
 struct NlinkCounts {
   std::uint64_t ranges = 0;
   std::uint64_t unknown_modules = 0;  ///< ranges to modules that no member carries
   std::uint64_t implausible = 0;      ///< ranges that are not positive, too long or too old
-  std::uint64_t without_ranges = 0;   ///< frames of a kind that has none
+  std::uint64_t without_ranges = 0;   ///< frames of a kind without ranges
   std::uint64_t clock_restarts = 0;   ///< of the module's own clock
 };
 
-/// Ranges from every kind of frame that has some.
+/// Extracts ranges from every kind of frame that has them.
 class NlinkParser {
  public:
   using Measurement = UwbRange;
@@ -45,12 +45,12 @@ class NlinkParser {
 
   [[nodiscard]] static FrameCheck examine(Bytes bytes) { return examine_nlink(bytes); }
 
-  /// A whole frame, stamped by the module's own clock. Ranges of NodeFrame2 carry their own age and
-  /// are stamped that much earlier.
+  /// Parses a whole frame, stamped by the module's clock. Ranges of NodeFrame2 carry their age and
+  /// are stamped earlier by it.
   void parse(Bytes frame, Timestamp arrival, const std::function<void(const UwbRange&)>& sink);
 
-  /// Why frames come but no ranges, judged by the last frame.
-  [[nodiscard]] std::string why_nothing() const;
+  /// Why frames arrive without ranges, according to the last frame.
+  [[nodiscard]] std::string no_measurement_reason() const;
   [[nodiscard]] const NlinkCounts& counts() const { return counts_; }
 
  private:

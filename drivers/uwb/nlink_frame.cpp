@@ -3,20 +3,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "drivers/serial/byte_fields.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/core/contract.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr std::uint8_t kHeader = 0x55;
+constexpr std::uint8_t kNlinkHeader = 0x55;
 constexpr std::uint8_t kLastRole = 6;
 constexpr std::size_t kMostNodes = 255;
 
-/// A kind with nodes: a fixed part that ends with their number, the nodes, a checksum. Offsets are
-/// those of the frame, or of the node where the name says so; 0: the kind has none.
+/// A kind with nodes: a fixed part that ends with the number of nodes, the nodes, a checksum.
+/// Offsets are from the frame, or from the node where the name says so; 0: the kind has no such
+/// field.
 struct Layout {
   NlinkKind kind;
   std::string_view name;
@@ -97,12 +98,12 @@ constexpr std::array kLayouts{
            .node_user_data = 5},
 };
 
-/// TagFrame0 has no nodes but eight ranges, to anchors 0 to 7.
+/// TagFrame0 has eight ranges, to anchors 0 to 7, instead of nodes.
 constexpr std::size_t kTagLength = 128;
 constexpr std::size_t kTagRanges = 22;
 constexpr std::size_t kTagAnchors = 8;
 
-/// Where NlinkMotion lies. Orientation: gyro, acceleration, 12 bytes, angles, quaternion.
+/// Offsets of NlinkMotion. Orientation: gyro, acceleration, 12 bytes, angles, quaternion.
 struct MotionLayout {
   std::size_t position;
   std::size_t velocity;
@@ -111,7 +112,7 @@ struct MotionLayout {
 };
 constexpr MotionLayout kTagMotion{.position = 4, .velocity = 13, .error = 117, .orientation = 46};
 constexpr MotionLayout kNodeMotion{.position = 13, .velocity = 22, .error = 10, .orientation = 40};
-constexpr std::size_t kAcceleration = 12;
+constexpr std::size_t kAccelerationOffset = 12;
 constexpr std::size_t kAngles = 36;
 constexpr std::size_t kQuaternion = 42;
 
@@ -130,7 +131,7 @@ Eigen::Vector3d int24_vector_at(Bytes bytes, std::size_t at) {
 }
 
 double angle_at(Bytes bytes, std::size_t at) {
-  return field_at<std::int16_t>(bytes, at) / 100.0 * std::numbers::pi / 180.0;
+  return radians(field_at<std::int16_t>(bytes, at) / 100.0);
 }
 
 Eigen::Vector4d wxyz_at(Bytes bytes, std::size_t at) {
@@ -143,7 +144,7 @@ std::size_t user_data_size(Bytes bytes, const Layout& layout, std::size_t node) 
   return layout.node_user_data == 0 ? 0 : unsigned_at(bytes, node + layout.node_user_data, 2);
 }
 
-/// Whether the nodes, as far as they are there, can fill a frame of `length` bytes.
+/// Whether the nodes received so far can fill a frame of `length` bytes.
 bool nodes_can_fill(Bytes bytes, const Layout& layout, std::size_t length) {
   const std::size_t end = length - 1;
   const std::size_t count = bytes[layout.count];
@@ -166,8 +167,8 @@ bool has_known_roles(Bytes frame, const Layout& layout) {
   return true;
 }
 
-/// With no length in it, a TagFrame0 must show that it is one: the quaternion has length 1, or is
-/// zero where the module has no inertial sensor.
+/// TagFrame0 has no length field, so its content is checked: the quaternion has norm 1, or is zero
+/// if the module has no inertial sensor.
 FrameCheck examine_tag(Bytes bytes) {
   if (bytes.size() > 3 && bytes[3] > kLastRole) return {};
   if (bytes.size() < kTagLength) return {FrameKind::kIncomplete};
@@ -186,7 +187,7 @@ NlinkMotion motion_in(Bytes frame, const MotionLayout& at) {
           .position_error_m = vector_at<std::uint8_t>(frame, at.error) / 100.0,
           .velocity_mps = int24_vector_at(frame, at.velocity) / 10000.0,
           .gyro_radps = vector_at<float>(frame, at.orientation),
-          .accel_mps2 = vector_at<float>(frame, at.orientation + kAcceleration),
+          .accel_mps2 = vector_at<float>(frame, at.orientation + kAccelerationOffset),
           .roll_pitch_yaw_rad = {angle_at(frame, angles), angle_at(frame, angles + 2),
                                  angle_at(frame, angles + 4)},
           .q = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3])};
@@ -252,7 +253,7 @@ bool has_ranges(NlinkKind kind) {
 }
 
 FrameCheck examine_nlink(Bytes bytes) {
-  if (bytes[0] != kHeader && bytes[0] != 0xff) return {};
+  if (bytes[0] != kNlinkHeader && bytes[0] != 0xff) return {};
   if (bytes.size() < 2) return {FrameKind::kIncomplete};
   if (bytes[0] == 0xff) return {bytes[1] == 0x02 ? FrameKind::kForeign : FrameKind::kNone};
   const NlinkKind kind{bytes[1]};
@@ -260,7 +261,7 @@ FrameCheck examine_nlink(Bytes bytes) {
   const Layout* layout = layout_of(kind);
   if (layout == nullptr) return {};
 
-  // The length stands twice, in itself and as the number of nodes: both must agree.
+  // The length field and the number of nodes must agree.
   if (bytes.size() < 4) return {FrameKind::kIncomplete};
   const std::size_t length = unsigned_at(bytes, 2, 2);
   if (length <= layout->first_node() || length > kLongestNlinkFrame) return {};
@@ -301,7 +302,7 @@ std::vector<std::uint8_t> encode_node_frame3(std::uint8_t module, std::uint32_t 
   constexpr std::size_t kFixed = 21;
   constexpr std::size_t kPerNode = 7;
   CREPES_EXPECT(nodes.size() <= kMostNodes, "the number of nodes is one byte");
-  std::vector<std::uint8_t> out{kHeader, static_cast<std::uint8_t>(NlinkKind::kNodeFrame3)};
+  std::vector<std::uint8_t> out{kNlinkHeader, static_cast<std::uint8_t>(NlinkKind::kNodeFrame3)};
   append(out, static_cast<std::uint32_t>(kFixed + nodes.size() * kPerNode + 1), 2);
   append(out, kRoleNode, 1);
   append(out, module, 1);

@@ -1,4 +1,4 @@
-/// The NLink protocol of NoopLoop LinkTrack modules: bytes to values, nothing else.
+/// The NLink protocol of NoopLoop LinkTrack modules: decoding of frames.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,11 +25,11 @@ enum class NlinkKind : std::uint8_t {
   kNodeFrame6 = 0x09,
 };
 
-/// As NAssistant calls it.
+/// The name in NAssistant.
 [[nodiscard]] std::string_view name_of(NlinkKind kind);
 [[nodiscard]] bool has_ranges(NlinkKind kind);
 
-/// What a module says of one other module; a kind of frame fills only what it has.
+/// A module's report on one other module. Each kind of frame sets only some of the fields.
 struct NlinkNode {
   std::uint32_t module = 0;
   double range_m = 0.0;         ///< of kinds with `has_ranges`
@@ -43,7 +43,7 @@ struct NlinkNode {
   std::vector<std::uint8_t> user_data = {};                  ///< NodeFrame0, NodeFrame6
 };
 
-/// What a tag knows of itself, in the axes of its anchors.
+/// A tag's own state, in the axes of its anchors.
 struct NlinkMotion {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d position_error_m = Eigen::Vector3d::Zero();
@@ -67,13 +67,13 @@ struct NlinkFrame {
 
 inline constexpr std::size_t kLongestNlinkFrame = 119 + 255 * 13 + 1;  ///< NodeFrame2, 255 nodes
 
-/// `bytes` begin a frame of this protocol?
+/// Whether `bytes` begin with a frame of this protocol.
 [[nodiscard]] FrameCheck examine_nlink(Bytes bytes);
 
-/// A whole frame, as `examine_nlink` found it.
+/// Decodes a whole frame that `examine_nlink` found.
 [[nodiscard]] NlinkFrame decode_nlink(Bytes frame);
 
-/// The frame that a module with role NODE sends; times are milliseconds of the module's clocks.
+/// The frame that a module with role NODE sends; times are milliseconds of the module's clock.
 [[nodiscard]] std::vector<std::uint8_t> encode_node_frame3(std::uint8_t module,
                                                            std::uint32_t system_time_ms,
                                                            const std::vector<NlinkNode>& nodes);

@@ -57,7 +57,7 @@ class BoundEnvelope {
   std::vector<Slot> slots_;
 };
 
-/// The offset at `center` that all bounds push to, along lines of slope `skew`; `sign` as above.
+/// The tightest bound of the offset at `center`, along lines of slope `skew`; `sign` as above.
 [[nodiscard]] inline double tightest(const std::vector<OffsetBound>& bounds, double skew,
                                      double center, int sign) {
   double best = -std::numeric_limits<double>::infinity();
@@ -68,7 +68,7 @@ class BoundEnvelope {
 
 /// How far the tightest bound errs, one sigma: of n bounds with mean excess mu the smallest has
 /// mu/n. While there are few, half the `margin` (to bounds of the other side; 0: there are none)
-/// stands in for what they do not tell.
+/// replaces the missing ones.
 [[nodiscard]] inline double envelope_sigma(const std::vector<OffsetBound>& bounds, double skew,
                                            double center, double tight, double margin) {
   double excess = std::max(margin, 0.0) / 2;

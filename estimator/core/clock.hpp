@@ -1,4 +1,4 @@
-/// The one way to learn what time it is. For drivers, net and daemon; the rest of estimator/ may
+/// The interface that reads a clock. For drivers, net and daemon; the rest of estimator/ may
 /// not include it.
 #pragma once
 

@@ -1,4 +1,4 @@
-/// Everything that can happen to the estimator.
+/// The inputs of the estimator.
 #pragma once
 
 #include <variant>
@@ -7,13 +7,14 @@
 
 namespace crepes {
 
-/// Time passes: timeouts and outputs hang on it, so they replay like any measurement.
+/// Time has passed. Timeouts and outputs depend on it, so they replay like any measurement.
 struct Tick {
   Timestamp stamp{};
 };
 
 /// In order of arrival. A sensor's stamp may lie before the last Tick: data come late.
-using Event = std::variant<ImuSample, UwbRange, SpotFrame, ReceivedReport, GraphSolution, Tick>;
+using Event =
+    std::variant<ImuSample, UwbRange, SpotFrame, ReceivedReport, GraphSolution, TeamSolution, Tick>;
 
 /// When it was measured, or for a report when its sender composed it.
 [[nodiscard]] inline Timestamp stamp_of(const Event& event) {
@@ -23,6 +24,7 @@ using Event = std::variant<ImuSample, UwbRange, SpotFrame, ReceivedReport, Graph
     Timestamp operator()(const UwbRange& e) const { return e.stamp; }
     Timestamp operator()(const SpotFrame& e) const { return e.stamp; }
     Timestamp operator()(const GraphSolution& e) const { return e.stamp; }
+    Timestamp operator()(const TeamSolution& e) const { return e.stamp; }
     Timestamp operator()(const Tick& e) const { return e.stamp; }
   };
   return std::visit(Visitor{}, event);

@@ -1,4 +1,4 @@
-/// What sensors and peers tell the estimator, and what it tells them.
+/// Measurements of sensors and peers, reports, and problems of the pose graph.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +18,7 @@ struct RobotId {
   auto operator<=>(const RobotId&) const = default;
 };
 
-/// Body rates and specific force (+9.81 up at rest), body axes. `Time` says whose clock.
+/// Body rates and specific force (+9.81 up at rest), body axes. `Time` is the type of its clock.
 template <class Time>
 struct BasicImuSample {
   Time stamp{};
@@ -46,7 +46,7 @@ struct BasicBearing {
   double sigma_rad = 0.0;                           ///< one sigma across the direction
 };
 
-/// Which way is up: tilt is all that gravity can tell.
+/// The direction of up. Gravity determines roll and pitch only.
 template <class Time>
 struct BasicTilt {
   Time stamp{};
@@ -63,7 +63,7 @@ struct BasicNeighborEstimate {
   Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s], body axes
 };
 
-/// Everything that a robot tells its peers, in its own time.
+/// The broadcast of a robot, in its own time.
 template <class Time>
 struct BasicReport {
   RobotId sender{};
@@ -94,7 +94,7 @@ struct Spot {
   double elongation = 1.0;  ///< ratio of principal axes, 1 for round
 };
 
-/// All spots of one image; none is a statement too.
+/// All spots of one image; an empty frame is information too.
 struct SpotFrame {
   Timestamp stamp{};
   std::uint8_t camera = 0;  ///< index into the configured cameras
@@ -115,7 +115,7 @@ struct RelativePoseEdge {
   Eigen::Vector3d v_from_to = Eigen::Vector3d::Zero();  ///< R_W_from^T (v_W_to - v_W_from)
 };
 
-/// What the graph is to solve: all edges brought to one instant.
+/// Input of the graph: all edges at one instant.
 struct GraphProblem {
   Timestamp stamp{};
   RobotId self{};
@@ -135,6 +135,48 @@ struct GraphSolution {
   std::vector<GraphPose> poses;  ///< ordered by neighbor; unreachable robots are absent
   double cost = 0.0;
   int iterations = 0;
+};
+
+/// One robot as the team's filter knows it, in this robot's body frame.
+struct TeamPose {
+  RobotId neighbor{};
+  Pose T_B_N;
+  Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
+  /// Of [p, v, theta], theta a right perturbation.
+  Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
+  Timestamp last_sighting{};  ///< when anybody saw it, or it anybody
+};
+
+/// What the team's filter knows of a robot's IMU.
+struct ImuBiasEstimate {
+  RobotId robot{};
+  Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d gyro_scale = Eigen::Matrix3d::Zero();  ///< the rate reads (I + scale) w + bias
+  double gyro_sigma_radps = 0.0;                         ///< root mean square of the axes
+  double accel_sigma_mps2 = 0.0;
+};
+
+/// A robot whose sensors contradict the rest of the team.
+struct TeamFault {
+  enum class Kind : std::uint8_t {
+    kCameraTurned,   ///< its bearings are used with the misalignment that the team found
+    kCameraRefused,  ///< it contradicts the team whatever its misalignment
+    kRanges,         ///< its ranges are refused
+  };
+  RobotId robot{};
+  Kind kind = Kind::kCameraTurned;
+  double size = 0.0;  ///< [rad] of a camera, [m] of ranges, positive if they are too long
+
+  [[nodiscard]] bool operator==(const TeamFault&) const = default;
+};
+
+/// The team's answer, in this robot's body frame at `stamp`.
+struct TeamSolution {
+  Timestamp stamp{};
+  std::vector<TeamPose> poses;          ///< ordered by neighbor
+  std::vector<ImuBiasEstimate> biases;  ///< of this robot and of all in `poses`
+  std::vector<TeamFault> faults;
 };
 
 }  // namespace crepes

@@ -1,4 +1,4 @@
-/// What the estimator and the daemon tell the world.
+/// Outputs of the estimator: poses, verdicts, records, status.
 #pragma once
 
 #include <array>
@@ -7,15 +7,13 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
-#include "estimator/core/sensor_totals.hpp"
 
 namespace crepes {
 
-/// How a pose came about.
+/// The source of a pose.
 enum class PoseMode : std::uint8_t {
   kDirect,     ///< own filter, measured recently
   kGraph,      ///< reached through other robots
@@ -27,7 +25,7 @@ enum class PoseMode : std::uint8_t {
   return kNames[static_cast<std::size_t>(mode)];
 }
 
-/// What a pose rests on, measured within the last `predicted_after_s`.
+/// The measurements of a pose within the last `predicted_after_s`.
 struct PoseSources {
   bool bearing = false;       ///< we see the neighbor
   bool peer_bearing = false;  ///< the neighbor sees us
@@ -55,13 +53,13 @@ enum class NoPoseReason : std::uint8_t {
   kNeverHeard,     ///< no datagram from this robot
   kSilent,         ///< none for a while
   kNoClockOffset,  ///< heard, but its clock is not yet known
-  kNoOwnImu,       ///< our IMU says nothing
-  kNoPeerImu,      ///< its IMU says nothing
+  kNoOwnImu,       ///< our IMU is silent or faulty
+  kNoPeerImu,      ///< its IMU is silent or faulty
   kTiltUnknown,    ///< gravity not yet known on one of the two
   kNotSeen,        ///< our cameras do not see it
   kDoesNotSeeUs,   ///< it does not report seeing us
   kNoRange,        ///< no UWB distance
-  kNearVertical,   ///< almost above or below: yaw cannot be told
+  kNearVertical,   ///< almost above or below: yaw is not observable
   kTooClose,       ///< antennas or rings nearly coincide
   kContested,      ///< more than one place fits: mirror images, false sightings
   kUncertain,      ///< known worse than 1 m or 20 deg
@@ -85,14 +83,14 @@ enum class NoPoseReason : std::uint8_t {
   return kNames[static_cast<std::size_t>(reason)];
 }
 
-/// What became of a measurement.
+/// The outcome of a measurement.
 enum class Verdict : std::uint8_t {
   kFused,
   kGated,       ///< too unlikely
-  kDegenerate,  ///< the measurement says nothing here
+  kDegenerate,  ///< the model is singular here
   kLate,        ///< older than the lag
   kNoState,     ///< nothing to correct yet
-  kSkipped,     ///< another camera is listened to, or there was no time for it
+  kSkipped,     ///< another camera is in use, or no time was left
 };
 inline constexpr std::size_t kVerdictCount = 6;
 
@@ -118,7 +116,7 @@ inline constexpr std::size_t kMeasurementKindCount = 6;
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-/// How a measurement fared at a filter.
+/// The result of fusing a measurement.
 struct Fusion {
   static constexpr std::size_t kMaxDimension = 9;
 
@@ -130,7 +128,7 @@ struct Fusion {
   std::array<double, kMaxDimension> sigma{};     ///< roots of S's diagonal
 };
 
-/// One measurement of a neighbor, for whoever wants to see inside.
+/// One measurement of a neighbor, with its result.
 struct MeasurementRecord {
   RobotId neighbor{};
   Timestamp stamp{};  ///< when it was taken
@@ -138,9 +136,20 @@ struct MeasurementRecord {
   Fusion fusion;
 };
 
-/// What the tight filter believes of the sensors; vectors in the order of their axes.
+/// The sensor calibration that the tight filter estimates.
 struct CalibrationRecord {
-  static constexpr std::array<std::string_view, 19> kNames{
+  /// Where each quantity begins in `value` and `sigma`; vectors are in the order of their axes.
+  enum Index : std::size_t {
+    kGyroB = 0,
+    kAccelB = 3,
+    kGyroN = 6,
+    kAccelN = 9,
+    kRangeBias = 12,
+    kMisalignB = 13,
+    kMisalignN = 16,
+    kSize = 19,
+  };
+  static constexpr std::array<std::string_view, kSize> kNames{
       "gyro_B_x",     "gyro_B_y",     "gyro_B_z",     "accel_B_x",    "accel_B_y",
       "accel_B_z",    "gyro_N_x",     "gyro_N_y",     "gyro_N_z",     "accel_N_x",
       "accel_N_y",    "accel_N_z",    "range_bias",   "misalign_B_x", "misalign_B_y",
@@ -148,8 +157,8 @@ struct CalibrationRecord {
 
   RobotId neighbor{};
   Timestamp stamp{};
-  std::array<double, kNames.size()> value{};  ///< [rad/s], [m/s^2], [m], [rad]
-  std::array<double, kNames.size()> sigma{};
+  std::array<double, kSize> value{};  ///< [rad/s], [m/s^2], [m], [rad]
+  std::array<double, kSize> sigma{};
 };
 
 struct Records {
@@ -159,79 +168,44 @@ struct Records {
 
 using VerdictCounts = std::array<std::uint64_t, kVerdictCount>;
 
+/// Why an inertial sample was refused.
+enum class ImuFault : std::uint8_t {
+  kImplausible,  ///< NaN or out of range
+  kSpike,        ///< its predecessors and its successors agree without it
+  kJump,         ///< a change that no robot makes within a sample, and what followed it
+  kHangs,        ///< the sensor, or one of its axes, repeats its value
+  kSaturated,    ///< an axis is at the end of its range
+};
+inline constexpr std::size_t kImuFaultCount = 5;
+using ImuFaultCounts = std::array<std::uint64_t, kImuFaultCount>;
+
+[[nodiscard]] constexpr std::string_view name_of(ImuFault fault) {
+  constexpr std::array<std::string_view, kImuFaultCount> kNames{"implausible", "spike", "jump",
+                                                                "hangs", "saturated"};
+  return kNames[static_cast<std::size_t>(fault)];
+}
+
 struct NeighborStatus {
   RobotId neighbor{};
   std::string name;
   NoPoseReason reason = NoPoseReason::kNeverHeard;
   std::optional<NeighborPose> pose;
   std::array<VerdictCounts, kMeasurementKindCount> measurements{};  ///< [kind][verdict]
-  /// When the newest of a kind was taken, whatever became of it.
+  /// When the newest of a kind was taken, whatever its outcome.
   std::array<std::optional<Timestamp>, kMeasurementKindCount> newest{};
   std::optional<Timestamp> newest_imu;  ///< of its IMU's samples
-  std::uint64_t id_decodes = 0;         ///< tracks that were given this robot's ID
+  ImuFaultCounts refused_imu{};         ///< its IMU's samples, by reason
+  std::uint64_t id_decodes = 0;         ///< tracks decoded to this robot's ID
+  std::vector<TeamFault> faults;        ///< what the team finds wrong with it
 };
 
 struct EstimatorStatus {
   std::vector<NeighborStatus> neighbors;  ///< all members but this robot, ordered by id
   std::optional<Tilt> tilt;
   std::uint64_t unknown_senders = 0;  ///< reports from robots that are not members
-  std::uint64_t refused_samples = 0;  ///< NaN, out of range, stamp that goes back
-};
-
-/// A sensor, as STATUS tells it.
-struct SensorStatus {
-  std::string name;
-  double rate_hz = 0.0;
-  bool ok = false;
-  std::string message;  ///< what is wrong and what to do
-  SensorTotals totals{};
-};
-
-struct ClockStatus {
-  RobotId peer{};
-  double offset_s = 0.0;  ///< peer's clock minus ours
-  double skew_ppm = 0.0;
-  double sigma_s = 0.0;
-};
-
-/// What came of one peer's datagrams.
-struct PeerTraffic {
-  RobotId peer{};
-  std::uint64_t received = 0;
-  std::uint64_t lost = 0;      ///< missing in the peer's sequence
-  std::uint64_t restarts = 0;  ///< the peer or its clock began anew
-  double age_s = 0.0;          ///< since the last one
-};
-
-struct QueueStatus {
-  std::string name;
-  std::uint64_t dropped = 0;
-};
-
-/// Which configuration is in force.
-struct ConfigStatus {
-  int generation = 1;                ///< 1 at start, one more with each reload that was applied
-  Timestamp since{};                 ///< when that was
-  std::vector<std::string> restart;  ///< keys that have changed and wait for a restart
-  std::string fault;                 ///< why the last reload was refused, or empty
-};
-
-/// The answer to POLL.
-struct SystemStatus {
-  RobotId self{};
-  std::string name;
-  Timestamp stamp{};  ///< when this was so
-  double uptime_s = 0.0;
-  double cpu_s = 0.0;   ///< of all threads since start
-  double rss_mb = 0.0;  ///< resident memory [10^6 bytes]
-  ConfigStatus config;
-  double config_age_s = 0.0;
-  std::vector<SensorStatus> sensors;
-  EstimatorStatus estimator;
-  std::vector<ClockStatus> clocks;
-  std::vector<PeerTraffic> traffic;
-  std::vector<QueueStatus> queues;
-  std::vector<std::pair<std::string, std::uint64_t>> network;  ///< datagrams and refusals by reason
+  std::uint64_t refused_samples = 0;  ///< NaN, out of range, stamp that goes back, refused_imu
+  ImuFaultCounts refused_imu{};       ///< of our IMU, by reason
+  std::vector<TeamFault> faults;      ///< what the team finds wrong with us
 };
 
 }  // namespace crepes

@@ -22,6 +22,11 @@ struct Pose {
     const Eigen::Quaterniond q_inv = q.conjugate();
     return {-(q_inv * p), q_inv};
   }
+
+  /// The same numbers: q and -q differ.
+  [[nodiscard]] bool operator==(const Pose& other) const {
+    return p == other.p && q.coeffs() == other.q.coeffs();
+  }
 };
 
 [[nodiscard]] inline Eigen::Vector3d operator*(const Pose& T_A_B, const Eigen::Vector3d& p_B) {
@@ -61,7 +66,7 @@ struct GaussianPose {
                                        J_second * T_B_C.covariance * J_second.transpose()};
 }
 
-/// The perturbation d that takes `from` to `to`, in GaussianPose's error convention.
+/// The perturbation d from `from` to `to`, in GaussianPose's error convention.
 [[nodiscard]] inline Vector6d pose_difference(const Pose& from, const Pose& to) {
   Vector6d d;
   d << to.p - from.p, so3_log(from.q.conjugate() * to.q);

@@ -14,14 +14,14 @@ enum class ErrorCode {
   kConfig,    ///< a setting is missing, unknown or out of bounds
   kUsage,     ///< the caller of a program asked for something that does not exist
   kNotFound,  ///< a file, device or robot that is not there
-  kBusy,      ///< the system cannot take more just now; what it was given before is not in doubt
+  kBusy,      ///< the system accepts no more at present; earlier requests are not affected
 };
 
 struct Error {
   ErrorCode code;
   std::string message;
 
-  /// The same error, told from one level further out: "context: message".
+  /// The same error with the context of the caller: "context: message".
   [[nodiscard]] Error with_context(std::string_view context) && {
     return {code, std::string(context) + ": " + std::move(message)};
   }

@@ -24,11 +24,11 @@ Eigen::Quaterniond so3_exp(const Eigen::Vector3d& theta) {
       angle < kSmallAngle ? 0.5 - angle2 / 48.0 : std::sin(0.5 * angle) / angle;
   const double w = std::cos(0.5 * angle);
   const Eigen::Vector3d v = half_sinc * theta;
-  return Eigen::Quaterniond(w, v.x(), v.y(), v.z());
+  return {w, v.x(), v.y(), v.z()};
 }
 
 Eigen::Vector3d so3_log(const Eigen::Quaterniond& q) {
-  const double sign = q.w() < 0.0 ? -1.0 : 1.0;  // q and -q are one rotation: take the short way
+  const double sign = q.w() < 0.0 ? -1.0 : 1.0;  // q and -q are one rotation: use the short way
   const Eigen::Vector3d v = sign * q.vec();
   const double sine = v.norm();
   const double cosine = sign * q.w();
@@ -61,6 +61,24 @@ Eigen::Matrix3d so3_right_jacobian_inverse(const Eigen::Vector3d& theta) {
   const double c = angle < kSmallAngle ? 1.0 / 12.0 + angle2 / 720.0
                                        : (1.0 - half * std::cos(half) / std::sin(half)) / angle2;
   return Eigen::Matrix3d::Identity() + 0.5 * W + c * W * W;
+}
+
+// Eigen's FromTwoVectors compiles a singular value decomposition for the half turn.
+Eigen::Quaterniond shortest_rotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  constexpr double kHalfTurn = -1.0 + 1e-12;  // cosine
+  const Eigen::Vector3d a = from.normalized();
+  const Eigen::Vector3d b = to.normalized();
+  const double cosine = b.dot(a);
+  Eigen::Quaterniond q;
+  if (cosine < kHalfTurn) {
+    q.w() = 0.0;
+    q.vec() = tangent_basis(a).col(0);
+    return q;
+  }
+  const double s = std::sqrt((1.0 + cosine) * 2.0);
+  q.vec() = a.cross(b) * (1.0 / s);
+  q.w() = s * 0.5;
+  return q;
 }
 
 double yaw_of(const Eigen::Quaterniond& q) {

@@ -22,6 +22,11 @@ namespace crepes {
 /// J_r^-1(theta):  Log(R Exp(d)) = Log(R) + J_r^-1(Log R) d  to first order in d.
 [[nodiscard]] Eigen::Matrix3d so3_right_jacobian_inverse(const Eigen::Vector3d& theta);
 
+/// The shortest rotation that turns `from` into the direction of `to`. Both are nonzero. Between
+/// opposite directions it is a half turn about one of the axes across.
+[[nodiscard]] Eigen::Quaterniond shortest_rotation(const Eigen::Vector3d& from,
+                                                   const Eigen::Vector3d& to);
+
 /// Heading of `q` about z, the first angle of Z-Y-X Euler angles [rad].
 [[nodiscard]] double yaw_of(const Eigen::Quaterniond& q);
 

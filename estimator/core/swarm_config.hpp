@@ -1,4 +1,4 @@
-/// Settings: who is who.
+/// Settings: the members of the swarm.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,19 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "estimator/core/config_schema.hpp"
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/settings_schema.hpp"
 
 namespace crepes {
-
-struct RobotConfig {
-  RobotId id{};
-
-  template <class Visitor>
-  void visit(Visitor& v) {
-    v.required("id", id, Bounds{1, 65534}, "this robot's id; must be one of swarm.members");
-  }
-};
 
 /// One robot of the swarm: how it blinks and where its LED ring and antenna are mounted.
 struct MemberConfig {
@@ -37,10 +28,10 @@ struct MemberConfig {
     v.required("id", id, Bounds{1, 65534}, "robot id");
     v.required("name", name, "robot name, as in outputs");
     v.field("pattern", pattern,
-            "blink pattern, one character a slot: 1 lit, 0 dark; either this or duty");
+            "blink pattern, one character per slot: 1 lit, 0 dark; either this or duty");
     v.field("duty", duty, Bounds{0.05, 0.95},
-            "lit part of swarm.period_ms; either this or pattern");
-    v.field("uwb_id", uwb_id, Bounds{0, 65535}, "id of the UWB module; left out: the robot id");
+            "lit share of swarm.period_ms; either this or pattern");
+    v.field("uwb_id", uwb_id, Bounds{0, 65535}, "id of the UWB module; if omitted: the robot id");
     v.field("p_body_led", p_body_led, Bounds{-5, 5},
             "center of the LED ring in the body frame [m]");
     v.field("p_body_uwb", p_body_uwb, Bounds{-5, 5}, "UWB antenna in the body frame [m]");
@@ -56,11 +47,11 @@ struct SwarmConfig {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("slot_ms", slot_ms, Bounds{2, 50}, "one bit of a blink pattern");
-    v.field("period_ms", period_ms, Bounds{10, 200}, "one period of a duty-coded board");
+    v.field("slot_ms", slot_ms, Bounds{2, 50}, "duration of one slot of a blink pattern");
+    v.field("period_ms", period_ms, Bounds{10, 200}, "period of a duty-coded board");
     v.reference("members_file",
-                "instead of members: a file with the section swarm alone, which all robots share");
-    v.list("members", members, "everyone in the swarm, this robot included");
+                "instead of members: a file with only the section swarm, shared by all robots");
+    v.list("members", members, "all robots of the swarm, this one included");
   }
 };
 

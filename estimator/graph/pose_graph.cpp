@@ -22,7 +22,7 @@
 namespace crepes {
 namespace {
 
-// The paper's cost has no sigmas: an entry off by this much counts as one.
+// The paper's cost has no sigmas: the error of an entry that counts as one.
 constexpr double kFrobeniusSigma = 0.1;
 
 using Parameters = std::array<double, kPoseParameters>;
@@ -55,16 +55,16 @@ Matrix6d weight(const RelativePoseEdge& edge, const std::vector<RelativePoseEdge
   return chol.matrixL().solve(Matrix6d::Identity());
 }
 
-// What Ceres takes over as a bare pointer.
+// A new object whose ownership passes to Ceres with the pointer.
 template <class T, class... Arguments>
-T* given(Arguments&&... arguments) {
+T* owned_by_ceres(Arguments&&... arguments) {
   return std::make_unique<T>(std::forward<Arguments>(arguments)...).release();
 }
 
 template <int kResiduals, class Factor>
 ceres::CostFunction* cost_of(const Factor& factor) {
   using Cost = ceres::AutoDiffCostFunction<Factor, kResiduals, kPoseParameters, kPoseParameters>;
-  return given<Cost>(given<Factor>(factor));
+  return owned_by_ceres<Cost>(owned_by_ceres<Factor>(factor));
 }
 
 void add_factor(const RelativePoseEdge& edge, const Matrix6d& L, const GraphConfig& config,
@@ -73,18 +73,18 @@ void add_factor(const RelativePoseEdge& edge, const Matrix6d& L, const GraphConf
   ceres::CostFunction* cost = paper ? cost_of<12>(FrobeniusFactor{edge.T_from_to.pose})
                                     : cost_of<6>(LieFactor{edge.T_from_to.pose, L});
   const double scale = paper ? kFrobeniusSigma * config.kernel_scale : config.kernel_scale;
-  problem.AddResidualBlock(cost, given<ceres::CauchyLoss>(scale), nodes.at(edge.from).data(),
-                           nodes.at(edge.to).data());
+  problem.AddResidualBlock(cost, owned_by_ceres<ceres::CauchyLoss>(scale),
+                           nodes.at(edge.from).data(), nodes.at(edge.to).data());
 }
 
-// A graph over `nodes`, with self held fast.
+// A graph over `nodes`, with the pose of self constant.
 std::unique_ptr<ceres::Problem> build(const GraphProblem& input, const GraphConfig& config,
                                       Nodes& nodes) {
   auto problem = std::make_unique<ceres::Problem>();
   for (auto& [robot, x] : nodes) {
     problem->AddParameterBlock(
         x.data(), kPoseParameters,
-        given<ceres::AutoDiffManifold<RightPerturbation, kPoseParameters, 6>>());
+        owned_by_ceres<ceres::AutoDiffManifold<RightPerturbation, kPoseParameters, 6>>());
   }
   problem->SetParameterBlockConstant(nodes.at(input.self).data());
   for (const RelativePoseEdge& edge : input.edges) {

@@ -1,8 +1,8 @@
 /// The pose graph over the team (paper III-E): one node a robot, one edge a measured relative pose.
 #pragma once
 
-#include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
+#include "estimator/graph/graph_config.hpp"
 
 namespace crepes {
 

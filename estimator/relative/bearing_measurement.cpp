@@ -25,7 +25,7 @@ std::optional<BearingInnovation> linearize(const Line& line, const Eigen::Vector
   const Eigen::Vector3d predicted = M * direction;
   if (predicted.dot(u) <= 0.0) return std::nullopt;
 
-  // The residual is the log of the rotation that takes `predicted` to `u`, seen in the plane across
+  // The residual is the log of the rotation from `predicted` to `u`, in the plane across
   // it: no flattening at large angles, where the filter starts.
   const Eigen::Matrix<double, 3, 2> across = tangent_basis(predicted);
   const Eigen::Vector3d axis = predicted.cross(u);

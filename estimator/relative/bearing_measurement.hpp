@@ -1,4 +1,4 @@
-/// What the camera of one robot says of the LED ring of the other.
+/// The measurement model of bearings: the camera of one robot, the LED ring of the other.
 #pragma once
 
 #include <optional>

@@ -5,17 +5,18 @@
 
 #include "estimator/core/pose.hpp"
 #include "estimator/core/time.hpp"
+#include "estimator/relative/partitioned_covariance.hpp"
 
 namespace crepes {
 
-/// Relative motion of N seen by B. Gravity has no place in it: it pulls both alike.
+/// Motion of N relative to B. It does not depend on gravity, which acts on both robots alike.
 struct RelativeMotion {
   Pose T_B_N;
   Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
 };
 
-/// What an IMU reads beside the truth: (I + scale) x + bias of either sensor, `scale` for scales
-/// and axes that are not quite as they should be.
+/// Errors of an IMU: each sensor reads (I + scale) x + bias, where `scale` contains scale errors
+/// and misalignments of its axes.
 struct ImuBias {
   Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
@@ -29,14 +30,14 @@ struct NominalState {
   ImuBias bias_B;
   ImuBias bias_N;
   double range_bias_m = 0.0;
-  /// Rotation vectors that take a direction in calibrated body axes to the one the camera reports.
+  /// Rotation vectors from a direction in calibrated body axes to the one that the camera reports.
   Eigen::Vector3d misalignment_B = Eigen::Vector3d::Zero();
   Eigen::Vector3d misalignment_N = Eigen::Vector3d::Zero();
 };
 
 /// Layout of the error state. Position and velocity are additive in B's axes, attitude is a right
-/// perturbation (N's axes), the rest is additive. Measurements see the first `kSeen` states; the
-/// rest moves the motion as it goes on.
+/// perturbation (N's axes), all others are additive. Measurements depend on the first `kSeen`
+/// states; the others act through the propagation.
 struct ErrorState {
   enum Index : int {
     kP = 0,
@@ -58,9 +59,7 @@ struct ErrorState {
   static constexpr int kMotion = kRangeBias;  ///< size of [p, v, theta]
   static constexpr int kSeen = kGyroB;
   using Vector = Eigen::Matrix<double, kSize, 1>;
-  /// As kalman_update.hpp keeps it: of the seen rows, what stands right of the seen columns is
-  /// void.
-  using Covariance = Eigen::Matrix<double, kSize, kSize>;
+  using Covariance = PartitionedCovariance<kSeen, kSize>;
 };
 
 /// x <- x (+) dx

@@ -1,15 +1,17 @@
 /// The correction step of every filter here: gate, gain, covariance.
 ///
-/// Measurements see the first S of the N states. P is symmetric, and where S < N it is not kept
-/// twice: right of its first S columns, its first S rows are neither read nor written.
+/// Measurements see the first S of the N states. The covariance is a PartitionedCovariance, or a
+/// matrix where S = N.
 #pragma once
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cmath>
 #include <numbers>
+#include <type_traits>
 
 #include "estimator/core/outputs.hpp"
+#include "estimator/relative/partitioned_covariance.hpp"
 #include "estimator/relative/small_product.hpp"
 
 namespace crepes {
@@ -33,20 +35,32 @@ struct UpdateOutcome {
   Eigen::Matrix<double, N, M> G = Eigen::Matrix<double, N, M>::Zero();  ///< P H^T C^-T
 };
 
-/// What an innovation asks for; P is as before, and the correction left for the caller to inject. A
-/// NIS above `gate_nis` asks for nothing.
-template <int M, int S, int N>
-[[nodiscard]] UpdateOutcome<M, N> kalman_gain(const Innovation<M, S>& z, double gate_nis,
-                                              const Eigen::Matrix<double, N, N>& P) {
-  Eigen::Matrix<double, N, M> PHt = Eigen::Matrix<double, N, M>::Zero();
-  add_product(P.template leftCols<S>(), z.H, PHt);
+/// The columns of P that belong to the seen states.
+template <int S, int N>
+[[nodiscard]] auto seen_columns(const PartitionedCovariance<S, N>& P) {
+  return P.seen_columns();
+}
+template <int N>
+[[nodiscard]] const Eigen::Matrix<double, N, N>& seen_columns(
+    const Eigen::Matrix<double, N, N>& P) {
+  return P;
+}
+
+/// Gate and gain; does not change P. The caller injects the correction. If the NIS exceeds
+/// `gate_nis`, the verdict is kGated and the correction zero.
+template <int M, int S, class Covariance>
+[[nodiscard]] auto kalman_gain(const Innovation<M, S>& z, double gate_nis, const Covariance& P) {
+  constexpr int kStates = std::decay_t<decltype(seen_columns(P))>::RowsAtCompileTime;
+  static_assert(std::decay_t<decltype(seen_columns(P))>::ColsAtCompileTime == S);
+  Eigen::Matrix<double, kStates, M> PHt = Eigen::Matrix<double, kStates, M>::Zero();
+  add_product(seen_columns(P), z.H, PHt);
   const Eigen::LLT<Eigen::Matrix<double, M, M>> C(z.H.lazyProduct(PHt.template topRows<S>()) +
                                                   z.cov_z);
-  if (C.info() != Eigen::Success) return {};
+  UpdateOutcome<M, kStates> outcome;
+  if (C.info() != Eigen::Success) return outcome;
   const Eigen::Matrix<double, M, M> C_inverse =
       C.matrixL().solve(Eigen::Matrix<double, M, M>::Identity());
   const Eigen::Matrix<double, M, 1> white = C_inverse * z.residual;
-  UpdateOutcome<M, N> outcome;
   outcome.nis = white.squaredNorm();
   const double log_det = 2.0 * C.matrixLLT().diagonal().array().log().sum();
   outcome.log_likelihood = -0.5 * (outcome.nis + log_det + M * std::log(2.0 * std::numbers::pi));
@@ -61,27 +75,28 @@ template <int M, int S, int N>
   return outcome;
 }
 
-/// P - G G^T: what Joseph's form  (I - KH) P (I - KH)^T + K cov_z K^T  comes to for the gain
-/// K = G C^-1. It costs N^2 M, and both halves of P come out alike to the bit.
-template <int S, int M, int N>
+/// P - G G^T. This equals Joseph's form  (I - KH) P (I - KH)^T + K cov_z K^T  for the optimal gain
+/// K = G C^-1. It costs N^2 M, and the result is symmetric to the bit.
+template <int M, int S, int N>
+void correct_covariance(const UpdateOutcome<M, N>& outcome, PartitionedCovariance<S, N>& P) {
+  subtract_product(outcome.G, outcome.G.template topRows<S>(), P.seen_columns());
+  const auto of_hidden = outcome.G.template bottomRows<N - S>();
+  subtract_product(of_hidden, of_hidden, P.hidden());
+}
+template <int M, int N>
 void correct_covariance(const UpdateOutcome<M, N>& outcome, Eigen::Matrix<double, N, N>& P) {
-  subtract_product(outcome.G, outcome.G.template topRows<S>(), P.template leftCols<S>());
-  if constexpr (S < N) {
-    const auto rest = outcome.G.template bottomRows<N - S>();
-    subtract_product(rest, rest, P.template bottomRightCorner<N - S, N - S>());
-  }
+  subtract_product(outcome.G, outcome.G, P);
 }
 
-/// Both at once.
-template <int M, int S, int N>
-[[nodiscard]] UpdateOutcome<M, N> kalman_update(const Innovation<M, S>& z, double gate_nis,
-                                                Eigen::Matrix<double, N, N>& P) {
+/// Gain, and correction of the covariance.
+template <int M, int S, class Covariance>
+[[nodiscard]] auto kalman_update(const Innovation<M, S>& z, double gate_nis, Covariance& P) {
   auto outcome = kalman_gain(z, gate_nis, P);
-  if (outcome.verdict == Verdict::kFused) correct_covariance<S>(outcome, P);
+  if (outcome.verdict == Verdict::kFused) correct_covariance(outcome, P);
   return outcome;
 }
 
-/// What there is to tell of an update.
+/// The outcome of an update, for the records.
 template <int M, int S, int N>
 [[nodiscard]] Fusion fusion_of(const Innovation<M, S>& z, const UpdateOutcome<M, N>& outcome) {
   Fusion fusion{.verdict = outcome.verdict,

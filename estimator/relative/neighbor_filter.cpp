@@ -11,7 +11,7 @@
 #include "estimator/core/so3.hpp"
 #include "estimator/relative/bearing_measurement.hpp"
 #include "estimator/relative/pose_measurement.hpp"
-#include "estimator/relative/range_measurement.hpp"
+#include "estimator/relative/range_update.hpp"
 
 namespace crepes {
 namespace {
@@ -23,11 +23,12 @@ constexpr double kGraphSpeedSigma = 0.3;  // m/s
 ErrorState::Covariance first_covariance(const Matrix6d& pose, double speed_sigma,
                                         const Priors& priors) {
   const auto square = [](double x) { return x * x; };
-  E::Covariance P = E::Covariance::Zero();
-  P.block<3, 3>(E::kP, E::kP) = pose.topLeftCorner<3, 3>();
-  P.block<3, 3>(E::kP, E::kTheta) = pose.topRightCorner<3, 3>();
-  P.block<3, 3>(E::kTheta, E::kP) = pose.bottomLeftCorner<3, 3>();
-  P.block<3, 3>(E::kTheta, E::kTheta) = pose.bottomRightCorner<3, 3>();
+  E::Covariance P;
+  auto seen = P.seen();
+  seen.block<3, 3>(E::kP, E::kP) = pose.topLeftCorner<3, 3>();
+  seen.block<3, 3>(E::kP, E::kTheta) = pose.topRightCorner<3, 3>();
+  seen.block<3, 3>(E::kTheta, E::kP) = pose.bottomLeftCorner<3, 3>();
+  seen.block<3, 3>(E::kTheta, E::kTheta) = pose.bottomRightCorner<3, 3>();
   const auto set = [&](int index, double sigma) {
     P.diagonal().segment<3>(index).setConstant(square(sigma));
   };
@@ -42,32 +43,32 @@ ErrorState::Covariance first_covariance(const Matrix6d& pose, double speed_sigma
     P.diagonal().segment<9>(scale).setConstant(square(priors.gyro_scale));
   for (const int scale : {E::kAccelScaleB, E::kAccelScaleN})
     P.diagonal().segment<9>(scale).setConstant(square(priors.accel_scale));
-  P(E::kRangeBias, E::kRangeBias) = square(priors.range_bias_m);
+  P.diagonal()(E::kRangeBias) = square(priors.range_bias_m);
   return P;
 }
 
-// How a raw pose's error goes with the errors of calibration, which are states.
-void correlate(const CalibrationJacobian& J, E::Covariance& P) {
-  const auto add = [&P](const auto& by_state, int index) {
-    constexpr int kStates = std::decay_t<decltype(by_state)>::ColsAtCompileTime;
-    const Eigen::Matrix<double, 6, kStates> cross =
-        by_state * P.template block<kStates, kStates>(index, index);
-    P.template block<3, kStates>(E::kP, index) = cross.template topRows<3>();
-    P.template block<3, kStates>(E::kTheta, index) = cross.template bottomRows<3>();
-    P.template block<kStates, 3>(index, E::kP) = cross.template topRows<3>().transpose();
-    P.template block<kStates, 3>(index, E::kTheta) = cross.template bottomRows<3>().transpose();
-  };
-  add(J.by_misalignment_B, E::kMisalignB);
-  add(J.by_misalignment_N, E::kMisalignN);
-  add(J.by_accel_bias_B, E::kAccelB);
-  add(J.by_accel_bias_N, E::kAccelN);
-  add(J.by_accel_scale_B, E::kAccelScaleB);
-  add(J.by_accel_scale_N, E::kAccelScaleN);
-  add(J.by_range_bias, E::kRangeBias);
+// Sets the covariance of a raw pose's error with the calibration errors, which are states.
+template <int kIndex, class Jacobian>
+void set_cross_covariance(const Jacobian& by_state, E::Covariance& P) {
+  constexpr int kStates = Jacobian::ColsAtCompileTime;
+  const Eigen::Matrix<double, 6, kStates> cross =
+      by_state * P.template block<kIndex, kIndex, kStates, kStates>();
+  P.template set_symmetric<E::kP, kIndex>(cross.template topRows<3>());
+  P.template set_symmetric<E::kTheta, kIndex>(cross.template bottomRows<3>());
 }
 
-// With the tilt of accelerometers that are not quite right.
-Matrix6d tilted_covariance(const RawPose& raw, const Priors& priors) {
+void set_cross_covariances(const CalibrationJacobian& J, E::Covariance& P) {
+  set_cross_covariance<E::kMisalignB>(J.by_misalignment_B, P);
+  set_cross_covariance<E::kMisalignN>(J.by_misalignment_N, P);
+  set_cross_covariance<E::kAccelB>(J.by_accel_bias_B, P);
+  set_cross_covariance<E::kAccelN>(J.by_accel_bias_N, P);
+  set_cross_covariance<E::kAccelScaleB>(J.by_accel_scale_B, P);
+  set_cross_covariance<E::kAccelScaleN>(J.by_accel_scale_N, P);
+  set_cross_covariance<E::kRangeBias>(J.by_range_bias, P);
+}
+
+// The covariance of a raw pose, with the tilt errors that the accelerometers' errors cause.
+Matrix6d covariance_with_tilt_errors(const RawPose& raw, const Priors& priors) {
   Matrix6d covariance = raw.gaussian().covariance;
   const auto add = [&](const auto& by_state, double sigma) {
     covariance += sigma * sigma * by_state * by_state.transpose();
@@ -80,8 +81,8 @@ Matrix6d tilted_covariance(const RawPose& raw, const Priors& priors) {
   return covariance;
 }
 
-// How much two estimates whose errors go together, nobody knows how much, should each count: the
-// weight of the first for which the intersection of both is smallest.
+// Covariance intersection of two estimates with unknown correlation: the weight of the first for
+// which the determinant of the result is smallest.
 double intersection_weight(const Matrix6d& first, const Matrix6d& second) {
   constexpr int kSteps = 20;
   const Matrix6d A = first.inverse();
@@ -99,57 +100,63 @@ double intersection_weight(const Matrix6d& first, const Matrix6d& second) {
   return best;
 }
 
-/// P once three errors are J times what they were.
-void map_errors(int index, const Eigen::Matrix3d& J, E::Covariance& P) {
-  auto rows = P.block<3, E::kSeen>(index, 0);
+// Transforms three errors of P by J.
+template <int kIndex>
+void transform_errors(const Eigen::Matrix3d& J, E::Covariance& P) {
+  auto rows = P.seen_rows<kIndex, 3>();
   rows = (J * rows).eval();
-  P.middleCols<3>(index) = (P.middleCols<3>(index) * J.transpose()).eval();
+  auto columns = P.columns<kIndex, 3>();
+  columns = (columns * J.transpose()).eval();
 }
 
-// P of the error at the corrected state: theta_new = J_r(theta) (theta - theta_hat).
-void reset(const Eigen::Matrix3d& J_r, E::Covariance& P) { map_errors(E::kTheta, J_r, P); }
+// Transforms P to the error at the corrected state: theta_new = J_r(theta) (theta - theta_hat).
+void reset_attitude_error(const Eigen::Matrix3d& J_r, E::Covariance& P) {
+  transform_errors<E::kTheta>(J_r, P);
+}
 
-// What a bearing cannot see must stay unseen. Distance and range bias are known only together, so P
-// is long along the line of sight; each bearing turns that line by microradians and, P lying as
-// before, the next innovation would pass for news of the distance: robots at rest drift apart. So P
-// is turned until this bearing says nothing of the range's bias, as far as the estimate's unrest
-// explains it; what shows because robots moved, a parallax, is much more and stays. Compare Huang,
-// Mourikis and Roumeliotis 2010: an unobservable direction has to be one at every linearization.
-Eigen::Matrix3d turn_to_sight(const BearingInnovation& z, const E::Covariance& P) {
-  constexpr double kUnrest = 3e-4;  // rad
-  const Eigen::Vector3d along = P.block<3, 1>(E::kP, E::kRangeBias);
+// Bearings must not observe the range bias. Distance and range bias are strongly correlated, so the
+// covariance of the position is long along the line of sight. Each bearing rotates that line by
+// microradians. If P keeps its orientation, the next bearing couples into the distance, and the
+// estimates of robots at rest drift apart. So the position errors of P are rotated until this
+// bearing is uncorrelated with the range bias, as far as the jitter of the line of sight explains
+// the correlation. A parallax from motion is much larger and stays. Compare Huang, Mourikis and
+// Roumeliotis 2010: an unobservable direction must be unobservable at every linearization.
+Eigen::Matrix3d unobservable_bias_rotation(const BearingInnovation& z, const E::Covariance& P) {
+  constexpr double kLineOfSightJitter = 3e-4;  // rad
+  const Eigen::Vector3d along = P.block<E::kP, E::kRangeBias, 3, 1>();
   const Eigen::Matrix<double, 2, 3> by_p = z.H.middleCols<3>(E::kP);
-  const Eigen::Vector2d seen = z.H.lazyProduct(P.col(E::kRangeBias).head<E::kSeen>());
+  const Eigen::Vector2d seen = z.H.lazyProduct(P.block<0, E::kRangeBias, E::kSeen, 1>());
   const Eigen::Matrix2d across = by_p * by_p.transpose();
   const Eigen::Vector3d aside = -by_p.transpose() * across.inverse() * seen;
   const double length2 = along.squaredNorm();
-  if (!(aside.squaredNorm() < 0.01 * length2)) return Eigen::Matrix3d::Identity();  // not yet
-  const double share = kUnrest * kUnrest / (kUnrest * kUnrest + aside.squaredNorm() / length2);
+  if (!(aside.squaredNorm() < 0.01 * length2)) return Eigen::Matrix3d::Identity();  // converging
+  const double share = kLineOfSightJitter * kLineOfSightJitter /
+                       (kLineOfSightJitter * kLineOfSightJitter + aside.squaredNorm() / length2);
   return so3_exp(share / length2 * along.cross(aside)).toRotationMatrix();
 }
 
-// What an update asks for, once P's errors of position are `turn` times what they were.
+// Transforms the position rows of an outcome as `transform_errors` transforms P.
 template <int M>
-void turn_outcome(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& outcome) {
+void rotate_position(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& outcome) {
   const auto apply = [&turn](auto&& rows) { rows = (turn * rows).eval(); };
   apply(outcome.correction.template segment<3>(E::kP));
   apply(outcome.G.template middleRows<3>(E::kP));
 }
 
-// A turn of everything that our camera sees looks like its misalignment:
+// A rotation of all that our camera sees cannot be distinguished from its misalignment m:
 //   dp = p x dm,  dv = v x dm,  dtheta = -R^T dm.
-// Each correction moves p, v and R by some noise; P lying as before, the next one would learn dm
-// from that. So P goes along, as if in coordinates in which bearings do not see dm at all (compare
-// Barrau and Bonnabel 2015, and Huang, Mourikis and Roumeliotis 2010). The neighbor's camera needs
-// nothing of the kind: there it is dtheta = dm, wherever the neighbor is.
-void carry_misalignment(const RelativeMotion& before, const RelativeMotion& after,
-                        E::Covariance& P) {
+// Each correction moves p, v and R by some noise. If P is not transported, the next update reads
+// that motion as information about m. So P is transported, as if in coordinates in which bearings
+// do not depend on m (compare Barrau and Bonnabel 2015, and Huang, Mourikis and Roumeliotis 2010).
+// The neighbor's camera does not need this: there dtheta = dm, wherever the neighbor is.
+void transport_misalignment(const RelativeMotion& before, const RelativeMotion& after,
+                            E::Covariance& P) {
   Eigen::Matrix<double, E::kMotion, 3> by_m;
   by_m << hat(after.T_B_N.p - before.T_B_N.p), hat(after.v_B_N - before.v_B_N),
       (before.T_B_N.R() - after.T_B_N.R()).transpose();
-  add_product(P.middleCols<3>(E::kMisalignB), by_m, P.leftCols<E::kMotion>());
-  P.block<E::kMotion, E::kSeen>(0, 0) += by_m.lazyProduct(P.block<3, E::kSeen>(E::kMisalignB, 0));
-  auto motion = P.topLeftCorner<E::kMotion, E::kMotion>();
+  add_product(P.columns<E::kMisalignB, 3>(), by_m, P.columns<0, E::kMotion>());
+  P.seen_rows<0, E::kMotion>() += by_m.lazyProduct(P.seen_rows<E::kMisalignB, 3>());
+  auto motion = P.seen().topLeftCorner<E::kMotion, E::kMotion>();
   motion = (0.5 * (motion + motion.transpose())).eval();
 }
 
@@ -158,9 +165,9 @@ void carry_misalignment(const RelativeMotion& before, const RelativeMotion& afte
 NeighborFilter::NeighborFilter(Timestamp stamp, const RawPose& first, const ProcessNoise& noise,
                                const Priors& priors)
     : stamp_(stamp),
-      P_(first_covariance(tilted_covariance(first, priors), priors.speed_mps, priors)),
+      P_(first_covariance(covariance_with_tilt_errors(first, priors), priors.speed_mps, priors)),
       noise_(noise) {
-  correlate(first.by_calibration, P_);
+  set_cross_covariances(first.by_calibration, P_);
   state_.motion.T_B_N = first.T_B_N;
 }
 
@@ -186,13 +193,13 @@ void NeighborFilter::advance_to(Timestamp to, const ImuHistory& imu_B, const Imu
   stamp_ = to;
 }
 
-// An update that moves the state far is done again, linearized where it leads to (iterated Kalman
-// filter, Bell and Cathey 1993). A first pose is off by degrees and a bearing is not: with the
-// first linearization alone, what the bearing does not see, the roll about the line of sight, would
-// come out as known from the next bearing on.
+// An update that moves the state far is repeated, linearized at its result (iterated Kalman filter,
+// Bell and Cathey 1993). A first pose has an error of degrees, a bearing does not. With the first
+// linearization alone, the next bearing would make the roll about the line of sight appear known,
+// though bearings do not depend on it.
 template <class Linearize>
 Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
-  // rad, and of the distance; half its square is well below any bearing's noise.
+  // In rad, and relative to the distance. Half its square is well below the noise of a bearing.
   constexpr double kLinear = 0.01;
   constexpr int kMaxIterations = 5;
 
@@ -201,65 +208,74 @@ Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
   constexpr bool kIsBearing = std::is_same_v<std::decay_t<decltype(*z)>, BearingInnovation>;
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
   if constexpr (kIsBearing) {
-    turn = turn_to_sight(*z, P_);
-    z->H.template middleCols<3>(E::kP) *= turn;  // as good as turning P, which a gate may forbid
+    turn = unobservable_bias_rotation(*z, P_);
+    z->H.template middleCols<3>(E::kP) *= turn;  // like a rotation of P, which may yet be gated
   }
   auto outcome = kalman_gain(*z, gate_nis, P_);
   const Fusion fusion = fusion_of(*z, outcome);
   if (outcome.verdict != Verdict::kFused) return fusion;
-  if constexpr (kIsBearing) {
-    map_errors(E::kP, turn, P_);
-    turn_outcome(turn, outcome);
-  }
+  if constexpr (kIsBearing) rotate_position(turn, outcome);
 
   Eigen::Vector3d theta = outcome.correction.template segment<3>(E::kTheta);
   const double shift = outcome.correction.template segment<3>(E::kP).norm();
   const bool is_far = theta.norm() > kLinear || shift > kLinear * state_.motion.T_B_N.p.norm();
+  std::optional<E::Covariance> before_rotation;
+  if (kIsBearing && is_far) before_rotation = P_;
+  if constexpr (kIsBearing) transform_errors<E::kP>(turn, P_);
   for (int i = 0; is_far && i < kMaxIterations; ++i) {
     NominalState there = state_;
     inject(outcome.correction, there);
     z = linearize(there);
-    if (!z) return {};
+    if (!z) break;
     z->H.template middleCols<3>(E::kTheta) =
         (z->H.template middleCols<3>(E::kTheta) * so3_right_jacobian(theta)).eval();
     z->residual += z->H * outcome.correction.template head<E::kSeen>();
     outcome = kalman_gain(*z, std::numeric_limits<double>::infinity(), P_);
+    if (outcome.verdict != Verdict::kFused) break;
     theta = outcome.correction.template segment<3>(E::kTheta);
   }
-  correct_covariance<E::kSeen>(outcome, P_);
-  if (is_far) reset(so3_right_jacobian(theta), P_);
-  const RelativeMotion before = state_.motion;
-  inject(outcome.correction, state_);
-  carry_misalignment(before, state_.motion, P_);
+  if (!z || outcome.verdict != Verdict::kFused) {
+    if (before_rotation) P_ = *before_rotation;
+    return {};
+  }
+  correct_covariance(outcome, P_);
+  if (is_far) reset_attitude_error(so3_right_jacobian(theta), P_);
+  apply(outcome.correction);
   return fusion;
 }
 
-// The error along one axis of the attitude, a, takes the others with it: x = g a + rest, g = P a /
-// s^2. Parts are moved along g, and narrower in it.
+void NeighborFilter::apply(const E::Vector& correction) {
+  const RelativeMotion before = state_.motion;
+  inject(correction, state_);
+  transport_misalignment(before, state_.motion, P_);
+}
+
+// The error along one attitude axis a correlates with all others: x = g a + rest, g = P a / s^2.
+// The parts are spaced along g, with a smaller variance along it.
 std::vector<NeighborFilter::Part> NeighborFilter::split() const {
   constexpr double kNarrow = 0.03;  // rad
-  constexpr double kSpacing = 1.5;  // in sigmas of a part: without a ripple in their sum
+  constexpr double kSpacing = 1.5;  // in sigmas of a part; no ripple in the sum
   constexpr double kReach = 3.5;    // in sigmas of the whole
   constexpr int kMaxSide = 9;
 
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> attitude;
-  attitude.computeDirect(P_.block<3, 3>(E::kTheta, E::kTheta));
+  attitude.computeDirect(P_.block<E::kTheta, E::kTheta, 3, 3>());
   const double variance = attitude.eigenvalues()(2);
   const double sigma = std::sqrt(variance);
   if (!(sigma > kNarrow)) return {{*this}};
 
   const double narrow = std::max(kNarrow, kReach * sigma / (kSpacing * kMaxSide));
-  const double cut = variance - narrow * narrow;  // variance of the parts' centers
+  const double cut = variance - narrow * narrow;  // variance of the centers of the parts
   const int side = static_cast<int>(std::ceil(kReach * std::sqrt(cut) / (kSpacing * narrow)));
   const Eigen::Vector3d axis = attitude.eigenvectors().col(2);
-  const E::Vector g = P_.middleCols<3>(E::kTheta) * axis / variance;
+  const E::Vector g = P_.columns<E::kTheta, 3>() * axis / variance;
 
   std::vector<Part> parts;
   for (int i = -side; i <= side; ++i) {
     const double angle = i * kSpacing * narrow;
     Part part{*this, -0.5 * angle * angle / cut};
-    part.filter.P_ -= cut * g * g.transpose();
-    reset(so3_right_jacobian(angle * axis), part.filter.P_);
+    part.filter.P_.subtract_outer(cut * g, g);
+    reset_attitude_error(so3_right_jacobian(angle * axis), part.filter.P_);
     inject(angle * g, part.filter.state_);
     parts.push_back(part);
   }
@@ -286,19 +302,20 @@ Fusion NeighborFilter::fuse_peer_bearing(const DirectionReading& z, const Eigen:
 
 Fusion NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
                                   const Eigen::Vector3d& p_N_Q, double gate_nis) {
-  return correct(
-      [&](const NominalState& state) {
-        return linearize_range(state, p_B_U, p_N_Q, z.range_m, z.sigma_m);
-      },
-      gate_nis);
+  const auto innovation = linearize_range(state_, p_B_U, p_N_Q, z.range_m, z.sigma_m);
+  if (!innovation) return {};
+  const double distance_m = z.range_m - state_.range_bias_m - innovation->residual(0);
+  const RangeUpdate update = update_by_range(*innovation, distance_m, gate_nis, P_);
+  if (update.fusion.verdict == Verdict::kFused) apply(update.correction);
+  return update.fusion;
 }
 
 Fusion NeighborFilter::fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis) {
   const double own = intersection_weight(pose_covariance(), T_B_N.covariance);
   if (own == 1.0) return {.verdict = Verdict::kFused};
   const E::Covariance before = P_;
-  P_.block<E::kMotion, E::kSeen>(0, 0) /= std::sqrt(own);
-  P_.leftCols<E::kMotion>() /= std::sqrt(own);
+  P_.seen_rows<0, E::kMotion>() /= std::sqrt(own);
+  P_.columns<0, E::kMotion>() /= std::sqrt(own);
   const GaussianPose discounted{T_B_N.pose, T_B_N.covariance / (1.0 - own)};
   const Fusion fusion = correct(
       [&](const NominalState& state) { return std::optional(linearize_pose(state, discounted)); },
@@ -307,7 +324,7 @@ Fusion NeighborFilter::fuse_correlated_pose(const GaussianPose& T_B_N, double ga
   return fusion;
 }
 
-void NeighborFilter::forget_distance(double sigma_m, const Priors& priors) {
+void NeighborFilter::reset_distance(double sigma_m, const Priors& priors) {
   const Eigen::Vector3d v_B_N = state_.motion.v_B_N;
   const Eigen::Vector3d u = state_.motion.T_B_N.p.normalized();
   GaussianPose known{state_.motion.T_B_N, pose_covariance()};
@@ -316,23 +333,22 @@ void NeighborFilter::forget_distance(double sigma_m, const Priors& priors) {
   state_.motion.v_B_N = v_B_N;
 }
 
-void NeighborFilter::change_camera(MeasurementKind kind, double misalignment_rad) {
+void NeighborFilter::reset_misalignment(MeasurementKind kind, double misalignment_rad) {
   const bool ours = kind == MeasurementKind::kBearing;
-  const int index = ours ? E::kMisalignB : E::kMisalignN;
-  (ours ? state_.misalignment_B : state_.misalignment_N).setZero();
-  P_.middleRows<3>(index).setZero();
-  P_.middleCols<3>(index).setZero();
-  P_.diagonal().segment<3>(index).setConstant(misalignment_rad * misalignment_rad);
-}
-
-ErrorState::Covariance NeighborFilter::covariance() const {
-  return P_.selfadjointView<Eigen::Lower>();
+  const double variance = misalignment_rad * misalignment_rad;
+  if (ours) {
+    state_.misalignment_B.setZero();
+    P_.set_independent<E::kMisalignB, 3>(variance);
+  } else {
+    state_.misalignment_N.setZero();
+    P_.set_independent<E::kMisalignN, 3>(variance);
+  }
 }
 
 Matrix6d NeighborFilter::pose_covariance() const {
   Matrix6d covariance;
-  covariance << P_.block<3, 3>(E::kP, E::kP), P_.block<3, 3>(E::kP, E::kTheta),
-      P_.block<3, 3>(E::kTheta, E::kP), P_.block<3, 3>(E::kTheta, E::kTheta);
+  covariance << P_.block<E::kP, E::kP, 3, 3>(), P_.block<E::kP, E::kTheta, 3, 3>(),
+      P_.block<E::kTheta, E::kP, 3, 3>(), P_.block<E::kTheta, E::kTheta, 3, 3>();
   return covariance;
 }
 

@@ -1,18 +1,18 @@
-/// The tight filter of one neighbor: every measurement by itself, at its own time.
+/// The tight filter of one neighbor: an error-state Kalman filter of single measurements.
 #pragma once
 
 #include <vector>
 
+#include "estimator/core/imu_history.hpp"
 #include "estimator/core/outputs.hpp"
 #include "estimator/relative/error_state.hpp"
-#include "estimator/relative/imu_history.hpp"
 #include "estimator/relative/kalman_update.hpp"
 #include "estimator/relative/propagation.hpp"
 #include "estimator/relative/raw_pose.hpp"
 
 namespace crepes {
 
-/// What is believed of sensors before they speak, one sigma.
+/// Priors of the states, one sigma.
 struct Priors {
   double speed_mps = 2.0;
   double gyro_bias_radps = 0.0;
@@ -23,7 +23,7 @@ struct Priors {
   double misalignment_rad = 0.0;
 };
 
-/// A camera's word on where a ring is, in the seeing robot's body.
+/// The direction of an LED ring in the body of the robot whose camera sees it.
 struct DirectionReading {
   Eigen::Vector3d u = Eigen::Vector3d::UnitX();
   Eigen::Vector3d camera = Eigen::Vector3d::Zero();
@@ -36,20 +36,21 @@ struct RangeReading {
 };
 
 /// ErrorState::kSize error states: relative motion, both IMUs' biases and scales, the pair's
-/// range bias and both cameras' misalignment. Moves forward only; corrections apply at `stamp()`.
+/// range bias and both cameras' misalignment. Advances forward only; corrections apply at
+/// `stamp()`.
 class NeighborFilter {
  public:
-  /// `first` shares its errors of calibration with all that follows; the speed is unknown.
+  /// The errors of `first` are correlated with the calibration states; the speed is unknown.
   NeighborFilter(Timestamp stamp, const RawPose& first, const ProcessNoise& noise,
                  const Priors& priors);
-  /// With errors of its own; the speed is unknown.
+  /// The errors of the pose are independent; the speed is unknown.
   NeighborFilter(Timestamp stamp, const GaussianPose& T_B_N, const ProcessNoise& noise,
                  const Priors& priors);
-  /// From the pose graph: the speed is known as well as that of the robots between.
+  /// From the pose graph, which includes the speed.
   NeighborFilter(Timestamp stamp, const GraphPose& first, const ProcessNoise& noise,
                  const Priors& priors);
 
-  /// Of both robots' motion and sensors from now on.
+  /// Applies to later propagation.
   void set_noise(const ProcessNoise& noise) { noise_ = noise; }
 
   [[nodiscard]] Timestamp stamp() const { return stamp_; }
@@ -62,36 +63,38 @@ class NeighborFilter {
                            double gate_nis);
   Fusion fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
                     const Eigen::Vector3d& p_N_Q, double gate_nis);
-  /// A pose whose errors may go together with this filter's, and with those of such poses before:
-  /// covariance intersection (Julier and Uhlmann 1997).
+  /// A pose whose errors may be correlated with this filter and with earlier such poses: covariance
+  /// intersection (Julier and Uhlmann 1997).
   Fusion fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis);
 
-  /// The distance is known no better than `sigma_m` any more, and the speed and what was learned of
-  /// the sensors no better than at the start: wrong ranges have led them astray.
-  void forget_distance(double sigma_m, const Priors& priors);
+  /// After wrong ranges: adds `sigma_m` to the uncertainty of the distance and resets the
+  /// covariance of speed and calibration to the priors.
+  void reset_distance(double sigma_m, const Priors& priors);
 
-  /// Bearings of this kind come from another camera from now on, misaligned in its own way.
-  void change_camera(MeasurementKind kind, double misalignment_rad);
+  /// Bearings of this kind come from another camera from now on, with another misalignment.
+  void reset_misalignment(MeasurementKind kind, double misalignment_rad);
 
   struct Part;
-  /// As Gaussians that are narrow enough for one linearization each, the attitude cut across its
-  /// most uncertain axis; their weighted sum is about the whole.
+  /// Splits the Gaussian along its most uncertain attitude axis into parts that are narrow enough
+  /// for one linearization. Their weighted sum approximates the whole.
   [[nodiscard]] std::vector<Part> split() const;
 
   [[nodiscard]] const RelativeMotion& motion() const { return state_.motion; }
   [[nodiscard]] const NominalState& state() const { return state_; }
-  [[nodiscard]] ErrorState::Covariance covariance() const;
+  [[nodiscard]] const ErrorState::Covariance& covariance() const { return P_; }
   /// Of T_B_N, in GaussianPose's convention.
   [[nodiscard]] Matrix6d pose_covariance() const;
 
  private:
-  /// `linearize` gives the innovation at a state, or nothing where it says nothing.
+  /// `linearize` returns the innovation at a state, or nothing where the model is singular.
   template <class Linearize>
   Fusion correct(const Linearize& linearize, double gate_nis);
+  /// Corrects the state, after P.
+  void apply(const ErrorState::Vector& correction);
 
   Timestamp stamp_;
   NominalState state_;
-  ErrorState::Covariance P_ = ErrorState::Covariance::Zero();
+  ErrorState::Covariance P_;
   ProcessNoise noise_;
 };
 

@@ -3,9 +3,9 @@
 
 #include <Eigen/Core>
 
+#include "estimator/core/imu_history.hpp"
 #include "estimator/core/outputs.hpp"
 #include "estimator/relative/error_state.hpp"
-#include "estimator/relative/imu_history.hpp"
 #include "estimator/relative/kalman_update.hpp"
 #include "estimator/relative/propagation.hpp"
 #include "estimator/relative/raw_pose.hpp"

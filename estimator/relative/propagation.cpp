@@ -19,8 +19,8 @@ BodyRates rates(const ImuMean& mean, const ImuBias& bias) {
 
 constexpr int kMotion = ErrorState::kMotion;
 
-/// The rates' errors from those of the sensors: of the biases and, by each axis a robot turns or is
-/// pushed about, of a column of its sensors' scales.
+/// Errors of the rates from the errors of the sensors: the bias, and for each axis the rate times a
+/// column of the scale matrix. Each row of `errors` is one case.
 template <class Errors>
 auto rate_errors(const Errors& errors, const BodyRates& body, const BodyRates& neighbor) {
   using E = ErrorState;
@@ -38,7 +38,7 @@ auto rate_errors(const Errors& errors, const BodyRates& body, const BodyRates& n
   return of_rates;
 }
 
-/// The motion's errors after a step; each row of the arguments is one case.
+/// Errors of the motion after a step; each row of the arguments is one case.
 template <class Motion, class Rates>
 auto moved_errors(const Motion& motion, const Rates& rates, const PropagationJacobian& J) {
   using Moved = Eigen::Matrix<double, Motion::RowsAtCompileTime, kMotion>;
@@ -48,34 +48,31 @@ auto moved_errors(const Motion& motion, const Rates& rates, const PropagationJac
   return moved;
 }
 
-/// Share of the range's bias that is left after a step.
-double range_bias_kept(const ProcessNoise& noise, double dt) {
+/// Factor of the range bias over a step.
+double range_bias_decay(const ProcessNoise& noise, double dt) {
   return std::exp(-noise.range_bias_return * dt);
 }
 
-// P <- F P F^T + Q, where F leaves all but the motion and the range's bias as it is.
+// P <- F P F^T + Q, where F changes the motion and the range bias only.
 void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
                           const BodyRates& neighbor, const Eigen::Matrix<double, 12, 1>& variance,
                           const ProcessNoise& noise, double dt, ErrorState::Covariance& P) {
   using E = ErrorState;
-  constexpr int kRest = E::kSize - E::kSeen;
-
-  // P F^T. Of its seen rows, the far half stands below the diagonal.
-  const auto seen =
-      moved_errors(P.topLeftCorner<E::kSeen, kMotion>(),
-                   rate_errors(P.leftCols<E::kSeen>().transpose(), body, neighbor), J);
-  const auto rest = moved_errors(P.bottomLeftCorner<kRest, kMotion>(),
-                                 rate_errors(P.bottomRows<kRest>(), body, neighbor), J);
-  P.leftCols<kMotion>() << seen, rest;
-  P.block<kMotion, E::kSeen - kMotion>(0, kMotion) =
-      seen.bottomRows<E::kSeen - kMotion>().transpose();
-  // F P F^T + J Q J^T: as F has -J for the rates, taking J Q off theirs does it.
-  auto rates = rate_errors(P.leftCols<kMotion>().transpose(), body, neighbor);
+  // P F^T. The rows of the seen states are read from their columns.
+  const auto of_seen = moved_errors(P.seen().leftCols<kMotion>(),
+                                    rate_errors(P.seen_columns().transpose(), body, neighbor), J);
+  const auto of_hidden =
+      moved_errors(P.cross().leftCols<kMotion>(), rate_errors(P.hidden_rows(), body, neighbor), J);
+  P.columns<0, kMotion>() << of_seen, of_hidden;
+  P.seen().block<kMotion, E::kSeen - kMotion>(0, kMotion) =
+      of_seen.bottomRows<E::kSeen - kMotion>().transpose();
+  // F P F^T + J Q J^T. F contains -J for the rates, so that J Q is subtracted from their errors.
+  auto rates = rate_errors(P.columns<0, kMotion>().transpose(), body, neighbor);
   rates -= J.by_rates * variance.asDiagonal();
   const Eigen::Matrix<double, kMotion, kMotion> once =
-      P.topLeftCorner<kMotion, kMotion>().transpose();
+      P.seen().topLeftCorner<kMotion, kMotion>().transpose();
   const auto twice = moved_errors(once, rates, J);
-  P.topLeftCorner<kMotion, kMotion>() = 0.5 * (twice + twice.transpose());
+  P.seen().topLeftCorner<kMotion, kMotion>() = 0.5 * (twice + twice.transpose());
 
   const double gyro_walk = noise.gyro_walk * noise.gyro_walk * dt;
   const double accel_walk = noise.accel_walk * noise.accel_walk * dt;
@@ -83,10 +80,10 @@ void propagate_covariance(const PropagationJacobian& J, const BodyRates& body,
   P.diagonal().segment<3>(E::kAccelB).array() += accel_walk;
   P.diagonal().segment<3>(E::kGyroN).array() += gyro_walk;
   P.diagonal().segment<3>(E::kAccelN).array() += accel_walk;
-  const double kept = range_bias_kept(noise, dt);
-  P.row(E::kRangeBias).head<E::kSeen>() *= kept;
-  P.col(E::kRangeBias) *= kept;
-  P(E::kRangeBias, E::kRangeBias) += noise.range_bias_walk * noise.range_bias_walk * dt;
+  const double kept = range_bias_decay(noise, dt);
+  P.seen_rows<E::kRangeBias, 1>() *= kept;
+  P.columns<E::kRangeBias, 1>() *= kept;
+  P.diagonal()(E::kRangeBias) += noise.range_bias_walk * noise.range_bias_walk * dt;
 }
 
 }  // namespace
@@ -150,20 +147,22 @@ PropagationJacobian propagation_jacobian(const RelativeMotion& before, const Rel
 Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body, const ImuMean& neighbor,
                                            const ProcessNoise& noise, double dt) {
   const auto square = [](double x) { return x * x; };
-  // A rate held for s is off by surprise * sqrt(s), and stays so: its integral by s^3/3 surprise^2.
-  const auto density2 = [&](double white, double shown, double guess, double surprise,
-                            double held_s2) {
-    return square(std::max(white, shown)) + (square(guess) + square(surprise)) * held_s2;
+  // An extrapolated rate is a random walk: after s its error is density * sqrt(s), and the variance
+  // of its integral s^3/3 density^2.
+  const auto density2 = [&](double specified, double observed, double extrapolation,
+                            double innovation, double time2_s2) {
+    return square(std::max(specified, observed)) +
+           (square(extrapolation) + square(innovation)) * time2_s2;
   };
   Eigen::Matrix<double, 12, 1> variance;
   int row = 0;
   for (const ImuMean* imu : {&body, &neighbor}) {
-    variance.segment<3>(row).setConstant(density2(noise.gyro_density, imu->gyro_density,
-                                                  noise.gyro_guess_change, imu->gyro_surprise,
-                                                  imu->held_s2));
-    variance.segment<3>(row + 3).setConstant(density2(noise.accel_density, imu->accel_density,
-                                                      noise.accel_guess_change, imu->accel_surprise,
-                                                      imu->held_s2));
+    variance.segment<3>(row).setConstant(
+        density2(noise.gyro_density, imu->gyro_noise_density, noise.gyro_extrapolation_density,
+                 imu->gyro_innovation_density, imu->extrapolation_time2_s2));
+    variance.segment<3>(row + 3).setConstant(
+        density2(noise.accel_density, imu->accel_noise_density, noise.accel_extrapolation_density,
+                 imu->accel_innovation_density, imu->extrapolation_time2_s2));
     row += 6;
   }
   return variance / dt;
@@ -180,15 +179,15 @@ void propagate(const ImuHistory& imu_B, const ImuHistory& imu_N, Timestamp from,
     const BodyRates neighbor = rates(mean_N, state.bias_N);
     const RelativeMotion before = state.motion;
     state.motion = propagated(before, body, neighbor, dt);
-    state.range_bias_m *= range_bias_kept(noise, dt);
+    state.range_bias_m *= range_bias_decay(noise, dt);
     propagate_covariance(propagation_jacobian(before, state.motion, body, neighbor, dt), body,
                          neighbor, rate_variance(mean_B, mean_N, noise, dt), noise, dt, P);
     t = next;
   }
 }
 
-RelativeMotion moved(const RelativeMotion& motion, const ImuHistory& imu_B, const ImuHistory& imu_N,
-                     Timestamp from, Timestamp to) {
+RelativeMotion propagated_by_imus(const RelativeMotion& motion, const ImuHistory& imu_B,
+                                  const ImuHistory& imu_N, Timestamp from, Timestamp to) {
   RelativeMotion state = motion;
   const bool back = to < from;
   for (Timestamp t = from; t != to;) {

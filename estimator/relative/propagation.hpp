@@ -1,31 +1,31 @@
-/// Relative motion between two accelerating, turning robots, and how its error moves.
+/// Propagation of the relative motion by both IMUs, with its covariance.
 #pragma once
 
 #include <Eigen/Core>
 
+#include "estimator/core/imu_history.hpp"
 #include "estimator/relative/error_state.hpp"
-#include "estimator/relative/imu_history.hpp"
 
 namespace crepes {
 
-/// One robot's rates over a step, without what its IMU adds.
+/// One robot's rates over a step, corrected by the errors of its IMU.
 struct BodyRates {
   Eigen::Vector3d w = Eigen::Vector3d::Zero();  ///< [rad/s], body axes
   Eigen::Vector3d a = Eigen::Vector3d::Zero();  ///< specific force [m/s^2], body axes
 };
 
-/// How far to trust the IMUs, the same for all robots of a team. Densities are white noise per
-/// sqrt(Hz); `guess` changes are what may begin at any time where no sample covers, beside what the
-/// signal's own surprises tell.
+/// Noise of the IMUs and of the range bias, the same for all robots. Densities are white noise per
+/// sqrt(Hz). Where no sample covers, the rates are random walks: `extrapolation` densities are
+/// their least densities; the innovation densities of the signals are added.
 struct ProcessNoise {
   double gyro_density = 0.0;
   double accel_density = 0.0;
   double gyro_walk = 0.0;
   double accel_walk = 0.0;
-  double gyro_guess_change = 0.3;   ///< [rad/s/sqrt(s)]
-  double accel_guess_change = 3.0;  ///< [m/s^2/sqrt(s)]
-  double range_bias_walk = 0.0;     ///< [m/sqrt(s)]
-  double range_bias_return = 0.0;   ///< to zero, so that a walk stays within bounds [1/s]
+  double gyro_extrapolation_density = 0.3;   ///< [rad/s/sqrt(s)]
+  double accel_extrapolation_density = 3.0;  ///< [m/s^2/sqrt(s)]
+  double range_bias_walk = 0.0;              ///< [m/sqrt(s)]
+  double range_bias_return = 0.0;            ///< rate of its decay to zero [1/s]
 };
 
 /// The step of paper eq. 9 with the forces turned to the middle of the step:
@@ -46,17 +46,18 @@ struct PropagationJacobian {
                                                        const BodyRates& body,
                                                        const BodyRates& neighbor, double dt);
 
-/// Variance of the rates [w_B, a_B, w_N, a_N] over a step, as if they were white.
+/// Variance of the rates [w_B, a_B, w_N, a_N] over a step, as white noise.
 [[nodiscard]] Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body,
                                                          const ImuMean& neighbor,
                                                          const ProcessNoise& noise, double dt);
 
-/// Moves state and covariance from `from` to `to` in steps of at most 10 ms.
+/// Propagates state and covariance from `from` to `to` in steps of at most 10 ms.
 void propagate(const ImuHistory& imu_B, const ImuHistory& imu_N, Timestamp from, Timestamp to,
                const ProcessNoise& noise, NominalState& state, ErrorState::Covariance& P);
 
-/// Moves a bare relative motion, forward or back, for example another robot's estimate.
-[[nodiscard]] RelativeMotion moved(const RelativeMotion& motion, const ImuHistory& imu_B,
-                                   const ImuHistory& imu_N, Timestamp from, Timestamp to);
+/// Propagates a motion without covariance, forward or back, for example another robot's estimate.
+[[nodiscard]] RelativeMotion propagated_by_imus(const RelativeMotion& motion,
+                                                const ImuHistory& imu_B, const ImuHistory& imu_N,
+                                                Timestamp from, Timestamp to);
 
 }  // namespace crepes

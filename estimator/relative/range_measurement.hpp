@@ -1,4 +1,4 @@
-/// What the UWB modules say.
+/// The measurement model of ranges between the UWB antennas.
 #pragma once
 
 #include <optional>

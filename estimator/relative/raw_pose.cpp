@@ -5,17 +5,17 @@
 #include <numbers>
 #include <optional>
 
+#include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
 namespace {
 
-// Horizontal part of a direction below which its heading is not worth having (6 degrees from the
-// vertical).
+// Smallest horizontal part of a direction with a usable heading: 6 degrees from the vertical.
 constexpr double kMinHorizontal = 0.1;
 constexpr double kMinRange = 0.10;         // m; below it the mountings set the direction
 constexpr double kMaxContradiction = 5.0;  // sigma
-// Each shrinks the error by about mounting over range, times what a steep line costs.
+// Each iteration reduces the error by about mounting over range, more slowly near the vertical.
 constexpr int kIterations = 10;
 
 struct Solution {
@@ -61,7 +61,7 @@ std::variant<Solution, NoPoseReason> solve(const MutualSighting& m) {
   const Eigen::Vector3d u_N_level = q_L_N * m.N.u;
   if (horizontal(u_N_level) < kMinHorizontal) return NoPoseReason::kNearVertical;
 
-  // The first pass takes the line from N's camera to our ring as -u_B: the paper's formula.
+  // The first pass uses -u_B for the line from N's camera to our ring: the paper's formula.
   Eigen::Vector3d back_B = -m.B.u;
   Solution solution;
   for (int i = 0; i < kIterations; ++i) {
@@ -82,7 +82,7 @@ std::variant<Solution, NoPoseReason> solve(const MutualSighting& m) {
   return solution;
 }
 
-// How much steeper N says the line is than B does [rad], and its one sigma.
+// Whether both robots measure the same elevation of the line from N's camera to B's ring.
 bool elevations_agree(const MutualSighting& m, const Solution& solution) {
   const Eigen::Vector3d line_B = m.B.mounting.led - solution.T_B_N * m.N.mounting.camera;
   const double elevation_B = std::asin(m.B.up.dot(line_B.normalized()));
@@ -150,23 +150,21 @@ Eigen::Matrix<double, 9, 9> covariance(const MutualSighting& m, const InputJacob
   return scaled * scaled.transpose();
 }
 
-// Truth lies where the inputs would lead without their fault: u turned back by the misalignment,
-// Exp(-m) u; the force less the bias and what scales make of gravity, up - b / g - S up; the range
-// less its own.
+// The true pose follows from corrected inputs: the direction Exp(-m) u, the vertical
+// up - b / g - S up, and the range minus its bias.
 CalibrationJacobian calibration_jacobian(const MutualSighting& m, const InputJacobian& J) {
-  constexpr double kGravity = 9.80665;
   Eigen::Matrix<double, 6, kInputs> J_pose;
   J_pose << J.topRows<3>(), J.bottomRows<3>();
   const auto by_turn = [&](int column, const Eigen::Vector3d& u) -> Eigen::Matrix<double, 6, 3> {
     return J_pose.middleCols<2>(column) * tangent_basis(u).transpose() * hat(u);
   };
   const auto by_force = [&](int column, const Eigen::Vector3d& up) -> Eigen::Matrix<double, 6, 3> {
-    return J_pose.middleCols<2>(column) * tangent_basis(up).transpose() / -kGravity;
+    return J_pose.middleCols<2>(column) * tangent_basis(up).transpose() / -kGravityMps2;
   };
   const auto by_scale = [&](int column, const Eigen::Vector3d& up) {
     Eigen::Matrix<double, 6, 9> J_scale;
     for (Eigen::Index axis = 0; axis < 3; ++axis)
-      J_scale.middleCols<3>(3 * axis) = kGravity * up(axis) * by_force(column, up);
+      J_scale.middleCols<3>(3 * axis) = kGravityMps2 * up(axis) * by_force(column, up);
     return J_scale;
   };
   return {.by_misalignment_B = by_turn(0, m.B.u),

@@ -17,7 +17,7 @@ struct Mounting {
   Eigen::Vector3d antenna = Eigen::Vector3d::Zero();
 };
 
-/// What one of the two robots contributes.
+/// The measurements of one of the two robots.
 struct Sighting {
   Eigen::Vector3d u = Eigen::Vector3d::UnitX();   ///< where its camera sees the other's ring
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity
@@ -34,8 +34,8 @@ struct MutualSighting {
   double range_sigma_m = 0.0;
 };
 
-/// What one raw pose and the next get wrong alike: both cameras' misalignment, both accelerometers'
-/// bias and scale (which tilt "up") and the pair's range bias.
+/// Jacobians by the calibration errors that all raw poses share: both cameras' misalignment, both
+/// accelerometers' bias and scale (which tilt "up"), and the pair's range bias.
 struct CalibrationJacobian {
   Eigen::Matrix<double, 6, 3> by_misalignment_B = Eigen::Matrix<double, 6, 3>::Zero();
   Eigen::Matrix<double, 6, 3> by_misalignment_N = Eigen::Matrix<double, 6, 3>::Zero();
@@ -52,13 +52,13 @@ struct RawPose {
   Eigen::Vector3d p_N_B = Eigen::Vector3d::Zero();
   /// Of [p_B_N, p_N_B, theta], theta a right perturbation of T_B_N's rotation.
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
-  /// Of gaussian()'s error. The covariance holds what misalignments and range bias add.
+  /// Of gaussian()'s error. The covariance includes misalignments and range bias.
   CalibrationJacobian by_calibration;
 
   [[nodiscard]] GaussianPose gaussian() const;
 };
 
-/// A RawPose, or why the geometry does not give one: kNearVertical, kTooClose, kNoRange (the range
+/// A RawPose, or the reason why there is none: kNearVertical, kTooClose, kNoRange (the range
 /// is shorter than the mountings allow), kUncertain (the two elevations contradict each other by
 /// more than 5 sigma: not one line of sight).
 ///
@@ -66,9 +66,9 @@ struct RawPose {
 /// R = (R_pitch R_roll)_B^T R_yaw(psi) (R_pitch R_roll)_N. Lever arms enter by iterating it.
 [[nodiscard]] std::variant<RawPose, NoPoseReason> compute_raw_pose(const MutualSighting& sighting);
 
-/// The pose of `seen` in `seer` from one robot's bearing, the range and both tilts: its heading
-/// could be any. So there are poses all around, `count` of them, each a Gaussian wide enough for
-/// its share. Empty where the range is shorter than the mountings allow. `seen.u` plays no part.
+/// Poses of `seen` in `seer` from one robot's bearing, the range and both tilts. The heading is
+/// unknown, so `count` Gaussians cover all headings. Empty if the range is shorter than the
+/// mountings allow. `seen.u` is not used.
 [[nodiscard]] std::vector<GaussianPose> poses_by_heading(const Sighting& seer, const Sighting& seen,
                                                          double range_m, double range_sigma_m,
                                                          int count);

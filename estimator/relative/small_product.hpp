@@ -1,4 +1,4 @@
-/// The products that the tight filter spends its time in: of a few columns each.
+/// Matrix products with few columns: most of the run time of the tight filter.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,13 +8,13 @@ namespace crepes {
 using MatrixRef = Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 using ConstMatrixRef = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
-/// C += A B^T, in vectors as wide as the processor has, with the same result to the bit in any
-/// width: each element of C sums in the order of A's columns. C shares none with A or B.
+/// C += A B^T, with the widest vectors of the processor. The result is the same to the bit for any
+/// width: each element of C sums in the order of A's columns. C must not overlap A or B.
 void add_product(const ConstMatrixRef& A, const ConstMatrixRef& B, MatrixRef C);
 /// C -= A B^T, likewise.
 void subtract_product(const ConstMatrixRef& A, const ConstMatrixRef& B, MatrixRef C);
 
-/// `add_product` as processors do it whose vectors have two lanes, so that tests see it on others.
+/// `add_product` with vectors of two lanes, for tests on processors with wider ones.
 void add_product_narrow(const ConstMatrixRef& A, const ConstMatrixRef& B, MatrixRef C);
 
 }  // namespace crepes

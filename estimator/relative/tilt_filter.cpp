@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
+#include "estimator/core/constants.hpp"
+#include "estimator/core/imu_history.hpp"
 #include "estimator/core/so3.hpp"
-#include "estimator/relative/imu_history.hpp"
 #include "estimator/relative/kalman_update.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr double kGravity = 9.80665;
 constexpr double kFirstSigma = 0.15;         // rad; a robot in flight at the first sample
 constexpr double kAccelerationTime = 1.0;    // s; how long a robot's acceleration keeps its sign
 constexpr double kStillAcceleration = 0.03;  // m/s^2
@@ -25,16 +24,16 @@ constexpr int kBias = 3;
 
 }  // namespace
 
-TiltFilter::TiltFilter(ImuConfig config) : config_(std::move(config)) {}
+TiltFilter::TiltFilter(const ImuNoise& config) : config_(config) {}
 
 void TiltFilter::start(const ImuSample& sample) {
-  q_L_B_ = Eigen::Quaterniond::FromTwoVectors(sample.accel_mps2, Eigen::Vector3d::UnitZ());
+  q_L_B_ = shortest_rotation(sample.accel_mps2, Eigen::Vector3d::UnitZ());
   gyro_bias_.setZero();
   P_.setZero();
   P_.diagonal().head<3>().setConstant(kFirstSigma * kFirstSigma);
   P_.diagonal().tail<3>().setConstant(config_.gyroscope_bias_sigma * config_.gyroscope_bias_sigma);
   turning_radps_ = sample.gyro_radps.norm();
-  surplus_mps2_ = std::abs(sample.accel_mps2.norm() - kGravity);
+  surplus_mps2_ = std::abs(sample.accel_mps2.norm() - kGravityMps2);
   samples_ = 1;
   last_ = sample;
 }
@@ -74,13 +73,13 @@ void TiltFilter::correct(const ImuSample& sample, double dt) {
   const double force = sample.accel_mps2.norm();
   const double share = std::min(1.0, dt / kSmoothingTime);
   turning_radps_ += share * ((sample.gyro_radps - gyro_bias_).norm() - turning_radps_);
-  surplus_mps2_ += share * (std::abs(force - kGravity) - surplus_mps2_);
-  if (force < 0.5 * kGravity || force > 2.0 * kGravity) return;  // falling or thrown about
+  surplus_mps2_ += share * (std::abs(force - kGravityMps2) - surplus_mps2_);
+  if (force < 0.5 * kGravityMps2 || force > 2.0 * kGravityMps2) return;  // falling or thrown about
 
   // White noise that weighs as much per second as an acceleration of this size and duration.
   const double acceleration =
       kStillAcceleration + kAccelerationPerTurn * turning_radps_ + surplus_mps2_;
-  const double sigma = acceleration / kGravity * std::sqrt(2.0 * kAccelerationTime / dt);
+  const double sigma = acceleration / kGravityMps2 * std::sqrt(2.0 * kAccelerationTime / dt);
 
   const Eigen::Vector3d up_B = q_L_B_.conjugate() * Eigen::Vector3d::UnitZ();
   const Eigen::Matrix<double, 3, 2> across = tangent_basis(up_B);

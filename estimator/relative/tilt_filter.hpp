@@ -5,27 +5,27 @@
 #include <Eigen/Geometry>
 #include <optional>
 
-#include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/sensor_noise.hpp"
 
 namespace crepes {
 
-/// Error-state filter on attitude and gyro bias. An accelerometer alone shows gravity only on a
-/// robot that stands still: what flies is accelerated along its own z axis whatever its tilt. So
-/// the force counts as gravity plus an unknown acceleration, correlated over a second and as large
-/// as the present motion suggests, and the gyroscope carries the attitude in between.
+/// Error-state filter on attitude and gyro bias. An accelerometer measures gravity only on a robot
+/// at rest: thrust acts along the z axis of the body, whatever its tilt. So the model of the force
+/// is gravity plus an unknown acceleration. The acceleration is correlated over a second, and its
+/// size follows from the present motion. The gyroscope propagates the attitude.
 class TiltFilter {
  public:
-  explicit TiltFilter(ImuConfig config);
+  explicit TiltFilter(const ImuNoise& config);
 
-  /// Another noise from now on; what is known stays known.
-  void set_noise(const ImuConfig& config) { config_ = config; }
+  /// Changes the noise and keeps the state.
+  void set_noise(const ImuNoise& config) { config_ = config; }
 
-  /// False, and nothing changes: not plausible, or a stamp that does not advance. A gap of more
-  /// than half a second starts the filter anew.
+  /// False, and nothing changes, if the sample is implausible or its stamp does not advance. A gap
+  /// of more than half a second restarts the filter.
   bool add(const ImuSample& sample);
 
-  /// Empty until enough samples came to average out the first ones.
+  /// Empty for the first samples after a start.
   [[nodiscard]] std::optional<Tilt> tilt() const;
 
  private:
@@ -33,7 +33,7 @@ class TiltFilter {
   void predict(const ImuSample& sample, double dt);
   void correct(const ImuSample& sample, double dt);
 
-  ImuConfig config_;
+  ImuNoise config_;
   std::optional<ImuSample> last_;
   int samples_ = 0;
   Eigen::Quaterniond q_L_B_ = Eigen::Quaterniond::Identity();  // heading arbitrary

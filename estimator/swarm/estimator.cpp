@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <numeric>
 #include <set>
 #include <utility>
 #include <variant>
@@ -10,16 +12,17 @@
 #include "estimator/core/contract.hpp"
 #include "estimator/relative/tilt_filter.hpp"
 #include "estimator/swarm/filter_settings.hpp"
+#include "estimator/swarm/graph_problem_builder.hpp"
 #include "estimator/swarm/neighbor.hpp"
 #include "estimator/swarm/report_composer.hpp"
 #include "estimator/swarm/robot_state.hpp"
-#include "estimator/swarm/team.hpp"
+#include "estimator/swarm/team_intake.hpp"
 #include "estimator/vision/blink_tracker.hpp"
 
 namespace crepes {
 namespace {
 
-// Estimates travel at this rate: the graph asks for no more.
+// The graph needs no higher rate of estimates in the reports.
 constexpr Duration kEstimatePeriod = std::chrono::milliseconds{100};
 
 const MemberConfig& member_of(const SwarmConfig& swarm, RobotId id) {
@@ -30,9 +33,9 @@ const MemberConfig& member_of(const SwarmConfig& swarm, RobotId id) {
 }
 
 // True once a period, counted from the first call.
-class Metronome {
+class PeriodicTimer {
  public:
-  explicit Metronome(Duration period) : period_(period) {}
+  explicit PeriodicTimer(Duration period) : period_(period) {}
 
   [[nodiscard]] bool is_due(Timestamp now) {
     if (next_ && now < *next_) return false;
@@ -45,8 +48,8 @@ class Metronome {
   std::optional<Timestamp> next_;
 };
 
-// Two robots alone have nothing to adjust: both their estimates rest on the same readings.
-bool is_a_team(const GraphProblem& problem) {
+// A graph of two robots has nothing to adjust: both estimates rest on the same readings.
+bool connects_three_robots(const GraphProblem& problem) {
   std::set<RobotId> robots;
   for (const RelativePoseEdge& edge : problem.edges) robots.insert({edge.from, edge.to});
   return robots.size() > 2;
@@ -61,14 +64,14 @@ void append(const Records& more, Records& all) {
                           more.calibrations.end());
 }
 
-std::vector<BlinkTracker> make_trackers(const Config& config) {
-  const auto library = IdLibrary::from(config.swarm);
+std::vector<BlinkTracker> make_trackers(const EstimatorSettings& settings) {
+  const auto library = IdLibrary::from(settings.swarm);
   CREPES_EXPECT(library.has_value(), "validated: every member has a code of its own");
   std::vector<BlinkTracker> trackers;
-  for (const CameraConfig& camera : config.cameras) {
+  for (const CameraCalibration& camera : settings.cameras) {
     const auto model = CameraModel::from(camera);
     CREPES_EXPECT(model.has_value(), "validated: every camera has a calibration");
-    trackers.emplace_back(camera, *model, config.vision, *library, config.robot.id);
+    trackers.emplace_back(camera, *model, settings.vision, *library, settings.self);
   }
   return trackers;
 }
@@ -76,94 +79,114 @@ std::vector<BlinkTracker> make_trackers(const Config& config) {
 }  // namespace
 
 struct Estimator::State {
-  explicit State(const Config& config)
-      : id(config.robot.id),
-        tilt_filter(config.imu),
-        trackers(make_trackers(config)),
-        composer(config.robot.id),
-        graph_enabled(config.graph.enabled),
-        report_clock(period_of(config.net.report_rate_hz)),
-        estimate_clock(kEstimatePeriod),
-        graph_clock(period_of(config.graph.rate_hz)),
-        swarm(config.swarm),
-        vision(config.vision) {
-    meet_members(filter_settings(config.estimator, config.imu, config.uwb));
+  explicit State(const EstimatorSettings& settings)
+      : id(settings.self),
+        tilt_filter(settings.imu),
+        trackers(make_trackers(settings)),
+        composer(settings.self),
+        graph_enabled(settings.solves_graph),
+        uses_team_filter(settings.uses_team_filter),
+        team_size(settings.team_size),
+        report_timer(period_of(settings.report_rate_hz)),
+        estimate_timer(kEstimatePeriod),
+        graph_timer(period_of(settings.graph_rate_hz)),
+        swarm(settings.swarm),
+        filters(filter_settings(settings.filters, settings.imu, settings.range)),
+        vision(settings.vision) {
+    add_new_members();
   }
 
-  void reconfigure(const Config& config);
-  void meet_members(const FilterSettings& settings);
+  void reconfigure(const EstimatorSettings& settings);
+  void add_new_members();
 
-  Outputs on(const ImuSample& sample);
-  Outputs on(const UwbRange& range);
-  Outputs on(const SpotFrame& frame);
-  Outputs on(const ReceivedReport& received);
-  Outputs on(const GraphSolution& solution);
-  Outputs on(const Tick& tick);
+  Outputs handle(const ImuSample& sample);
+  Outputs handle(const UwbRange& range);
+  Outputs handle(const SpotFrame& frame);
+  Outputs handle(const ReceivedReport& received);
+  Outputs handle(const GraphSolution& solution);
+  Outputs handle(const TeamSolution& solution);
+  Outputs handle(const Tick& tick);
 
+  [[nodiscard]] bool runs_team_filter() const {
+    return graph_enabled && uses_team_filter && filters.profile == Profile::kTight;
+  }
+  /// Null without samples.
+  [[nodiscard]] const ImuHistory* imu_of(RobotId robot) const;
   [[nodiscard]] GraphProblem graph_problem(const std::vector<NeighborEstimate>& own) const;
+  [[nodiscard]] std::optional<TeamInterval> team_interval(Timestamp now);
 
   RobotId id;
   RobotState self;
   TiltFilter tilt_filter;
   std::vector<BlinkTracker> trackers;
   std::map<RobotId, Neighbor> neighbors;
-  Team team;
+  GraphProblemBuilder graph_builder;
+  TeamIntake team_intake;
   ReportComposer composer;
   bool graph_enabled;
-  Metronome report_clock;
-  Metronome estimate_clock;
-  Metronome graph_clock;
+  bool uses_team_filter;
+  std::size_t team_size;
+  PeriodicTimer report_timer;
+  PeriodicTimer estimate_timer;
+  PeriodicTimer graph_timer;
   Timestamp last_tick = kNever;
   SwarmConfig swarm;
+  FilterSettings filters;
   VisionConfig vision;
   bool keeps_records = false;
+  std::vector<TeamFault> faults;  ///< of the latest team solution
   std::uint64_t unknown_senders = 0;
   std::uint64_t refused_samples = 0;
 };
 
 /// A Neighbor for every member that has none yet.
-void Estimator::State::meet_members(const FilterSettings& settings) {
+void Estimator::State::add_new_members() {
   const MemberConfig& own = member_of(swarm, id);
   for (const MemberConfig& member : swarm.members) {
     if (member.id == id) continue;
-    const auto [neighbor, is_new] = neighbors.try_emplace(member.id, own, member, settings);
-    if (is_new && keeps_records) neighbor->second.keep_records();
+    const auto [neighbor, is_new] = neighbors.try_emplace(member.id, own, member, filters);
+    if (is_new && keeps_records) neighbor->second.outcomes().keep_records();
   }
 }
 
-void Estimator::State::reconfigure(const Config& config) {
-  CREPES_EXPECT(config.robot.id == id && config.cameras.size() == trackers.size(),
+void Estimator::State::reconfigure(const EstimatorSettings& settings) {
+  CREPES_EXPECT(settings.self == id && settings.cameras.size() == trackers.size(),
                 "robot and cameras stay the same");
-  const SwarmConfig before = std::exchange(swarm, config.swarm);
-  const FilterSettings settings = filter_settings(config.estimator, config.imu, config.uwb);
+  const SwarmConfig before = std::exchange(swarm, settings.swarm);
+  filters = filter_settings(settings.filters, settings.imu, settings.range);
   const bool own_is_same = member_of(before, id) == member_of(swarm, id);
   std::erase_if(neighbors, [&](const auto& entry) {
     const auto& now = swarm.members;
     return !own_is_same ||
            std::find(now.begin(), now.end(), member_of(before, entry.first)) == now.end();
   });
-  for (auto& [robot, neighbor] : neighbors) neighbor.reconfigure(settings);
-  meet_members(settings);
+  for (auto& [robot, neighbor] : neighbors) neighbor.reconfigure(filters);
+  add_new_members();
 
-  tilt_filter.set_noise(config.imu);
-  if (!(swarm == before && config.vision == vision)) trackers = make_trackers(config);
-  vision = config.vision;
-  graph_enabled = config.graph.enabled;
-  report_clock = Metronome(period_of(config.net.report_rate_hz));
-  graph_clock = Metronome(period_of(config.graph.rate_hz));
+  tilt_filter.set_noise(settings.imu);
+  if (!(swarm == before && settings.vision == vision)) trackers = make_trackers(settings);
+  vision = settings.vision;
+  graph_enabled = settings.solves_graph;
+  uses_team_filter = settings.uses_team_filter;
+  team_size = settings.team_size;
+  if (!runs_team_filter()) faults.clear();
+  report_timer = PeriodicTimer(period_of(settings.report_rate_hz));
+  graph_timer = PeriodicTimer(period_of(settings.graph_rate_hz));
 }
 
-Outputs Estimator::State::on(const ImuSample& sample) {
-  if (!self.watch.accept(sample) || !tilt_filter.add(sample) || !self.imu.push(sample)) {
-    ++refused_samples;
-    return {};
+Outputs Estimator::State::handle(const ImuSample& sample) {
+  for (const ImuSample& believed : self.guard.accept(sample)) {
+    if (!tilt_filter.add(believed) || !self.add_believed(believed)) {
+      ++refused_samples;
+      continue;
+    }
+    self.tilt = tilt_filter.tilt();
+    for (BlinkTracker& tracker : trackers) tracker.add_imu(believed);
   }
-  self.tilt = tilt_filter.tilt();
-  for (BlinkTracker& tracker : trackers) tracker.add_imu(sample);
   return {};
 }
 
-Outputs Estimator::State::on(const UwbRange& range) {
+Outputs Estimator::State::handle(const UwbRange& range) {
   const auto neighbor = neighbors.find(range.neighbor);
   if (neighbor == neighbors.end() || !std::isfinite(range.range_m)) {
     ++refused_samples;
@@ -174,14 +197,14 @@ Outputs Estimator::State::on(const UwbRange& range) {
   return {};
 }
 
-Outputs Estimator::State::on(const SpotFrame& frame) {
+Outputs Estimator::State::handle(const SpotFrame& frame) {
   if (frame.camera >= trackers.size()) {
     ++refused_samples;
     return {};
   }
   Outputs outputs;
   outputs.bearings = trackers[frame.camera].step(frame);
-  // A robot that sees its own blinking sees it in a mirror.
+  // A robot that sees its own code sees itself in a mirror.
   std::erase_if(outputs.bearings,
                 [&](const Bearing& bearing) { return !neighbors.contains(bearing.neighbor); });
   for (const Bearing& bearing : outputs.bearings) {
@@ -191,18 +214,22 @@ Outputs Estimator::State::on(const SpotFrame& frame) {
   return outputs;
 }
 
-Outputs Estimator::State::on(const ReceivedReport& received) {
+Outputs Estimator::State::handle(const ReceivedReport& received) {
   const auto neighbor = neighbors.find(received.report.sender);
   if (neighbor == neighbors.end()) {
     ++unknown_senders;
     return {};
   }
   neighbor->second.add_report(received, self);
-  team.add(received.report);
+  graph_builder.add_report(received.report);
+  if (!runs_team_filter()) return {};
+  const ImuHistory& imu = neighbor->second.robot_state().imu;
+  const double w = imu.empty() ? 0.0 : imu.newest().gyro_radps.norm();
+  team_intake.add_report(received.report, w * received.clock_sigma_s, swarm, filters);
   return {};
 }
 
-Outputs Estimator::State::on(const GraphSolution& solution) {
+Outputs Estimator::State::handle(const GraphSolution& solution) {
   for (const GraphPose& pose : solution.poses) {
     const auto neighbor = neighbors.find(pose.neighbor);
     if (neighbor != neighbors.end()) neighbor->second.add_graph_pose(solution.stamp, pose);
@@ -210,19 +237,44 @@ Outputs Estimator::State::on(const GraphSolution& solution) {
   return {};
 }
 
-GraphProblem Estimator::State::graph_problem(const std::vector<NeighborEstimate>& own) const {
-  const auto imu_of = [this](RobotId robot) -> const ImuHistory* {
-    const auto neighbor = neighbors.find(robot);
-    const ImuHistory* imu = robot == id                   ? &self.imu
-                            : neighbor != neighbors.end() ? &neighbor->second.body().imu
-                                                          : nullptr;
-    return imu == nullptr || imu->empty() ? nullptr : imu;
+Outputs Estimator::State::handle(const TeamSolution& solution) {
+  faults = solution.faults;
+  const auto bias_of = [&](RobotId robot) {
+    const auto found = std::ranges::find(solution.biases, robot, &ImuBiasEstimate::robot);
+    return found == solution.biases.end() ? ImuBiasEstimate{} : *found;
   };
-  const Timestamp stamp = own.empty() ? self.imu.newest().stamp : own.front().stamp;
-  return team.problem(stamp, id, own, imu_of);
+  for (const TeamPose& pose : solution.poses) {
+    const auto neighbor = neighbors.find(pose.neighbor);
+    if (neighbor != neighbors.end())
+      neighbor->second.add_team_pose(solution.stamp, pose, bias_of(id), bias_of(pose.neighbor));
+  }
+  return {};
 }
 
-Outputs Estimator::State::on(const Tick& tick) {
+const ImuHistory* Estimator::State::imu_of(RobotId robot) const {
+  const auto neighbor = neighbors.find(robot);
+  const ImuHistory* imu = robot == id                   ? &self.imu
+                          : neighbor != neighbors.end() ? &neighbor->second.robot_state().imu
+                                                        : nullptr;
+  return imu == nullptr || imu->empty() ? nullptr : imu;
+}
+
+GraphProblem Estimator::State::graph_problem(const std::vector<NeighborEstimate>& own) const {
+  const Timestamp stamp = own.empty() ? self.imu.newest().stamp : own.front().stamp;
+  return graph_builder.build(stamp, id, own, [this](RobotId robot) { return imu_of(robot); });
+}
+
+/// What was measured until the lag before `now`. Empty for a team of two: it has nothing to share.
+std::optional<TeamInterval> Estimator::State::team_interval(Timestamp now) {
+  const auto imus = [this](RobotId robot) { return imu_of(robot); };
+  auto interval = team_intake.drain(id, now - filters.lag, swarm, filters, imus);
+  if (!interval || interval->members.size() < 3) return std::nullopt;
+  interval->settings.max_robots = team_size;
+  interval->edges = graph_builder.build(interval->to, id, {}, imus).edges;
+  return interval;
+}
+
+Outputs Estimator::State::handle(const Tick& tick) {
   if (tick.stamp <= last_tick) {
     ++refused_samples;
     return {};
@@ -233,40 +285,55 @@ Outputs Estimator::State::on(const Tick& tick) {
   std::vector<NeighborEstimate> estimates;
   for (auto& [robot, neighbor] : neighbors) {
     neighbor.tick(tick.stamp, self);
-    append(neighbor.take_records(), outputs.records);
-    if (auto estimate = neighbor.estimate()) estimates.push_back(*estimate);
-    if (auto pose = neighbor.improved_pose()) outputs.poses.push_back(std::move(*pose));
+    append(neighbor.outcomes().drain_records(), outputs.records);
+    if (auto estimate = neighbor.output().estimate()) estimates.push_back(*estimate);
+    if (auto pose = neighbor.output().published()) outputs.poses.push_back(std::move(*pose));
   }
-  if (report_clock.is_due(tick.stamp)) {
-    const bool with_estimates = estimate_clock.is_due(tick.stamp);
+  if (report_timer.is_due(tick.stamp)) {
+    const bool with_estimates = estimate_timer.is_due(tick.stamp);
     outputs.report = composer.compose(tick.stamp, self,
                                       with_estimates ? estimates : std::vector<NeighborEstimate>{});
   }
-  if (graph_enabled && !self.imu.empty() && graph_clock.is_due(tick.stamp)) {
-    GraphProblem problem = graph_problem(estimates);
-    if (is_a_team(problem)) outputs.graph_problem = std::move(problem);
+  if (outputs.report && runs_team_filter()) {
+    graph_builder.add_report(*outputs.report);
+    team_intake.add_own_report(*outputs.report, swarm, filters);
+  }
+  if (graph_enabled && !self.imu.empty() && graph_timer.is_due(tick.stamp)) {
+    if (runs_team_filter()) {
+      if (auto interval = team_interval(tick.stamp)) outputs.team_problem = std::move(*interval);
+    } else if (GraphProblem problem = graph_problem(estimates); connects_three_robots(problem)) {
+      outputs.team_problem = std::move(problem);
+    }
   }
   return outputs;
 }
 
-Estimator::Estimator(const Config& config) : state_(std::make_unique<State>(config)) {}
+Estimator::Estimator(const EstimatorSettings& settings)
+    : state_(std::make_unique<State>(settings)) {}
 Estimator::Estimator(Estimator&&) noexcept = default;
 Estimator& Estimator::operator=(Estimator&&) noexcept = default;
 Estimator::~Estimator() = default;
 
 Outputs Estimator::step(const Event& event) {
-  return std::visit([this](const auto& e) { return state_->on(e); }, event);
+  return std::visit([this](const auto& e) { return state_->handle(e); }, event);
 }
 
-void Estimator::reconfigure(const Config& config) { state_->reconfigure(config); }
+void Estimator::reconfigure(const EstimatorSettings& settings) { state_->reconfigure(settings); }
 
 void Estimator::keep_records() {
   state_->keeps_records = true;
-  for (auto& [robot, neighbor] : state_->neighbors) neighbor.keep_records();
+  for (auto& [robot, neighbor] : state_->neighbors) neighbor.outcomes().keep_records();
 }
 
 EstimatorStatus Estimator::status() const {
   EstimatorStatus status;
+  const auto faults_of = [this](RobotId robot) {
+    std::vector<TeamFault> of_robot;
+    std::ranges::copy_if(state_->faults, std::back_inserter(of_robot),
+                         [robot](const TeamFault& fault) { return fault.robot == robot; });
+    return of_robot;
+  };
+  status.faults = faults_of(state_->id);
   for (const auto& [robot, neighbor] : state_->neighbors) {
     NeighborStatus one = neighbor.status();
     for (const BlinkTracker& tracker : state_->trackers) {
@@ -274,11 +341,14 @@ EstimatorStatus Estimator::status() const {
       const auto found = decodes.find(robot);
       if (found != decodes.end()) one.id_decodes += found->second;
     }
+    one.faults = faults_of(robot);
     status.neighbors.push_back(std::move(one));
   }
   status.tilt = state_->self.tilt;
   status.unknown_senders = state_->unknown_senders;
-  status.refused_samples = state_->refused_samples;
+  status.refused_imu = state_->self.guard.refused();
+  status.refused_samples = std::accumulate(status.refused_imu.begin(), status.refused_imu.end(),
+                                           state_->refused_samples);
   return status;
 }
 

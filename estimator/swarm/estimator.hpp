@@ -5,27 +5,28 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/core/config.hpp"
 #include "estimator/core/event.hpp"
 #include "estimator/core/outputs.hpp"
+#include "estimator/swarm/estimator_settings.hpp"
+#include "estimator/swarm/team_solver.hpp"
 
 namespace crepes {
 
-/// What a step gave. Most steps give nothing; a Tick may give everything.
+/// The result of a step. Most steps return nothing; a Tick may return all of it.
 struct Outputs {
-  std::vector<NeighborPose> poses;            ///< to publish, ordered by neighbor
-  std::optional<Report> report;               ///< to broadcast
-  std::optional<GraphProblem> graph_problem;  ///< to solve; the answer comes back as an Event
-  std::vector<Bearing> bearings;              ///< what the cameras identified
-  Records records;                            ///< at a Tick, if they are kept
+  std::vector<NeighborPose> poses;          ///< to publish, ordered by neighbor
+  std::optional<Report> report;             ///< to broadcast
+  std::optional<TeamProblem> team_problem;  ///< to solve; the answer comes back as an Event
+  std::vector<Bearing> bearings;            ///< of the robots that the cameras identified
+  Records records;                          ///< at a Tick, if they are kept
 };
 
-/// Events in order of arrival in, poses out. A pure function of the events so far: same events,
-/// same outputs, to the bit. Late data are put in their place within `estimator.lag_ms`.
+/// Receives events in order of their arrival. Its outputs are a function of the events so far: the
+/// same events give the same outputs, to the bit. Late data are reordered within `filters.lag_ms`.
 class Estimator {
  public:
-  /// `config` must have passed validation.
-  explicit Estimator(const Config& config);
+  /// `settings` must come from a configuration without faults.
+  explicit Estimator(const EstimatorSettings& settings);
   Estimator(Estimator&&) noexcept;
   Estimator& operator=(Estimator&&) noexcept;
   Estimator(const Estimator&) = delete;
@@ -33,11 +34,11 @@ class Estimator {
   ~Estimator();
 
   [[nodiscard]] Outputs step(const Event& event);
-  /// Other settings from now on, with the same `robot` and `cameras`. Filters keep what they know,
-  /// unless the profile or a mounting changes. New members are unknown, missing ones forgotten.
-  /// Where `vision` or a code changes, tracks begin anew and read their IDs again.
-  void reconfigure(const Config& config);
-  /// From now on `Outputs::records` tells of every measurement. Changes nothing else.
+  /// Applies other settings with the same `self` and `cameras`. Filters keep their state, unless
+  /// the profile or a mounting changes. Members may be added and removed. If `vision` or a code
+  /// changes, all tracks restart and decode their IDs again.
+  void reconfigure(const EstimatorSettings& settings);
+  /// From now on `Outputs::records` contains every measurement. Changes nothing else.
   void keep_records();
   [[nodiscard]] EstimatorStatus status() const;
 

@@ -1,21 +1,30 @@
 #include "estimator/swarm/filter_settings.hpp"
 
 #include <cmath>
-#include <numbers>
 
+#include "estimator/core/constants.hpp"
 #include "estimator/relative/chi_square.hpp"
 
 namespace crepes {
 namespace {
 
 constexpr double kBiasTime = 2.0;  // s
+// The tight filter fuses the bearings of its raw pose once more, one by one. This sigma keeps the
+// raw pose from counting them first.
+constexpr double kLooseBearing = 0.05;  // rad
+
+ProfileTraits traits_of(Profile profile) {
+  const bool tight = profile == Profile::kTight;
+  return {.fuses_single_readings = tight, .hypotheses_compete = tight, .starts_one_way = tight};
+}
 
 }  // namespace
 
-FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig& imu,
-                               const UwbConfig& uwb) {
+FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuNoise& imu,
+                               const RangeNoise& range) {
   FilterSettings s;
   s.profile = estimator.profile;
+  s.traits = traits_of(s.profile);
   s.lag = from_seconds(estimator.lag_ms * 1e-3);
   s.recent = from_seconds(estimator.predicted_after_s);
   s.forget = from_seconds(estimator.forget_after_s);
@@ -24,14 +33,14 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig
   s.noise.accel_density = imu.accelerometer_noise_density;
   s.noise.gyro_walk = imu.gyroscope_random_walk;
   s.noise.accel_walk = imu.accelerometer_random_walk;
-  // A random walk that reaches bias_drift_m within bias_time_s, drawn back so that in the long run
-  // it stays within bias_sigma_m (a Gauss-Markov process).
-  s.noise.range_bias_walk = uwb.bias_drift_m / std::sqrt(uwb.bias_time_s);
-  if (uwb.bias_sigma_m > 0.0)
-    s.noise.range_bias_return = 0.5 * std::pow(s.noise.range_bias_walk / uwb.bias_sigma_m, 2);
+  // A Gauss-Markov process: a random walk that reaches bias_drift_m within bias_time_s, with a
+  // stationary sigma of bias_sigma_m.
+  s.noise.range_bias_walk = range.bias_drift_m / std::sqrt(range.bias_time_s);
+  if (range.bias_sigma_m > 0.0)
+    s.noise.range_bias_return = 0.5 * std::pow(s.noise.range_bias_walk / range.bias_sigma_m, 2);
 
   if (s.profile == Profile::kPaper) {
-    // The paper's filter has no bias states: what a bias does within kBiasTime must pass as noise.
+    // The paper's filter has no bias states: noise replaces the effect of a bias over kBiasTime.
     s.noise.accel_density =
         std::hypot(s.noise.accel_density, imu.accelerometer_bias_sigma * std::sqrt(kBiasTime));
     s.noise.gyro_density =
@@ -42,17 +51,20 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig
   s.priors.accel_bias_mps2 = imu.accelerometer_bias_sigma;
   s.priors.gyro_scale = imu.gyroscope_scale_sigma;
   s.priors.accel_scale = imu.accelerometer_scale_sigma;
-  s.priors.range_bias_m = uwb.bias_sigma_m;
-  s.priors.misalignment_rad = estimator.camera_misalignment_deg * std::numbers::pi / 180.0;
+  s.priors.range_bias_m = range.bias_sigma_m;
+  s.priors.misalignment_rad = radians(estimator.camera_misalignment_deg);
 
   const double p = estimator.gate_probability;
   s.gates = {.range = chi_square_quantile(p, 1),
              .bearing = chi_square_quantile(p, 2),
              .pose = chi_square_quantile(p, 6),
              .raw_pose = chi_square_quantile(p, 9)};
-  s.range_sigma_m = uwb.noise_m;
-  s.max_range_m = uwb.max_range_m;
-  s.late_path_db = uwb.late_path_db;
+  s.range_sigma_m = range.noise_m;
+  s.raw_pose_range_sigma_m = std::hypot(s.range_sigma_m, s.priors.range_bias_m);
+  s.raw_pose_calibration_sigma_rad =
+      s.traits.fuses_single_readings ? kLooseBearing : s.priors.misalignment_rad;
+  s.max_range_m = range.max_range_m;
+  s.late_path_db = range.late_path_db;
   return s;
 }
 

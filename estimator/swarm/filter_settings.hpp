@@ -1,9 +1,10 @@
-/// Config keys as the filters want them.
+/// The configuration, in the form that the filters use.
 #pragma once
 
-#include "estimator/core/config.hpp"
+#include "estimator/core/sensor_noise.hpp"
 #include "estimator/relative/neighbor_filter.hpp"
 #include "estimator/relative/propagation.hpp"
+#include "estimator/swarm/estimator_config.hpp"
 
 namespace crepes {
 
@@ -15,8 +16,16 @@ struct Gates {
   double raw_pose = 0.0;
 };
 
+/// The consequences of the profile, besides the type of the filter.
+struct ProfileTraits {
+  bool fuses_single_readings = true;  ///< bearings and ranges; otherwise raw poses
+  bool hypotheses_compete = true;     ///< otherwise each raw pose replaces the filter
+  bool starts_one_way = true;         ///< a track may start from bearings of one direction
+};
+
 struct FilterSettings {
   Profile profile = Profile::kTight;
+  ProfileTraits traits;
   Duration lag{};
   Duration recent{};  ///< a measurement within this makes a pose direct
   Duration forget{};  ///< a neighbor silent for longer is forgotten
@@ -24,11 +33,13 @@ struct FilterSettings {
   Priors priors;
   Gates gates;
   double range_sigma_m = 0.0;
+  double raw_pose_range_sigma_m = 0.0;          ///< of one range, with its bias
+  double raw_pose_calibration_sigma_rad = 0.0;  ///< added to a bearing's noise in raw poses
   double max_range_m = 0.0;
   double late_path_db = 0.0;
 };
 
-[[nodiscard]] FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuConfig& imu,
-                                             const UwbConfig& uwb);
+[[nodiscard]] FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuNoise& imu,
+                                             const RangeNoise& range);
 
 }  // namespace crepes

@@ -6,11 +6,11 @@
 namespace crepes {
 namespace {
 
-// How many readings out of nowhere are reckoned with for each true one: per steradian, per meter.
+// Density of clutter for each true reading: per steradian and per meter.
 constexpr double kFalseBearings = 0.1;
 constexpr double kFalseRanges = 0.05;
 
-// A pose in the metric of another's own covariance.
+// Squared Mahalanobis distance of a pose, by the covariance of the other.
 double distance2(const GaussianPose& from, const Pose& to) {
   const Vector6d step = pose_difference(from.pose, to);
   return step.dot(from.covariance.llt().solve(step));
@@ -18,8 +18,8 @@ double distance2(const GaussianPose& from, const Pose& to) {
 
 }  // namespace
 
-double score_of(const Fusion& fusion, MeasurementKind kind) {
-  if (fusion.verdict != Verdict::kFused) return 0.0;  // clutter, by either account
+double log_likelihood_ratio(const Fusion& fusion, MeasurementKind kind) {
+  if (fusion.verdict != Verdict::kFused) return 0.0;  // clutter under both hypotheses
   const bool is_range = kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange;
   return fusion.log_likelihood - std::log(is_range ? kFalseRanges : kFalseBearings);
 }
@@ -44,50 +44,50 @@ void GaussianSum::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHis
 
 Association GaussianSum::fuse(std::span<const Measurement> candidates, const PairMounting& mounting,
                               const Gates& gates) {
-  const std::size_t chosen = heaviest().likeliest(candidates, mounting);
+  const std::size_t chosen = heaviest().most_likely(candidates, mounting);
   const Measurement& reading = candidates[chosen];
   Association association{.chosen = chosen, .fusion{}};
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const Fusion fusion = parts_[i].track.fuse(reading, mounting, gates);
     if (i == heaviest_) association.fusion = fusion;
-    parts_[i].log_weight += score_of(fusion, reading.kind);
+    parts_[i].log_weight += log_likelihood_ratio(fusion, reading.kind);
   }
   association.score = normalize();
   return association;
 }
 
-/// Back to a sum of weights of one; the logarithm of what it was.
+/// Scales the weights to a sum of one. Returns the logarithm of the sum before.
 double GaussianSum::normalize() {
   const auto heaviest =
       std::max_element(parts_.begin(), parts_.end(),
                        [](const Part& a, const Part& b) { return a.log_weight < b.log_weight; });
   heaviest_ = static_cast<std::size_t>(heaviest - parts_.begin());
-  const double most = heaviest->log_weight;
+  const double largest = heaviest->log_weight;
   double sum = 0.0;
-  for (const Part& part : parts_) sum += std::exp(part.log_weight - most);
-  const double log_sum = most + std::log(sum);
+  for (const Part& part : parts_) sum += std::exp(part.log_weight - largest);
+  const double log_sum = largest + std::log(sum);
   for (Part& part : parts_) part.log_weight -= log_sum;
   return log_sum;
 }
 
 void GaussianSum::prune() {
-  constexpr double kUnlikely = -9.0;  // against the heaviest
+  constexpr double kUnlikely = -9.0;  // log weight relative to the heaviest
   constexpr double kEqual = 0.25;     // squared, in sigmas
   if (parts_.size() == 1) return;
   std::swap(parts_.front(), parts_[heaviest_]);
   const Part& first = parts_.front();
   const GaussianPose pose = first.track.pose();
-  const auto superfluous = [&](const Part& part) {
+  const auto is_redundant = [&](const Part& part) {
     return part.log_weight - first.log_weight < kUnlikely ||
            distance2(pose, part.track.pose().pose) < kEqual;
   };
-  parts_.erase(std::remove_if(parts_.begin() + 1, parts_.end(), superfluous), parts_.end());
+  parts_.erase(std::remove_if(parts_.begin() + 1, parts_.end(), is_redundant), parts_.end());
   normalize();
 }
 
-bool GaussianSum::is_like(const GaussianSum& other) const {
-  constexpr double kAlike = 12.0;  // squared, in sigmas; a mirror image is hundreds off
-  return distance2(heaviest().pose(), other.heaviest().pose().pose) < kAlike;
+bool GaussianSum::is_compatible_with(const GaussianSum& other) const {
+  constexpr double kCompatible = 12.0;  // squared, in sigmas; a mirror image is hundreds away
+  return distance2(heaviest().pose(), other.heaviest().pose().pose) < kCompatible;
 }
 
 const NeighborTrack& GaussianSum::heaviest() const { return parts_[heaviest_].track; }

@@ -1,4 +1,4 @@
-/// One start of a neighbor's filter as a sum of Gaussians.
+/// One hypothesis about a neighbor's pose, as a sum of Gaussians.
 #pragma once
 
 #include <span>
@@ -8,38 +8,39 @@
 
 namespace crepes {
 
-/// What became of a group of rival readings, of which at most one is true.
+/// The result of fusing a group of alternatives, of which at most one is true.
 struct Association {
-  std::size_t chosen = 0;  ///< the likeliest
+  std::size_t chosen = 0;  ///< index of the most likely alternative
   Fusion fusion;           ///< of the chosen one
-  double score = 0.0;      ///< ln of its likelihood against that of all being clutter
+  double score = 0.0;      ///< log likelihood ratio: the chosen one is true, or all are clutter
 };
 
-/// ln of what a reading says for a filter, against its being clutter.
-[[nodiscard]] double score_of(const Fusion& fusion, MeasurementKind kind);
+/// ln of the likelihood of a reading given the filter, over its likelihood as clutter.
+[[nodiscard]] double log_likelihood_ratio(const Fusion& fusion, MeasurementKind kind);
 
-/// Filters that differ in what the first reading left open, weighted by what came since (Alspach
-/// and Sorenson 1972). What one linearization could not hold, 10 degrees of roll, each of them can.
-/// Parts that became unlikely or equal to another go; after a second there is one.
+/// A weighted bank of filters (Alspach and Sorenson 1972). They differ in what the first reading
+/// left open, for example 10 degrees of roll: too much for one linearization, not for each part.
+/// `prune` removes parts that became unlikely or equal to another; after a second one is left.
 class GaussianSum {
  public:
   explicit GaussianSum(const NeighborTrack& whole);
-  /// Of parts that are as likely one as the other.
+  /// Parts of equal weight.
   explicit GaussianSum(std::vector<NeighborTrack> parts);
 
   void set_noise(const ProcessNoise& noise);
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
-  /// Corrects every part with the candidate that is likeliest to the heaviest part.
+  /// Corrects every part with the candidate that is most likely for the heaviest part.
   Association fuse(std::span<const Measurement> candidates, const PairMounting& mounting,
                    const Gates& gates);
   void prune();
 
-  /// Whether the other may be the same, by what the heaviest part knows.
-  [[nodiscard]] bool is_like(const GaussianSum& other) const;
+  /// True if the heaviest parts of both are equal within the covariance of this one.
+  [[nodiscard]] bool is_compatible_with(const GaussianSum& other) const;
   [[nodiscard]] const NeighborTrack& heaviest() const;
   [[nodiscard]] std::size_t size() const { return parts_.size(); }
 
-  /// The sum as one Gaussian, where `heaviest` is the heaviest part's pose now, a little later.
+  /// Mean and covariance of the sum. `heaviest` is the pose of the heaviest part, propagated to a
+  /// later instant; the result is at that instant.
   [[nodiscard]] GaussianPose mean(const GaussianPose& heaviest) const;
 
  private:

@@ -2,22 +2,26 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <numbers>
+#include <type_traits>
 #include <utility>
 
+#include "estimator/core/constants.hpp"
 #include "estimator/core/contract.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr double kMaxSigma = 1.0;                                      // m
-constexpr double kMaxAttitudeSigma = 20.0 * std::numbers::pi / 180.0;  // rad
+constexpr double kMaxSigma = 1.0;                    // m
+constexpr double kMaxAttitudeSigma = radians(20.0);  // rad
 
-// A camera that has not shown the neighbor for so long gives way to another of the same robot.
+// Another camera of the same robot is used after the current one was silent for so long.
 constexpr Duration kHandover = std::chrono::milliseconds{100};
 
-constexpr int kEnough = 10;            // refusals in a row, to mean something
-constexpr double kLostDistance = 1.0;  // m
+constexpr int kMinGated = 10;         // in a row; fewer may be chance
+constexpr int kMinContradicting = 3;  // in a row, after the last one that fit
+// Without so long a gap, false bearings among true ones are gated in a row, too.
+constexpr Duration kGlimpseGap = std::chrono::milliseconds{100};
+constexpr double kDistanceSigma = 1.0;  // m; after a reset
 
 double largest_sigma(const Eigen::Matrix3d& covariance) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
@@ -50,12 +54,12 @@ Fusion fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounti
     case MeasurementKind::kRawPose:
       break;
   }
-  return {.verdict = Verdict::kNoState};  // a raw pose only starts this filter
+  return {.verdict = Verdict::kNoState};  // a raw pose only initializes this filter
 }
 
 Fusion fuse_paper(PaperFilter& filter, const Measurement& m, const Gates& gates) {
   if (m.kind == MeasurementKind::kRawPose) {
-    return filter.fuse(std::get<MutualStart>(m.reading).raw, gates.raw_pose);
+    return filter.fuse(std::get<MutualInitialization>(m.reading).raw, gates.raw_pose);
   }
   CREPES_EXPECT(m.kind == MeasurementKind::kGraphPose, "the paper's filter takes poses only");
   return filter.fuse(std::get<GraphPose>(m.reading).T_B_N, gates.pose);
@@ -99,10 +103,10 @@ void NeighborTrack::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuH
 Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& mounting,
                            const Gates& gates) {
   auto* tight = std::get_if<NeighborFilter>(&filter_);
-  // Out of view, ranges that took a detour may have led the distance astray. Nothing else would
-  // bring it back: bearings of a robot at twice the distance are the same.
-  if (tight != nullptr && has_lost_its_distance(measurement.kind))
-    tight->forget_distance(kLostDistance, priors_);
+  // While the robots could not see each other, reflected ranges may have corrupted the distance.
+  // Bearings cannot correct it: they do not depend on the distance.
+  if (tight != nullptr && is_range_diverged(measurement.kind))
+    tight->reset_distance(kDistanceSigma, priors_);
   const bool is_bearing = std::holds_alternative<DirectionReading>(measurement.reading);
   const Fusion fusion = tight == nullptr
                             ? fuse_paper(std::get<PaperFilter>(filter_), measurement, gates)
@@ -111,11 +115,11 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
   const auto kind = static_cast<std::size_t>(measurement.kind);
   if (fusion.verdict == Verdict::kFused) {
     last_[kind] = measurement.stamp;
-    refused_[kind] = {};
+    gated_[kind] = {};
   } else if (fusion.verdict == Verdict::kGated) {
-    Refusals& refused = refused_[kind];
-    if (refused.count++ == 0) refused.since = measurement.stamp;
-    refused.latest = measurement.stamp;
+    GatedRun& gated = gated_[kind];
+    if (gated.count++ == 0) gated.since = measurement.stamp;
+    gated.latest = measurement.stamp;
   }
   return fusion;
 }
@@ -123,29 +127,29 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
 Fusion NeighborTrack::fuse_bearing(NeighborFilter& filter, const Measurement& bearing,
                                    const PairMounting& mounting, const Gates& gates) {
   const Eigen::Vector3d& camera = std::get<DirectionReading>(bearing.reading).camera;
-  auto& speaking = bearing.kind == MeasurementKind::kBearing ? p_B_C_ : p_N_C_;
+  auto& in_use = bearing.kind == MeasurementKind::kBearing ? p_B_C_ : p_N_C_;
   Fusion fusion{.verdict = Verdict::kSkipped};
-  if (!speaking || *speaking == camera) {
+  if (!in_use || *in_use == camera) {
     fusion = fuse_tight(filter, bearing, mounting, gates);
   } else if (bearing.stamp - last(bearing.kind) > kHandover) {
-    NeighborFilter asked = filter;
-    asked.change_camera(bearing.kind, priors_.misalignment_rad);
-    fusion = fuse_tight(asked, bearing, mounting, gates);
-    if (fusion.verdict == Verdict::kFused) filter = asked;
+    NeighborFilter trial = filter;
+    trial.reset_misalignment(bearing.kind, priors_.misalignment_rad);
+    fusion = fuse_tight(trial, bearing, mounting, gates);
+    if (fusion.verdict == Verdict::kFused) filter = trial;
   }
-  if (fusion.verdict == Verdict::kFused) speaking = camera;
+  if (fusion.verdict == Verdict::kFused) in_use = camera;
   return fusion;
 }
 
-std::size_t NeighborTrack::likeliest(std::span<const Measurement> candidates,
-                                     const PairMounting& mounting) const {
+std::size_t NeighborTrack::most_likely(std::span<const Measurement> candidates,
+                                       const PairMounting& mounting) const {
   const auto* tight = std::get_if<NeighborFilter>(&filter_);
   if (candidates.size() == 1 || tight == nullptr) return 0;
-  NeighborFilter asked = *tight;
+  NeighborFilter trial = *tight;
   std::size_t best = 0;
   double least_nis = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const Fusion fusion = fuse_tight(asked, candidates[i], mounting, Gates{});  // nothing passes
+    const Fusion fusion = fuse_tight(trial, candidates[i], mounting, Gates{});  // all gated
     if (fusion.verdict == Verdict::kGated && fusion.nis < least_nis) {
       least_nis = fusion.nis;
       best = i;
@@ -181,18 +185,23 @@ std::optional<CalibrationRecord> NeighborTrack::calibration() const {
   const auto* tight = std::get_if<NeighborFilter>(&filter_);
   if (tight == nullptr) return std::nullopt;
   const NominalState& x = tight->state();
-  using States = Eigen::Matrix<double, 19, 1>;
-  States value;
-  value << x.bias_B.gyro_radps, x.bias_B.accel_mps2, x.bias_N.gyro_radps, x.bias_N.accel_mps2,
-      x.range_bias_m, x.misalignment_B, x.misalignment_N;
   const ErrorState::Vector variance = tight->covariance().diagonal();
-  States sigma;
-  sigma << variance.segment<12>(ErrorState::kGyroB).cwiseSqrt(),
-      variance.segment<7>(ErrorState::kRangeBias).cwiseSqrt();
-  CalibrationRecord record;
+  using R = CalibrationRecord;
+  R record;
   record.stamp = tight->stamp();
-  States::Map(record.value.data()) = value;
-  States::Map(record.sigma.data()) = sigma;
+  const auto put = [&](R::Index index, const auto& value, int state) {
+    constexpr int kSize = std::decay_t<decltype(value)>::RowsAtCompileTime;
+    using Values = Eigen::Matrix<double, kSize, 1>;
+    Values::Map(&record.value[index]) = value;
+    Values::Map(&record.sigma[index]) = variance.segment<kSize>(state).cwiseSqrt();
+  };
+  put(R::kGyroB, x.bias_B.gyro_radps, ErrorState::kGyroB);
+  put(R::kAccelB, x.bias_B.accel_mps2, ErrorState::kAccelB);
+  put(R::kGyroN, x.bias_N.gyro_radps, ErrorState::kGyroN);
+  put(R::kAccelN, x.bias_N.accel_mps2, ErrorState::kAccelN);
+  put(R::kRangeBias, Eigen::Matrix<double, 1, 1>(x.range_bias_m), ErrorState::kRangeBias);
+  put(R::kMisalignB, x.misalignment_B, ErrorState::kMisalignB);
+  put(R::kMisalignN, x.misalignment_N, ErrorState::kMisalignN);
   return record;
 }
 
@@ -201,22 +210,36 @@ Timestamp NeighborTrack::last_sighting() const {
                    last(MeasurementKind::kRawPose)});
 }
 
-bool NeighborTrack::has_lost_its_distance(MeasurementKind kind) const {
+bool NeighborTrack::is_range_diverged(MeasurementKind kind) const {
   if (kind != MeasurementKind::kRange && kind != MeasurementKind::kPeerRange) return false;
-  const Refusals& refused = refused_[static_cast<std::size_t>(kind)];
-  const auto fits = [this](MeasurementKind other) { return last(other) > stamp() - kPatience; };
-  return refused.count >= kEnough && refused.latest - refused.since >= 2 * kPatience &&
+  const GatedRun& gated = gated_[static_cast<std::size_t>(kind)];
+  const auto fits = [this](MeasurementKind other) {
+    return last(other) > stamp() - kDivergenceTime;
+  };
+  return gated.count >= kMinGated && gated.latest - gated.since >= 2 * kDivergenceTime &&
          fits(MeasurementKind::kBearing) && fits(MeasurementKind::kPeerBearing) &&
          !fits(MeasurementKind::kRange) && !fits(MeasurementKind::kPeerRange);
 }
 
-bool NeighborTrack::has_lost_its_way() const {
-  const auto is_astray = [this](MeasurementKind kind) {
-    const Refusals& refused = refused_[static_cast<std::size_t>(kind)];
-    return refused.count >= kEnough && refused.latest - refused.since >= kPatience;
+bool NeighborTrack::is_contradicted() const {
+  const auto is_gated_since = [this](MeasurementKind kind, Timestamp used) {
+    const GatedRun& gated = gated_[static_cast<std::size_t>(kind)];
+    return gated.count >= kMinContradicting && gated.since > used;
   };
-  return is_astray(MeasurementKind::kBearing) || is_astray(MeasurementKind::kPeerBearing) ||
-         is_astray(MeasurementKind::kRawPose);
+  using Kind = MeasurementKind;
+  const Timestamp sighted = last_sighting() + kGlimpseGap;
+  const Timestamp ranged = std::max(last(Kind::kRange), last(Kind::kPeerRange));
+  return is_gated_since(Kind::kBearing, sighted) || is_gated_since(Kind::kPeerBearing, sighted) ||
+         is_gated_since(Kind::kRange, ranged) || is_gated_since(Kind::kPeerRange, ranged);
+}
+
+bool NeighborTrack::is_diverged() const {
+  const auto is_gated_out = [this](MeasurementKind kind) {
+    const GatedRun& gated = gated_[static_cast<std::size_t>(kind)];
+    return gated.count >= kMinGated && gated.latest - gated.since >= kDivergenceTime;
+  };
+  return is_gated_out(MeasurementKind::kBearing) || is_gated_out(MeasurementKind::kPeerBearing) ||
+         is_gated_out(MeasurementKind::kRawPose);
 }
 
 }  // namespace crepes

@@ -1,4 +1,4 @@
-/// A neighbor's filter of either profile, with a memory of what it was fed.
+/// A neighbor's filter of either profile, and when it fused or gated which readings.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 
 #include "estimator/relative/neighbor_filter.hpp"
 #include "estimator/relative/paper_filter.hpp"
-#include "estimator/swarm/event_sequencer.hpp"
 #include "estimator/swarm/filter_settings.hpp"
+#include "estimator/swarm/measurement.hpp"
 
 namespace crepes {
 
@@ -27,28 +27,28 @@ struct PairMounting {
 /// Long before any stamp, yet safe to subtract from one.
 inline constexpr Timestamp kNever{Duration{std::numeric_limits<std::int64_t>::min() / 4}};
 
-/// A filter whose sightings were all refused for so long is wrong, not unlucky.
-inline constexpr Duration kPatience = std::chrono::milliseconds{250};
+/// A filter that gated all sightings of one kind for so long has diverged.
+inline constexpr Duration kDivergenceTime = std::chrono::milliseconds{250};
 
 /// At most 1 m and 20 deg, one sigma, in any direction.
 [[nodiscard]] bool is_certain(const Matrix6d& covariance);
 
-/// A value: copies are used to look ahead over readings that still wait for late ones.
+/// Has value semantics: OutputPredictor works on copies.
 class NeighborTrack {
  public:
   NeighborTrack(Timestamp stamp, const RawPose& first, const FilterSettings& settings);
   NeighborTrack(Timestamp stamp, const GraphPose& first, const FilterSettings& settings);
-  /// At rest or at any speed.
+  /// With the prior of the speed.
   NeighborTrack(Timestamp stamp, const GaussianPose& T_B_N, const FilterSettings& settings);
 
   void set_noise(const ProcessNoise& noise);
 
   [[nodiscard]] Timestamp stamp() const;
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
-  /// The one of some readings of the same kind, taken at `stamp()`, that is nearest to what this
-  /// filter expects. Of poses the first.
-  [[nodiscard]] std::size_t likeliest(std::span<const Measurement> candidates,
-                                      const PairMounting& mounting) const;
+  /// Index of the candidate with the smallest NIS. The candidates have the same kind and were taken
+  /// at `stamp()`. The first one if they are poses.
+  [[nodiscard]] std::size_t most_likely(std::span<const Measurement> candidates,
+                                        const PairMounting& mounting) const;
   /// Corrects with a reading taken at `stamp()`.
   Fusion fuse(const Measurement& measurement, const PairMounting& mounting, const Gates& gates);
 
@@ -59,28 +59,31 @@ class NeighborTrack {
   [[nodiscard]] RelativeMotion motion() const;
   [[nodiscard]] GaussianPose pose() const;
   [[nodiscard]] bool is_certain() const { return crepes::is_certain(pose().covariance); }
-  /// What the tight filter believes of the sensors; nothing of the paper's.
+  /// The sensor calibration that the tight filter estimates; empty for the paper's filter.
   [[nodiscard]] std::optional<CalibrationRecord> calibration() const;
   /// When a reading of this kind was last used; kNever if never.
   [[nodiscard]] Timestamp last(MeasurementKind kind) const {
     return last_[static_cast<std::size_t>(kind)];
   }
-  /// When anything that shows the neighbor itself (not the graph) was last used.
+  /// When a bearing or raw pose was last used.
   [[nodiscard]] Timestamp last_sighting() const;
-  /// Of either direction, all sightings of the last quarter second were refused: a filter that was
-  /// led astray, by a mirror image for example. The other direction alone may still agree with it.
-  [[nodiscard]] bool has_lost_its_way() const;
+  /// True if one kind of sighting was gated without exception for kDivergenceTime, for example
+  /// because the filter follows a mirror image. Bearings of the other direction may still fit.
+  [[nodiscard]] bool is_diverged() const;
+  /// True if the latest readings contradict the pose: some ranges in a row were gated, or after a
+  /// gap some bearings, and none of either side was used since the first of them.
+  [[nodiscard]] bool is_contradicted() const;
 
  private:
-  /// The filter has one misalignment a robot, that of the camera which spoke last. Another one that
-  /// sees the same meanwhile is not heard.
+  /// The filter has one misalignment a robot: that of the camera in use. Bearings of the robot's
+  /// other cameras are skipped until that camera has been silent for a while.
   Fusion fuse_bearing(NeighborFilter& filter, const Measurement& bearing,
                       const PairMounting& mounting, const Gates& gates);
-  /// Both directions fit, and for half a second no range did.
-  [[nodiscard]] bool has_lost_its_distance(MeasurementKind kind) const;
+  /// Bearings of both directions fit, but all ranges of the last half second were gated.
+  [[nodiscard]] bool is_range_diverged(MeasurementKind kind) const;
 
-  /// Readings of one kind, gated one after the other.
-  struct Refusals {
+  /// Successive gated readings of one kind.
+  struct GatedRun {
     Timestamp since = kNever;
     Timestamp latest = kNever;
     int count = 0;
@@ -93,8 +96,8 @@ class NeighborTrack {
     never.fill(kNever);
     return never;
   }();
-  std::array<Refusals, kMeasurementKindCount> refused_{};
-  /// Where the cameras are whose bearings were used last.
+  std::array<GatedRun, kMeasurementKindCount> gated_{};
+  /// Positions of the cameras in use.
   std::optional<Eigen::Vector3d> p_B_C_;
   std::optional<Eigen::Vector3d> p_N_C_;
 };

@@ -16,8 +16,8 @@ std::optional<Report> ReportComposer::compose(Timestamp now, const RobotState& s
     }
     seen.clear();
   }
-  bearings_.forget_before(now - kRepeated);
-  ranges_.forget_before(now - kRepeated);
+  bearings_.drop_before(now - kRepeated);
+  ranges_.drop_before(now - kRepeated);
   if (!self.tilt) return std::nullopt;
 
   Report report;

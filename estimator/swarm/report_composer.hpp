@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
-#include "estimator/swarm/recent.hpp"
+#include "estimator/swarm/bounded_fifo.hpp"
 #include "estimator/swarm/robot_state.hpp"
 
 namespace crepes {
@@ -28,8 +28,8 @@ class ReportComposer {
  private:
   RobotId self_;
   std::map<RobotId, std::vector<Bearing>> newest_;  ///< since the last report
-  Recent<Bearing, 1024> bearings_;
-  Recent<UwbRange, 1024> ranges_;
+  BoundedFifo<Bearing, 1024> bearings_;
+  BoundedFifo<UwbRange, 1024> ranges_;
 };
 
 }  // namespace crepes

@@ -1,39 +1,47 @@
-/// What is known of one robot by itself.
+/// The IMU and tilt of one robot.
 #pragma once
 
 #include <optional>
 
+#include "estimator/core/imu_history.hpp"
 #include "estimator/core/measurements.hpp"
-#include "estimator/relative/imu_history.hpp"
-#include "estimator/relative/imu_watch.hpp"
+#include "estimator/relative/imu_guard.hpp"
 
 namespace crepes {
 
-/// A robot's motion and attitude, own or as a neighbor reports them.
+/// Own measurements, or those in a neighbor's reports.
 struct RobotState {
   ImuHistory imu;
   std::optional<Tilt> tilt;
-  ImuWatch watch{};
+  ImuGuard guard{};
 
-  /// False for a sample that says nothing or is out of place.
-  bool add(const ImuSample& sample) { return watch.accept(sample) && imu.push(sample); }
-
-  /// Whether nothing is known of its turns at `t`: no samples of late, or wrong ones.
-  [[nodiscard]] bool is_blind(Timestamp t) const {
-    constexpr Duration kLongest = std::chrono::milliseconds{500};
-    return imu.empty() || t - imu.newest().stamp > kLongest || watch.is_at_its_end();
+  /// Adds a sample that the guard believes. False for a duplicate, and for a late sample that
+  /// contradicts those about it.
+  bool add_believed(const ImuSample& sample) {
+    constexpr Duration kAbout = std::chrono::milliseconds{5};
+    const bool is_late = !imu.empty() && sample.stamp < imu.newest().stamp;
+    if (is_late && !guard.agrees(sample, imu.mean(sample.stamp - kAbout, sample.stamp)))
+      return false;
+    return imu.push(sample);
   }
 
-  /// The tilt carried to another instant, at most a second away, by the gyroscope. Empty without
-  /// tilt or samples.
+  /// True if the IMU does not show the motion at `t`: no sample for half a second, or a saturated
+  /// sensor.
+  [[nodiscard]] bool lacks_imu(Timestamp t) const {
+    constexpr Duration kLongest = std::chrono::milliseconds{500};
+    return imu.empty() || t - imu.newest().stamp > kLongest || guard.is_saturated();
+  }
+
+  /// The tilt propagated by the gyroscope to `t`, at most a second away. Empty without tilt or
+  /// samples.
   [[nodiscard]] std::optional<Tilt> tilt_at(Timestamp t) const {
-    constexpr Duration kMaxCarry = std::chrono::seconds{1};
+    constexpr Duration kMaxPropagation = std::chrono::seconds{1};
     if (!tilt || imu.empty()) return std::nullopt;
-    if (t > tilt->stamp + kMaxCarry || t < tilt->stamp - kMaxCarry) return std::nullopt;
-    Tilt moved = *tilt;
-    moved.stamp = t;
-    moved.up_B = imu.rotation(tilt->stamp, t).conjugate() * tilt->up_B;
-    return moved;
+    if (t > tilt->stamp + kMaxPropagation || t < tilt->stamp - kMaxPropagation) return std::nullopt;
+    Tilt propagated = *tilt;
+    propagated.stamp = t;
+    propagated.up_B = imu.rotation(tilt->stamp, t).conjugate() * tilt->up_B;
+    return propagated;
   }
 };
 

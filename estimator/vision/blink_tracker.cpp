@@ -28,7 +28,7 @@ double distance2(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 
 }  // namespace
 
-BlinkTracker::BlinkTracker(const CameraConfig& camera, CameraModel model,
+BlinkTracker::BlinkTracker(const CameraCalibration& camera, CameraModel model,
                            const VisionConfig& config, const IdLibrary& library,
                            std::optional<RobotId> own)
     : config_(config),
@@ -42,7 +42,7 @@ BlinkTracker::BlinkTracker(const CameraConfig& camera, CameraModel model,
 }
 
 void BlinkTracker::add_imu(const ImuSample& sample) {
-  if (!gyro_.add(sample)) ++counts_.refused_imu;
+  if (!imu_.push(sample)) ++counts_.refused_imu;
 }
 
 std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
@@ -52,7 +52,7 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
     return {};
   }
   predict(stamp);
-  look(frame);
+  unproject(frame);
   const Pairing& sighting_of = assign(stamp);
 
   std::vector<Bearing> bearings;
@@ -89,7 +89,7 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
   return bearings;
 }
 
-void BlinkTracker::look(const SpotFrame& frame) {
+void BlinkTracker::unproject(const SpotFrame& frame) {
   sightings_.clear();
   for (const Spot& spot : frame.spots) {
     CameraModel::UnprojectionJacobian J;
@@ -114,7 +114,8 @@ void BlinkTracker::look(const SpotFrame& frame) {
 /// kAccelDensity; the covariance is that of each of the two axes across u.
 void BlinkTracker::predict(Timestamp stamp) {
   if (!now_) now_ = stamp;
-  const Eigen::Quaterniond R_now_before = gyro_.rotation(*now_, stamp).conjugate();
+  const Eigen::Quaterniond R_now_before =
+      imu_.empty() ? Eigen::Quaterniond::Identity() : imu_.rotation(stamp, *now_);
   const double dt = to_seconds(stamp - *now_);
   const double q = kAccelDensity * kAccelDensity;
   for (Track& track : tracks_) {

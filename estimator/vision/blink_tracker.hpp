@@ -8,23 +8,24 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/core/config.hpp"
+#include "estimator/core/camera_calibration.hpp"
+#include "estimator/core/imu_history.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/vision/assignment.hpp"
 #include "estimator/vision/camera_model.hpp"
-#include "estimator/vision/gyro_history.hpp"
 #include "estimator/vision/id_decoder.hpp"
 #include "estimator/vision/id_library.hpp"
+#include "estimator/vision/vision_config.hpp"
 
 namespace crepes {
 
-/// What a tracker is doing, for STATUS.
+/// State and counters of a tracker, for STATUS.
 struct TrackerStatus {
   std::size_t tracks = 0;
   std::size_t identified = 0;
   std::uint64_t refused_frames = 0;          ///< stamp not after the one before
   std::uint64_t refused_spots = 0;           ///< not finite, outside the image circle, too many
-  std::uint64_t refused_imu = 0;             ///< not finite, stamp not after the one before
+  std::uint64_t refused_imu = 0;             ///< not plausible, stamp there already or too old
   std::uint64_t merged_spots = 0;            ///< two boards in one spot: no bearing
   std::map<RobotId, std::uint64_t> decodes;  ///< tracks that were given this ID
   std::uint64_t lost_ids = 0;                ///< tracks that stopped blinking as their ID should
@@ -35,8 +36,8 @@ struct TrackerStatus {
 /// the estimator to decide.
 class BlinkTracker {
  public:
-  /// `own`: the robot that looks. It sees itself in mirrors only, and is never reported.
-  BlinkTracker(const CameraConfig& camera, CameraModel model, const VisionConfig& config,
+  /// `own`: the robot that carries the camera. It sees itself in mirrors only; never reported.
+  BlinkTracker(const CameraCalibration& camera, CameraModel model, const VisionConfig& config,
                const IdLibrary& library, std::optional<RobotId> own = std::nullopt);
 
   void add_imu(const ImuSample& sample);
@@ -65,7 +66,7 @@ class BlinkTracker {
   /// The sighting of each track, for those that have one.
   using Pairing = std::vector<std::optional<std::size_t>>;
 
-  void look(const SpotFrame& frame);
+  void unproject(const SpotFrame& frame);
   void predict(Timestamp stamp);
   [[nodiscard]] double gate_of(const Track& track) const;
   [[nodiscard]] const Pairing& assign(Timestamp stamp);
@@ -85,7 +86,7 @@ class BlinkTracker {
   Duration timeshift_{};
   Duration timeout_{};
   IdDecoder decoder_;
-  GyroHistory gyro_;
+  ImuHistory imu_;
   PhaseMemory phases_;
   std::vector<Track> tracks_;
   std::optional<Timestamp> now_;

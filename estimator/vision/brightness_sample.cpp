@@ -8,7 +8,7 @@ namespace crepes {
 namespace {
 
 constexpr int kRows = 16;
-constexpr int kStep = 9;  // columns; odd, against pictures that repeat every second or fourth
+constexpr int kPixelStep = 9;  // columns; odd, against pictures that repeat every second or fourth
 constexpr int kMinContrast = 16;       // gray levels above the background
 constexpr double kSpreadSigmas = 8.0;  // noise above the background
 constexpr double kDarkShare = 0.05;    // a part smaller than this is no background
@@ -23,9 +23,9 @@ BrightnessSample::BrightnessSample(const GrayImage& image) {
   for (int v = row_step / 2; v < image.height; v += row_step) {
     const std::uint8_t* row = image.row(v);
     int u = 0;
-    for (; u + kStep < image.width; u += 2 * kStep) {
+    for (; u + kPixelStep < image.width; u += 2 * kPixelStep) {
       ++even[row[u]];
-      ++odd[row[u + kStep]];
+      ++odd[row[u + kPixelStep]];
     }
     if (u < image.width) ++even[row[u]];
   }

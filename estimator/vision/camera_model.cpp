@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "estimator/core/constants.hpp"
 
 namespace crepes {
 namespace {
@@ -10,18 +11,18 @@ namespace {
 using Faults = std::vector<CalibrationFault>;
 
 // A lens that folds nearer to its axis than this is no lens, let alone a fisheye.
-constexpr double kMinMaxAngle = 10.0 * std::numbers::pi / 180.0;
+constexpr double kMinMaxAngle = radians(10.0);
 
 bool are_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
 }
 
 /// The last four intrinsics of every model: focal lengths and center.
-Eigen::Vector4d pinhole_of(const CameraConfig& config) {
+Eigen::Vector4d pinhole_of(const CameraCalibration& config) {
   return Eigen::Map<const Eigen::Vector4d>(config.intrinsics.data() + config.intrinsics.size() - 4);
 }
 
-void check_pinhole(const CameraConfig& config, Faults& faults) {
+void check_pinhole(const CameraCalibration& config, Faults& faults) {
   const Eigen::Vector4d pinhole = pinhole_of(config);
   if (!(pinhole[0] > 0 && pinhole[1] > 0))
     faults.push_back({"intrinsics", "focal lengths must be positive"});
@@ -31,7 +32,7 @@ void check_pinhole(const CameraConfig& config, Faults& faults) {
     faults.push_back({"intrinsics", "the center, the last two, lies outside the resolution"});
 }
 
-Faults double_sphere_faults(const CameraConfig& config) {
+Faults double_sphere_faults(const CameraCalibration& config) {
   Faults faults;
   if (config.distortion_model != DistortionModel::kNone)
     faults.push_back({"distortion_model", "ds has no distortion: must be none"});
@@ -57,7 +58,7 @@ KannalaBrandt kannala_brandt_of(const std::vector<double>& k) {
   return KannalaBrandt({k[0], k[1], k[2], k[3]});
 }
 
-Faults kannala_brandt_faults(const CameraConfig& config) {
+Faults kannala_brandt_faults(const CameraCalibration& config) {
   Faults faults;
   if (config.distortion_model != DistortionModel::kEquidistant)
     faults.push_back({"distortion_model", "must be equidistant for pinhole"});
@@ -83,7 +84,7 @@ Faults kannala_brandt_faults(const CameraConfig& config) {
 
 }  // namespace
 
-Faults calibration_faults(const CameraConfig& config) {
+Faults calibration_faults(const CameraCalibration& config) {
   Faults faults = config.camera_model == CameraModelKind::kDoubleSphere
                       ? double_sphere_faults(config)
                       : kannala_brandt_faults(config);
@@ -100,7 +101,7 @@ CameraModel::CameraModel(const Lens& lens, const Eigen::Vector4d& pinhole,
       width_(resolution[0]),
       height_(resolution[1]) {}
 
-Result<CameraModel> CameraModel::from(const CameraConfig& config) {
+Result<CameraModel> CameraModel::from(const CameraCalibration& config) {
   if (const Faults faults = calibration_faults(config); !faults.empty()) {
     const CalibrationFault& first = faults.front();
     return fail(ErrorCode::kConfig,

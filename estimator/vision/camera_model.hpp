@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "estimator/core/config.hpp"
+#include "estimator/core/camera_calibration.hpp"
 #include "estimator/core/result.hpp"
 #include "estimator/vision/double_sphere.hpp"
 #include "estimator/vision/kannala_brandt.hpp"
@@ -20,7 +20,7 @@ struct CalibrationFault {
   std::string_view key;
   std::string reason;
 };
-[[nodiscard]] std::vector<CalibrationFault> calibration_faults(const CameraConfig& config);
+[[nodiscard]] std::vector<CalibrationFault> calibration_faults(const CameraCalibration& config);
 
 /// One camera: a lens, focal lengths and a sensor. Pixel centers have integer coordinates.
 class CameraModel {
@@ -29,7 +29,7 @@ class CameraModel {
   using UnprojectionJacobian = Eigen::Matrix<double, 3, 2>;  ///< d u_C / d uv [1/px]
 
   /// Refuses a calibration that has faults.
-  [[nodiscard]] static Result<CameraModel> from(const CameraConfig& config);
+  [[nodiscard]] static Result<CameraModel> from(const CameraCalibration& config);
 
   /// The pixel that sees `p_C`, which may lie beyond the image's border. Empty where the lens has
   /// no unique projection: behind the camera and at its center.

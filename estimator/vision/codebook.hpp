@@ -1,4 +1,4 @@
-/// Sets of blink patterns that an unsynchronized camera tells apart.
+/// Sets of blink patterns that an unsynchronized camera can distinguish.
 #pragma once
 
 #include <cstddef>

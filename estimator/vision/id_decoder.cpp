@@ -11,7 +11,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// What a camera can tell.
+// Limits of a camera.
 constexpr Duration kPhaseStep = 625us;
 constexpr std::size_t kMaxPhases = 320;
 constexpr Duration kEdgeBlur = 500us;  // half an exposure: a frame that straddles an edge is open
@@ -31,7 +31,7 @@ constexpr double kImageOdds = 0.1;     // second images of boards that are in si
 constexpr Duration kInSight = 200ms;   // a board that was seen later than that is
 constexpr double kMaxSkew = 200e-6;    // of two crystals against each other
 constexpr Duration kPhaseError = 2500us;
-constexpr Duration kOldPhase = 30s;  // an older one tells too little
+constexpr Duration kOldPhase = 30s;  // an older one is too uncertain
 constexpr std::int64_t kPeriodsToLearn = 2;
 constexpr double kImpossible = -1e9;
 constexpr double kNegligible = 40.0;  // nats
@@ -41,7 +41,7 @@ constexpr double kOtherDiffers = 0.2;
 const double kDoubted = std::log(60.0);
 const double kLost = std::log(20'000.0);
 
-// Lamps on the mains flash twice a cycle; in steps of duty that a camera hardly tells apart.
+// Lamps on the mains flash twice a cycle; in steps of duty that a camera can hardly distinguish.
 constexpr std::array kLampRatesHz{100.0, 120.0};
 constexpr std::array kLampDuties{0.1, 0.25, 0.4, 0.55, 0.7, 0.85};
 
@@ -256,7 +256,7 @@ void IdDecoder::learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory&
   if (now - evidence.assigned_since >= enough) known.learn(*evidence.assigned, now);
 }
 
-/// Log likelihood and prior of a code that goes on where it was when it was seen before.
+/// Log likelihood and prior of a code that continues with the phase of its last sighting.
 double IdDecoder::log_known(const BlinkEvidence& evidence, std::size_t code, Timestamp now,
                             const PhaseMemory& known) const {
   const auto phase = known.of(code);

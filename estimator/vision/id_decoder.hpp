@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
-#include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/time.hpp"
 #include "estimator/vision/blink_window.hpp"
 #include "estimator/vision/id_library.hpp"
+#include "estimator/vision/vision_config.hpp"
 
 namespace crepes {
 

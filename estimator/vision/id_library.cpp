@@ -7,8 +7,8 @@
 namespace crepes {
 namespace {
 
-constexpr std::size_t kMinSlots = 8;
-constexpr std::size_t kMaxSlots = 32;
+constexpr std::size_t kMinPatternSlots = 8;
+constexpr std::size_t kMaxPatternSlots = 32;
 constexpr double kMinDutyDistance = 0.02;  // less is lost between two frames
 
 Duration from_ms(double ms) { return Duration{std::llround(ms * 1e6)}; }
@@ -31,9 +31,10 @@ bool are_alike(const MemberConfig& a, const MemberConfig& b) {
 }  // namespace
 
 Result<BlinkCode> BlinkCode::from_pattern(std::string_view pattern, Duration slot) {
-  if (pattern.size() < kMinSlots || pattern.size() > kMaxSlots)
+  if (pattern.size() < kMinPatternSlots || pattern.size() > kMaxPatternSlots) {
     return fail(ErrorCode::kConfig,
                 "pattern: must have 8 to 32 slots, has " + std::to_string(pattern.size()));
+  }
   if (pattern.find_first_not_of("01") != std::string_view::npos)
     return fail(ErrorCode::kConfig, "pattern: may hold 0 and 1 only");
   if (pattern.find('0') == std::string_view::npos || pattern.find('1') == std::string_view::npos)
@@ -103,13 +104,15 @@ Result<IdLibrary> IdLibrary::from(const SwarmConfig& swarm) {
     if (!code) return tl::unexpected(std::move(code.error()).with_context(where));
     for (std::size_t j = 0; j < i; ++j) {
       const MemberConfig& other = swarm.members[j];
-      if (other.id == member.id)
+      if (other.id == member.id) {
         return fail(ErrorCode::kConfig,
                     where + ": id " + std::to_string(member.id.value) + " is taken");
-      if (are_alike(member, other))
+      }
+      if (are_alike(member, other)) {
         return fail(ErrorCode::kConfig, where + ": blinks like member " +
                                             std::to_string(other.id.value) +
                                             ": they cannot be told apart");
+      }
     }
     library.entries_.push_back({member.id, *std::move(code)});
   }

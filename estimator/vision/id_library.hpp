@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "estimator/core/config.hpp"
 #include "estimator/core/result.hpp"
+#include "estimator/core/swarm_config.hpp"
 #include "estimator/core/time.hpp"
 
 namespace crepes {
@@ -39,7 +39,7 @@ class BlinkCode {
   std::vector<Interval> lit_;  ///< within one period, in order
 };
 
-/// The codes of all members, told apart for good: no two of them are the same signal.
+/// The codes of all members. No two of them are the same signal.
 class IdLibrary {
  public:
   struct Entry {

@@ -11,8 +11,8 @@ namespace {
 
 // Where r ceases to grow, a pixel sees ever more of the world. Below this slope ten digits of a
 // direction are lost.
-constexpr double kMinSlope = 1e-3;
-constexpr double kRoundOff = 1e-12;
+constexpr double kMinRadiusSlope = 1e-3;
+constexpr double kAngleRoundOff = 1e-12;
 constexpr int kMaxIterations = 100;
 
 /// c0 + c1 x + c2 x^2 + ...
@@ -53,7 +53,8 @@ std::vector<double> sign_changes(const std::vector<double>& c, double end) {
 
 KannalaBrandt::KannalaBrandt(const std::array<double, 4>& k) : k_(k) {
   // r'(t) is a polynomial in t^2.
-  const std::vector<double> excess{1.0 - kMinSlope, 3.0 * k[0], 5.0 * k[1], 7.0 * k[2], 9.0 * k[3]};
+  const std::vector<double> excess{1.0 - kMinRadiusSlope, 3.0 * k[0], 5.0 * k[1], 7.0 * k[2],
+                                   9.0 * k[3]};
   const std::vector<double> turns = sign_changes(excess, std::numbers::pi * std::numbers::pi);
   max_angle_rad_ = turns.empty() ? std::numbers::pi : std::sqrt(turns.front());
   max_radius_ = radius(max_angle_rad_);
@@ -91,7 +92,7 @@ std::optional<Eigen::Vector2d> KannalaBrandt::project(const Eigen::Vector3d& p_C
   if (!std::isfinite(norm2) || norm2 == 0.0) return std::nullopt;
   const double rho = p_C.head<2>().norm();
   const double t = std::atan2(rho, p_C.z());
-  if (!(t < std::min(max_angle_rad_ + kRoundOff, std::numbers::pi))) return std::nullopt;
+  if (!(t < std::min(max_angle_rad_ + kAngleRoundOff, std::numbers::pi))) return std::nullopt;
   if (rho == 0.0) {
     if (J != nullptr) *J = Eigen::Matrix<double, 2, 3>::Identity() / p_C.z();
     return Eigen::Vector2d::Zero();
@@ -111,7 +112,7 @@ std::optional<Eigen::Vector2d> KannalaBrandt::project(const Eigen::Vector3d& p_C
 std::optional<Eigen::Vector3d> KannalaBrandt::unproject(const Eigen::Vector2d& m,
                                                         Eigen::Matrix<double, 3, 2>* J) const {
   const double r = m.norm();
-  if (!std::isfinite(r) || !(r <= max_radius_ * (1.0 + kRoundOff))) return std::nullopt;
+  if (!std::isfinite(r) || !(r <= max_radius_ * (1.0 + kAngleRoundOff))) return std::nullopt;
   if (r == 0.0) {
     if (J != nullptr) *J = Eigen::Matrix<double, 3, 2>::Identity();
     return Eigen::Vector3d::UnitZ();

@@ -31,7 +31,7 @@ constexpr double kHalfMinSpacing = 3.5;              // px, in one blob
 constexpr double kHalfSpacing = 24.0;                // px: two robots 5 m away would be 30 cm apart
 constexpr std::int32_t kHalfMinArea = 8;
 constexpr double kHalfSimilarArea = 1.6;
-constexpr int kSaturated = 250;
+constexpr int kSaturatedPeak = 250;
 
 struct Vec {
   double u, v;
@@ -90,7 +90,9 @@ bool is_half_ring(const Light& a, const Light& b, const Light& c) {
       cosine > shape.max_cosine)
     return false;
   if (is_one_blob) return shorter >= kHalfMinSpacing;
-  const auto is_led = [](const Light& x) { return x.peak >= kSaturated && x.area >= kHalfMinArea; };
+  const auto is_led = [](const Light& x) {
+    return x.peak >= kSaturatedPeak && x.area >= kHalfMinArea;
+  };
   return longer <= kHalfSpacing && is_led(a) && is_led(b) && is_led(c) &&
          are_alike(a, b, kHalfSimilarArea) && are_alike(b, c, kHalfSimilarArea) &&
          are_alike(a, c, kHalfSimilarArea);

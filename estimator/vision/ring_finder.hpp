@@ -17,7 +17,7 @@ struct Light {
   std::uint32_t blob = 0;   ///< the blob that it is, or is part of
 };
 
-/// A board whose LEDs are told apart.
+/// A board whose LEDs are separate blobs.
 struct Ring {
   double u = 0.0, v = 0.0;  ///< where the ring's center appears [px]
   std::array<std::uint32_t, 6> lights{};

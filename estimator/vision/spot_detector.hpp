@@ -8,13 +8,13 @@
 #include <string_view>
 #include <vector>
 
-#include "estimator/core/config.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/result.hpp"
 #include "estimator/vision/blob_finder.hpp"
 #include "estimator/vision/brightness_sample.hpp"
 #include "estimator/vision/ring_finder.hpp"
 #include "estimator/vision/spot_measure.hpp"
+#include "estimator/vision/vision_config.hpp"
 
 namespace crepes {
 

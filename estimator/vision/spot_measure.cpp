@@ -7,7 +7,7 @@ namespace crepes {
 namespace {
 
 constexpr int kMargin = 2;             // px
-constexpr int kMaxSide = 64;           // px; larger spots have nothing to gain from their flanks
+constexpr int kMaxFlankSide = 64;      // px; larger spots have nothing to gain from their flanks
 constexpr std::int32_t kFew = 4;       // pixels
 constexpr double kPixel = 1.0 / 12.0;  // variance of a single pixel's own extent
 
@@ -123,7 +123,8 @@ Spot measure_spot(const GrayImage& image, const Blob& blob, int threshold,
             .area_px2 = static_cast<double>(area_of(image, blob, threshold, around)),
             .peak = static_cast<double>(blob.peak),
             .elongation = blob.elongation()};
-  if (around.margin < kMargin || blob.box.width() > kMaxSide || blob.box.height() > kMaxSide)
+  if (around.margin < kMargin || blob.box.width() > kMaxFlankSide ||
+      blob.box.height() > kMaxFlankSide)
     return spot;
   const PixelBox window = grown(blob.box, kMargin, image);
   const Moments light(image, window, around.background);

@@ -1,4 +1,4 @@
-/// When the board is lit, one tick (LED_TICK_US) after the other.
+/// Whether the board is lit, tick by tick (LED_TICK_US).
 #ifndef CREPES_FIRMWARE_LED_BOARD_BLINK_H
 #define CREPES_FIRMWARE_LED_BOARD_BLINK_H
 
@@ -10,14 +10,14 @@ extern "C" {
 
 struct led_blink {
   uint32_t pattern;
-  uint16_t slot_ticks[2];  ///< of a dark slot, of a lit one
+  uint16_t slot_ticks[2];  ///< of a dark slot, of a lit slot
   uint8_t slots;
-  uint8_t slot;         ///< where the next tick is
-  uint16_t ticks_left;  ///< in that slot
-  uint32_t test_ticks;  ///< steady light for so long, while the pattern goes on beneath
+  uint8_t slot;         ///< of the next tick
+  uint16_t ticks_left;  ///< in this slot
+  uint32_t test_ticks;  ///< remaining steady light; the pattern continues meanwhile
 };
 
-/// At the beginning of the pattern of valid or unset settings.
+/// The beginning of the pattern. Settings must be valid or unset.
 struct led_blink led_blink_start(const struct led_settings* settings);
 
 /// Whether the next tick is lit.

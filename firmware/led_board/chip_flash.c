@@ -4,9 +4,9 @@
 
 enum {
   FIRST_PAGE = 0x08004000,
-  PAGE_STEP = 0x800,  // pages have 1 KiB or 2, as the chip is small or large
+  PAGE_STEP = 0x800,  // pages have 1 KiB or 2 KiB, depending on the chip
   KEY_1 = 0x45670123,
-  PATIENCE = 400000,  // turns of a loop; erasing takes a million cycles
+  PATIENCE = 400000,  // iterations of a loop; erasing needs a million cycles
 };
 static const uint32_t kKey2 = 0xCDEF89AB;
 
@@ -17,7 +17,7 @@ static uint32_t address_of(int page, size_t index) {
 static void unlock(uint32_t operation) {
   FLASH->KEYR = KEY_1;
   FLASH->KEYR = kKey2;
-  FLASH->SR = FLASH_SR_DONE_AND_FAILED;  // cleared by ones
+  FLASH->SR = FLASH_SR_DONE_AND_FAILED;  // writing 1 clears a bit
   FLASH->CR = operation;
 }
 

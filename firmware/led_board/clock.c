@@ -2,7 +2,7 @@
 
 #include "firmware/led_board/stm32f1.h"
 
-/// Turns of a loop at 8 MHz: some 40 ms. A crystal takes 2 ms.
+/// Iterations of a loop at 8 MHz: about 40 ms. A crystal needs 2 ms.
 enum { PATIENCE = 40000 };
 
 static bool comes(const reg32* reg, uint32_t mask, uint32_t value) {
@@ -12,7 +12,7 @@ static bool comes(const reg32* reg, uint32_t mask, uint32_t value) {
 }
 
 static bool run_on_pll(uint32_t source_and_factor) {
-  RCC->CR &= ~(uint32_t)RCC_CR_PLLON;  // it cannot be set while it runs
+  RCC->CR &= ~(uint32_t)RCC_CR_PLLON;  // the PLL cannot be configured while it runs
   RCC->CFGR = source_and_factor;
   RCC->CR |= RCC_CR_PLLON;
   if (!comes(&RCC->CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY)) return false;
@@ -27,7 +27,7 @@ enum led_clock clock_start(void) {
     RCC->CR |= RCC_CR_CSSON;
     return LED_CLOCK_CRYSTAL;
   }
-  RCC->CFGR = 0;  // back to the internal oscillator, if need be
+  RCC->CFGR = 0;  // back to the internal oscillator if necessary
   RCC->CR &= ~(uint32_t)RCC_CR_HSEON;
   if (run_on_pll(RCC_CFGR_PLL_X6)) return LED_CLOCK_RC;
   RCC->CFGR = 0;

@@ -4,8 +4,8 @@
 
 #include "firmware/protocol/led_messages.h"
 
-/// 24 MHz: the F100's most, and on both chips flash then has no wait states, so that interrupts
-/// take the same time each time. The best source that gets going within a few milliseconds.
+/// 24 MHz: the maximum of the F100. Flash then needs no wait states on either chip, so interrupts
+/// have a constant duration. Selects the best source that starts within a few milliseconds.
 enum led_clock clock_start(void);
 
 uint32_t clock_hz(enum led_clock clock);

@@ -1,4 +1,4 @@
-/// The board's side of the protocol: a request in, an answer out.
+/// The board's side of the protocol: a request in, a reply out.
 #ifndef CREPES_FIRMWARE_LED_BOARD_COMMAND_H
 #define CREPES_FIRMWARE_LED_BOARD_COMMAND_H
 
@@ -9,10 +9,10 @@
 extern "C" {
 #endif
 
-/// What the rest of the board has to do.
+/// The action that the rest of the board must take.
 enum led_effect {
   LED_EFFECT_NONE,
-  LED_EFFECT_BLINK,  ///< start on the board's new settings
+  LED_EFFECT_BLINK,  ///< start blinking with the board's new settings
   LED_EFFECT_TEST,   ///< steady light for test_ticks
 };
 
@@ -23,7 +23,7 @@ struct led_board {
   uint32_t test_ticks;
 };
 
-/// Answers `request`; sets flash and settings before it says so.
+/// Replies to `request`. Writes flash and settings before it confirms them.
 enum led_effect led_command(struct led_board* board, const struct led_frame* request,
                             struct led_frame* answer);
 

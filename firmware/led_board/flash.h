@@ -1,4 +1,4 @@
-/// The two flash pages that keep the settings, whatever they are made of.
+/// The interface of the two flash pages that store the settings.
 #ifndef CREPES_FIRMWARE_LED_BOARD_FLASH_H
 #define CREPES_FIRMWARE_LED_BOARD_FLASH_H
 
@@ -9,7 +9,7 @@
 enum { LED_FLASH_PAGES = 2 };
 
 /// Erasing sets all bits of a page; a half-word can then be programmed once. The half-word at
-/// `index` of a page is the one at byte 2 * index. What fails shows when it is read back.
+/// `index` of a page is at byte 2 * index. Failures are detected by reading back.
 struct led_flash {
   void* context;
   void (*erase)(void* context, int page);

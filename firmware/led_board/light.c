@@ -1,9 +1,10 @@
 #include "firmware/led_board/light.h"
 
 enum {
-  STEPS = 100,          // of brightness
-  PWM_HZ = 120000,      // a lit edge may wait for one period: 8.3 us
-  PWM_MODE_1 = 0x6868,  // two channels: high while CNT < CCR, CCR taken over at the period's end
+  STEPS = 100,      // of brightness
+  PWM_HZ = 120000,  // a lit edge can be delayed by one period: 8.3 us
+  PWM_MODE_1 =
+      0x6868,  // two channels: high while CNT < CCR; CCR is updated at the end of the period
   ALL_CHANNELS = 0x1111,
   START = 0x81,  // with buffered ARR
 };

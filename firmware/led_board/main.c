@@ -1,5 +1,5 @@
-/// The LED board. Two things happen: every tick SysTick sets the light and works out the next one;
-/// in between, the main loop answers requests and feeds the watchdog.
+/// The LED board. At every tick SysTick sets the light and computes the next one. Meanwhile the
+/// main loop replies to requests and feeds the watchdog.
 #include "firmware/led_board/blink.h"
 #include "firmware/led_board/chip_flash.h"
 #include "firmware/led_board/clock.h"
@@ -8,6 +8,7 @@
 #include "firmware/led_board/serial_line.h"
 #include "firmware/led_board/settings_store.h"
 #include "firmware/led_board/stm32f1.h"
+#include "firmware/led_board/version.h"
 
 enum {
   SILENCE_TICKS = LED_LINE_SILENCE_MS * 1000 / LED_TICK_US,
@@ -15,10 +16,9 @@ enum {
   WATCHDOG_FEED = 0xAAAA,
   WATCHDOG_START = 0xCCCC,
   WATCHDOG_DIVIDER_32 = 3,
-  WATCHDOG_TURNS = 1250,  // one second of the 40 kHz oscillator; 0.7 to 1.4 on a bad one
+  WATCHDOG_COUNT =
+      1250,  // one second of the 40 kHz oscillator; 0.7 s to 1.4 s within its tolerance
 };
-
-static const uint8_t kVersion[3] = {0, 1, 0};
 
 // Shared with SysTick: `blink` is changed with interrupts off.
 static struct led_blink blink;
@@ -28,7 +28,7 @@ void systick_handler(void);
 
 void systick_handler(void) {
   static uint32_t next = LIGHT_DARK;
-  light_set(next);  // first, so that nothing delays it
+  light_set(next);  // first, so that the delay is constant
   next = led_blink_step(&blink) ? LIGHT_LIT : LIGHT_DARK;
   ++ticks;
 }
@@ -57,14 +57,14 @@ static void start_watchdog(void) {
   IWDG->KR = WATCHDOG_START;
   IWDG->KR = WATCHDOG_UNLOCK;
   IWDG->PR = WATCHDOG_DIVIDER_32;
-  IWDG->RLR = WATCHDOG_TURNS;
+  IWDG->RLR = WATCHDOG_COUNT;
 }
 
 static struct led_board start_board(enum led_clock clock) {
   struct led_board board = {
       .flash = chip_flash(),
       .status = {.protocol = LED_PROTOCOL_VERSION,
-                 .version = {kVersion[0], kVersion[1], kVersion[2]},
+                 .version = {LED_VERSION_MAJOR, LED_VERSION_MINOR, LED_VERSION_PATCH},
                  .clock = (uint8_t)clock,
                  .was_watchdog = (RCC->CSR & RCC_CSR_IWDGRSTF) != 0},
   };
@@ -82,7 +82,7 @@ static void answer(struct led_board* board, const struct led_frame* request) {
   serial_line_write(bytes, led_frame_write(&frame, bytes));
 }
 
-/// All requests that have come in whole.
+/// Replies to all complete requests.
 static void listen(struct led_board* board, struct led_receiver* receiver) {
   static uint32_t last_byte_at;
   uint8_t byte = 0;
@@ -110,7 +110,7 @@ int main(void) {
   start_ticks(clock_hz(clock));
   for (uint32_t seen = ticks;;) {
     listen(&board, &receiver);
-    // A dead SysTick starves the watchdog as surely as a dead main loop.
+    // The watchdog is fed only if both SysTick and the main loop run.
     if (ticks != seen) IWDG->KR = WATCHDOG_FEED;
     seen = ticks;
     wait_for_interrupt();

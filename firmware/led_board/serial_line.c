@@ -5,12 +5,12 @@
 
 enum {
   KEPT = 64,          // a power of two
-  PATIENCE = 20000,   // turns of a loop; a byte takes 2083 cycles
+  PATIENCE = 20000,   // iterations of a loop; a byte needs 2083 cycles
   PRIORITY = 0x80,    // below SysTick's 0
-  PINS = 0x44444894,  // PA9 output of the USART, PA10 input, pulled up; the others as after reset
+  PINS = 0x44444894,  // PA9 USART output, PA10 input with pull-up; other pins as after reset
 };
 
-// One writes `in`, the other `out`.
+// The interrupt writes `in`, the main loop writes `out`.
 static struct {
   volatile uint8_t bytes[KEPT];
   volatile uint8_t in;
@@ -20,7 +20,7 @@ static struct {
 void usart1_handler(void);
 
 void usart1_handler(void) {
-  // Reading SR, then DR, clears an overrun too.
+  // Reading SR, then DR, also clears an overrun.
   if ((USART1->SR & USART_SR_RXNE) == 0) {
     (void)USART1->DR;
     return;

@@ -8,10 +8,10 @@
 
 void serial_line_start(uint32_t cpu_hz);
 
-/// The oldest byte that came in; false when there is none. While nobody asks, 63 are kept.
+/// The oldest received byte; false if there is none. The buffer holds 63 bytes.
 bool serial_line_read(uint8_t* byte);
 
-/// Returns when all has left, or when the line is stuck.
+/// Returns when all bytes have been sent, or after a timeout.
 void serial_line_write(const uint8_t* bytes, size_t size);
 
 #endif

@@ -1,7 +1,7 @@
 #include "firmware/led_board/settings_store.h"
 
-// A record: format, serial number (u32), settings, filler, CRC-16 of all before. The CRC is written
-// last.
+// A record: format, serial number (u32), settings, padding, CRC-16 of all preceding bytes. The CRC
+// is written last.
 enum {
   FORMAT = 0x4C45,
   SERIAL_AT = 2,
@@ -41,7 +41,7 @@ static bool is_good(const struct record* record) {
   return led_settings_fault(&settings) == LED_FINE;
 }
 
-/// The page with the newest good record, or -1; `record` is then that record.
+/// The page with the newest valid record, or -1. Copies the record to `record`.
 static int newest(const struct led_flash* flash, struct record* record) {
   int found = -1;
   for (int page = 0; page < LED_FLASH_PAGES; ++page) {

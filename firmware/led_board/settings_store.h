@@ -1,4 +1,4 @@
-/// Settings that outlive a power cut: at any moment flash holds the old or the new ones, whole.
+/// Settings that survive a power failure: flash always holds the complete old or new settings.
 #ifndef CREPES_FIRMWARE_LED_BOARD_SETTINGS_STORE_H
 #define CREPES_FIRMWARE_LED_BOARD_SETTINGS_STORE_H
 
@@ -9,11 +9,11 @@
 extern "C" {
 #endif
 
-/// The newest settings that are whole and valid; unset where there are none.
+/// The newest complete and valid settings; unset if there are none.
 struct led_settings led_settings_load(const struct led_flash* flash);
 
-/// Writes valid settings over the older copy and reads them back. False when flash does not hold
-/// them: the old ones still do.
+/// Writes valid settings over the older copy and reads them back. False if that failed; the old
+/// settings are then still valid.
 bool led_settings_save(const struct led_flash* flash, const struct led_settings* settings);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/// From reset to main: vectors, initial memory. What should never happen resets the chip.
+/// From reset to main: vectors, initial memory. Unexpected exceptions reset the chip.
 #include <stddef.h>
 
 #include "firmware/led_board/stm32f1.h"
@@ -16,7 +16,7 @@ void reset_handler(void) {
   main();
 }
 
-/// A fault, an interrupt that nobody asked for, or (NMI) a crystal that has stopped.
+/// A fault, an unexpected interrupt, or (NMI) a crystal that has stopped.
 static void start_over(void) {
   SCB_AIRCR = 0x05FA0004;
   for (;;) {
@@ -42,7 +42,7 @@ __attribute__((section(".vectors"), used)) static const struct vectors kVectors 
                    [USART1_IRQ + 1 ... 60] = start_over},
 };
 
-// The compiler copies and clears structures by these.
+// The compiler calls these to copy and clear structures.
 void* memcpy(void* to, const void* from, size_t size);
 void* memset(void* to, int value, size_t size);
 

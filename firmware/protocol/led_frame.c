@@ -27,7 +27,7 @@ size_t led_frame_write(const struct led_frame* frame, uint8_t* out) {
 }
 
 void led_receiver_push(struct led_receiver* receiver, uint8_t byte) {
-  // Not full after led_receiver_next: what fills it is a frame or a false start.
+  // Never full after led_receiver_next, because a full buffer holds a frame or a false start.
   if (receiver->size < LED_MAX_FRAME) receiver->bytes[receiver->size++] = byte;
 }
 

@@ -17,7 +17,7 @@ enum {
   LED_MAX_PAYLOAD = 32,
   LED_FRAME_OVERHEAD = 6,
   LED_MAX_FRAME = LED_MAX_PAYLOAD + LED_FRAME_OVERHEAD,
-  /// Bytes of a frame follow each other sooner than this.
+  /// The gap between bytes of a frame is shorter than this.
   LED_LINE_SILENCE_MS = 20,
 };
 
@@ -27,23 +27,23 @@ struct led_frame {
   uint8_t payload[LED_MAX_PAYLOAD];
 };
 
-/// What has come in and is not yet known to be a frame. Begins as all zeros.
+/// Received bytes that are not yet a frame. Initialized with zeros.
 struct led_receiver {
   uint8_t bytes[LED_MAX_FRAME];
   uint8_t size;
-  uint16_t skipped;  ///< bytes that were no part of a frame; stays at its maximum
+  uint16_t skipped;  ///< bytes outside frames; saturates
 };
 
 uint16_t led_crc16(const uint8_t* bytes, size_t size);
 
-/// Writes at most LED_MAX_FRAME bytes to `out` and returns how many.
+/// Writes at most LED_MAX_FRAME bytes to `out` and returns their number.
 size_t led_frame_write(const struct led_frame* frame, uint8_t* out);
 
-/// To be followed by led_receiver_next until that returns false.
+/// Call led_receiver_next afterwards until it returns false.
 void led_receiver_push(struct led_receiver* receiver, uint8_t byte);
 
-/// The next whole frame, if there is one. After a false start the search goes on one byte further.
-/// On a silent line a frame that is not whole never will be: it counts as a false start.
+/// The next complete frame, if there is one. After a false start the search continues one byte
+/// later. On a silent line an incomplete frame counts as a false start.
 bool led_receiver_next(struct led_receiver* receiver, bool line_is_silent, struct led_frame* frame);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/// What is said to an LED board and what it answers: one answer to each request.
+/// Requests to an LED board and its replies: one reply to each request.
 #ifndef CREPES_FIRMWARE_PROTOCOL_LED_MESSAGES_H
 #define CREPES_FIRMWARE_PROTOCOL_LED_MESSAGES_H
 
@@ -19,7 +19,7 @@ enum {
 
 enum led_message {
   LED_GET = 0x01,   ///< no payload -> LED_SETTINGS
-  LED_SET = 0x02,   ///< struct led_settings -> LED_SETTINGS as kept, or LED_REFUSED
+  LED_SET = 0x02,   ///< struct led_settings -> LED_SETTINGS as stored, or LED_REFUSED
   LED_TEST = 0x03,  ///< u16 ms of steady light, 0 ends it -> LED_DONE, or LED_REFUSED
   LED_ASK = 0x04,   ///< no payload -> LED_STATUS
   LED_SETTINGS = 0x81,
@@ -35,7 +35,7 @@ enum led_fault {
   LED_BAD_PATTERN,     ///< not 8 to 32 slots (2 for a duty code), all lit, all dark, or longer
   LED_BAD_TIME,        ///< see struct led_settings
   LED_BAD_BRIGHTNESS,  ///< over 100
-  LED_BAD_FLASH,       ///< the settings could not be kept; the old ones hold
+  LED_BAD_FLASH,       ///< the settings could not be stored; the old ones remain
   LED_FAULT_COUNT,
 };
 
@@ -58,18 +58,18 @@ struct led_status {
   uint8_t version[3];    ///< of the firmware
   uint8_t clock;         ///< enum led_clock
   uint8_t was_watchdog;  ///< the watchdog ended the last run
-  uint16_t skipped;      ///< bytes received that were no part of a frame
+  uint16_t skipped;      ///< received bytes outside frames
 };
 
 enum led_clock {
-  LED_CLOCK_CRYSTAL,    ///< 24 MHz off the crystal
-  LED_CLOCK_RC,         ///< 24 MHz off the internal oscillator, one percent off at most
-  LED_CLOCK_RC_NO_PLL,  ///< the internal oscillator's 8 MHz
+  LED_CLOCK_CRYSTAL,    ///< 24 MHz from the crystal
+  LED_CLOCK_RC,         ///< 24 MHz from the internal oscillator, with an error of 1 % at most
+  LED_CLOCK_RC_NO_PLL,  ///< 8 MHz from the internal oscillator
 };
 
 enum led_fault led_settings_fault(const struct led_settings* settings);
 
-/// The board never set: dark.
+/// Settings of a new board: dark.
 struct led_settings led_settings_unset(void);
 
 void led_settings_write(const struct led_settings* settings, uint8_t out[LED_SETTINGS_SIZE]);

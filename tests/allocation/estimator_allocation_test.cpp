@@ -44,7 +44,7 @@ std::map<std::size_t, std::size_t> most_allocations(Duration warm_up) {
   pair.log_to(events);
   pair.run_for(warm_up + 3s);
 
-  Estimator estimator(pair.config());
+  Estimator estimator(pair.settings());
   std::map<std::size_t, std::size_t> most;
   const Timestamp warm = pair.own_time(warm_up);
   for (const Event& event : events) {

@@ -4,39 +4,62 @@
 #include <array>
 #include <optional>
 #include <regex>
+#include <set>
 #include <sstream>
 
 namespace crepes {
 namespace {
 
-/// A folder and all that it may include of ours; files named where one alone may.
+/// A folder and the folders of this repository that it may include. A path without a final slash
+/// names a file, without its extension.
 struct FolderRule {
   std::string_view folder;
   std::vector<std::string_view> ours;
 };
 
-/// The most specific rule of a path is the last that fits.
+/// Of several rules that match a path, the last one counts: it is the most specific.
 const std::vector<FolderRule>& folder_rules() {
   static const std::vector<FolderRule> kRules{
       {"estimator/core/", {"estimator/core/"}},
       {"estimator/relative/", {"estimator/core/", "estimator/relative/"}},
       {"estimator/vision/", {"estimator/core/", "estimator/vision/"}},
       {"estimator/graph/", {"estimator/core/", "estimator/graph/"}},
+      {"estimator/team/", {"estimator/core/", "estimator/relative/", "estimator/team/"}},
       {"estimator/swarm/", {"estimator/"}},
       {"drivers/", {"estimator/core/", "firmware/protocol/", "drivers/"}},
+      {"drivers/base/", {"estimator/core/", "drivers/base/"}},
       {"drivers/sim/",
        {"estimator/core/", "estimator/vision/camera_model", "estimator/vision/id_library",
         "firmware/protocol/", "drivers/"}},
-      {"net/", {"estimator/core/", "net/"}},
-      {"daemon/", {"estimator/", "drivers/", "net/", "daemon/", "firmware/protocol/"}},
+      {"net/", {"estimator/core/", "drivers/base/", "net/"}},
+      {"net/mesh/",
+       {"estimator/core/", "drivers/base/", "net/mesh/", "net/endpoint", "net/udp_socket"}},
+      // The settings of what it configures, and what the rules between settings ask: whether a
+      // calibration, a blink code, an address or a key can be used.
+      {"config/",
+       {"config/", "estimator/core/", "drivers/base/", "drivers/camera/camera_config",
+        "drivers/imu/imu_config", "drivers/sim/sim_config", "drivers/uwb/uwb_config",
+        "estimator/graph/graph_config", "estimator/swarm/estimator_config",
+        "estimator/swarm/estimator_settings", "estimator/vision/vision_config",
+        "estimator/vision/camera_model", "estimator/vision/id_library", "net/endpoint",
+        "net/mesh/mesh_config", "net/mesh/packet_seal", "net/subscription/subscription_config"}},
+      {"config/schema/",
+       {"config/schema/", "estimator/core/", "drivers/camera/camera_config",
+        "drivers/imu/imu_config", "drivers/sim/sim_config", "drivers/uwb/uwb_config",
+        "estimator/graph/graph_config", "estimator/swarm/estimator_config",
+        "estimator/swarm/estimator_settings", "estimator/vision/vision_config",
+        "estimator/vision/camera_model", "estimator/vision/id_library", "net/endpoint",
+        "net/mesh/mesh_config", "net/subscription/subscription_config"}},
+      {"config/examples/", {}},
+      {"daemon/", {"estimator/", "drivers/", "net/", "config/", "daemon/", "firmware/protocol/"}},
       {"firmware/protocol/", {"firmware/protocol/"}},
       {"firmware/led_board/", {"firmware/"}},
-      {"tests/", {"estimator/", "drivers/", "net/", "daemon/", "firmware/", "tests/"}},
+      {"tests/", {"estimator/", "drivers/", "net/", "config/", "daemon/", "firmware/", "tests/"}},
   };
   return kRules;
 }
 
-/// A pattern in a line that only some files may have.
+/// A pattern that only some files may contain.
 struct WordRule {
   std::regex pattern;
   std::vector<std::string_view> allowed;  ///< path prefixes
@@ -50,8 +73,7 @@ std::regex include_of(const std::string& what) {
 const std::vector<WordRule>& word_rules() {
   static const std::vector<WordRule> kRules{
       {include_of("(opencv2?|cv)"),
-       {"estimator/vision/spot_detector", "estimator/vision/hough", "drivers/camera/",
-        "drivers/sim/", "daemon/", "tests/"},
+       {"estimator/vision/spot_detector", "drivers/camera/", "drivers/sim/", "daemon/", "tests/"},
        "OpenCV is for spot_detector, drivers/camera, drivers/sim and daemon"},
       {include_of("ceres/"), {"estimator/graph/", "tests/"}, "Ceres is for estimator/graph"},
       {include_of("arv"),
@@ -61,38 +83,43 @@ const std::vector<WordRule>& word_rules() {
        {"drivers/camera/mindvision_library.cpp", "tests/"},
        "libraries are loaded in drivers/camera/mindvision_library.cpp"},
       {include_of("nlohmann/"),
-       {"net/json_parts", "net/pose_push.cpp", "net/status_json.cpp", "net/subscription_",
-        "daemon/", "tests/"},
+       {"config/examples/", "net/client/", "net/subscription/", "daemon/", "tests/"},
        "JSON is for the subscription in net, and daemon"},
       {include_of("sodium"),
-       {"net/keyed_hash.cpp", "net/packet_seal.cpp", "daemon/", "tests/"},
-       "libsodium is for net/keyed_hash.cpp, net/packet_seal.cpp and daemon"},
-      {include_of("(spdlog|yaml-cpp)/"),
-       {"daemon/", "tests/"},
-       "spdlog and yaml-cpp are for daemon"},
+       {"config/keys/mesh_key.cpp", "net/subscription/keyed_hash.cpp", "net/mesh/packet_seal.cpp",
+        "daemon/", "tests/"},
+       "libsodium is for config/keys, net/subscription/keyed_hash.cpp, net/mesh/packet_seal.cpp "
+       "and daemon"},
+      {include_of("fmt/"),
+       {"config/", "drivers/", "net/", "daemon/", "tests/"},
+       "fmt is for config, drivers, net and daemon"},
+      {include_of("spdlog/"), {"daemon/", "tests/"}, "spdlog is for daemon"},
+      {include_of("yaml-cpp/"),
+       {"config/reading/", "daemon/", "tests/"},
+       "yaml-cpp is for config/reading and daemon"},
       {include_of("(CLI|systemd)/"), {"daemon/", "tests/"}, "options and systemd are for daemon"},
       {include_of(
            "(fstream|iostream|filesystem|cstdio|sys/|netinet/|arpa/|fcntl|unistd|poll|termios)"),
-       {"drivers/", "net/", "daemon/", "tests/", "estimator/core/contract.hpp"},
+       {"config/", "drivers/", "net/", "daemon/", "tests/", "estimator/core/contract.hpp"},
        "estimator/ touches no files, sockets or terminals"},
       {include_of("(ctime|time\\.h|sys/time)"),
        {"drivers/", "daemon/", "tests/"},
-       "time is read in drivers/monotonic_clock.hpp"},
+       "time is read in drivers/base/monotonic_clock.hpp"},
       {include_of("(mutex|shared_mutex|condition_variable|atomic|semaphore|latch|barrier|future)>"),
-       {"daemon/bounded_queue.hpp", "daemon/counters.hpp", "tests/"},
+       {"daemon/stages/bounded_queue.hpp", "daemon/stages/counters.hpp", "tests/"},
        "threads share queues and counters alone"},
       {include_of("thread>"),
-       {"daemon/worker.hpp", "tests/"},
-       "threads start in daemon/worker.hpp"},
+       {"daemon/stages/worker.hpp", "tests/"},
+       "threads start in daemon/stages/worker.hpp"},
       {std::regex("std::j?thread\\b"),
-       {"daemon/worker.hpp", "tests/"},
-       "threads start in daemon/worker.hpp"},
+       {"daemon/stages/worker.hpp", "tests/"},
+       "threads start in daemon/stages/worker.hpp"},
       {std::regex("::now\\(\\)"),
-       {"drivers/monotonic_clock.hpp", "tests/bench/"},
-       "time is read in drivers/monotonic_clock.hpp"},
+       {"config/examples/", "drivers/base/monotonic_clock.hpp", "tests/bench/"},
+       "time is read in drivers/base/monotonic_clock.hpp"},
       {std::regex("\\bgettimeofday|\\bclock_gettime\\s*\\((?!CLOCK_(THREAD|PROCESS)_CPUTIME_ID)"),
-       {"drivers/monotonic_clock.hpp"},
-       "time is read in drivers/monotonic_clock.hpp"},
+       {"drivers/base/monotonic_clock.hpp"},
+       "time is read in drivers/base/monotonic_clock.hpp"},
       {std::regex("estimator/core/clock\\.hpp"),
        {"drivers/", "net/", "daemon/", "tests/"},
        "estimation holds stamps, never a clock"},
@@ -134,18 +161,28 @@ std::vector<std::string> violations_in(std::string_view path, std::string_view t
   std::istringstream lines{std::string(text)};
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
-    const auto tell = [&](std::string_view reason) {
+    const auto report = [&](std::string_view reason) {
       violations.push_back(std::string(path) + ":" + std::to_string(number) + ": " +
                            std::string(reason));
     };
-    if (const auto fault = own_include_fault(path, line)) tell(*fault);
+    if (const auto fault = own_include_fault(path, line)) report(*fault);
     const std::string code = line.substr(0, line.find("//"));
     for (const WordRule& rule : word_rules()) {
       if (!starts_with_any(path, rule.allowed) && std::regex_search(code, rule.pattern))
-        tell(rule.reason);
+        report(rule.reason);
     }
   }
   return violations;
+}
+
+std::vector<std::string> paths_in_rules() {
+  std::set<std::string> paths;
+  for (const FolderRule& rule : folder_rules()) {
+    paths.emplace(rule.folder);
+    paths.insert(rule.ours.begin(), rule.ours.end());
+  }
+  for (const WordRule& rule : word_rules()) paths.insert(rule.allowed.begin(), rule.allowed.end());
+  return {paths.begin(), paths.end()};
 }
 
 }  // namespace crepes

@@ -1,4 +1,4 @@
-/// Who may include whom, and which words stay in which files.
+/// Which folder may include which, and which words only some files may contain.
 #pragma once
 
 #include <string>
@@ -7,7 +7,10 @@
 
 namespace crepes {
 
-/// What is wrong with one source file: `path:line: reason` each. `path` is relative to the root.
+/// The violations in one source file, each as `path:line: reason`. `path` is relative to the root.
 [[nodiscard]] std::vector<std::string> violations_in(std::string_view path, std::string_view text);
+
+/// Every folder (with a final slash) and every beginning of a file's path that a rule names.
+[[nodiscard]] std::vector<std::string> paths_in_rules();
 
 }  // namespace crepes

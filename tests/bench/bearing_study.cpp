@@ -1,6 +1,7 @@
 // What the tracker alone makes of recorded swarms, against their truth: bearing_study SWARM_DIR...
 #include <cstdio>
 
+#include "estimator/core/constants.hpp"
 #include "tests/support/bearing_truth.hpp"
 
 int main(int argc, char** argv) {
@@ -17,7 +18,7 @@ int main(int argc, char** argv) {
             "%-14s %s sees %d: visible %6zu identified %6.2f %% wrong %3zu rms %.4f deg\n",
             swarm->manifest.scenario.c_str(), robot.robot.name.c_str(), id.value, seen.visible,
             100.0 * static_cast<double>(seen.identified) / static_cast<double>(seen.visible),
-            seen.wrong, seen.rms_rad() * 180.0 / std::numbers::pi);
+            seen.wrong, kDegPerRad * seen.rms_rad());
   }
   return 0;
 }

@@ -10,9 +10,9 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "daemon/config_file.hpp"
+#include "config/reading/config_file.hpp"
+#include "drivers/base/monotonic_clock.hpp"
 #include "drivers/camera/aravis_camera.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "drivers/sim/ring_renderer.hpp"
 #include "estimator/vision/spot_detector.hpp"
 #include "tests/support/gige_camera.hpp"
@@ -35,7 +35,8 @@ double cpu_s() {
   const MonotonicClock clock;
   const SimWorld world(config.sim);
   RingRenderer renderer =
-      RingRenderer::make(world, RobotId{1}, config.swarm, config.cameras.at(0), 0).value();
+      RingRenderer::make(world, RobotId{1}, config.swarm, config.cameras.at(0).calibration, 0)
+          .value();
   const GigeCamera camera(
       [&](std::uint8_t* pixels, int /*width*/, int /*height*/) {
         Frame frame = renderer.render(to_seconds(clock.now().time_since_epoch()));

@@ -6,9 +6,12 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/graph/pose_graph.hpp"
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/neighbor.hpp"
+#include "estimator/team/team_filter.hpp"
 #include "tests/support/simulated_pair.hpp"
+#include "tests/support/simulated_team.hpp"
 
 namespace crepes {
 namespace {
@@ -19,9 +22,9 @@ using test::SimulatedPair;
 constexpr double kNoGate = std::numeric_limits<double>::infinity();
 
 void BM_MatrixProduct(benchmark::State& state) {
-  ErrorState::Covariance A = ErrorState::Covariance::Random();
-  ErrorState::Covariance B = ErrorState::Covariance::Random();
-  ErrorState::Covariance C;
+  ErrorState::Covariance::Full A = ErrorState::Covariance::Full::Random();
+  ErrorState::Covariance::Full B = ErrorState::Covariance::Full::Random();
+  ErrorState::Covariance::Full C;
   for (auto _ : state) {
     benchmark::DoNotOptimize(A.data());
     benchmark::DoNotOptimize(B.data());
@@ -162,10 +165,34 @@ void BM_NeighborTick(benchmark::State& state) {
     state.ResumeTiming();
     tick(arrivals);
   }
-  if (!neighbors.back().pose()) state.SkipWithError("no pose");
+  if (!neighbors.back().output().pose()) state.SkipWithError("no pose");
   state.SetComplexityN(state.range(0));
 }
 
+/// An interval of 0.1 s of a team in which everybody sees everybody; its filter estimates at most
+/// twelve jointly.
+void BM_TeamFilter(benchmark::State& state) {
+  test::SimulatedTeam team(1, static_cast<int>(state.range(0)));
+  TeamFilter filter;
+  for (int i = 0; i < 15; ++i) benchmark::DoNotOptimize(filter.step(team.next()));
+  for (auto _ : state) {
+    state.PauseTiming();
+    const TeamInterval interval = team.next();
+    state.ResumeTiming();
+    benchmark::DoNotOptimize(filter.step(interval));
+  }
+}
+
+/// The pose graph of the same team.
+void BM_PoseGraph(benchmark::State& state) {
+  test::SimulatedTeam team(1, static_cast<int>(state.range(0)));
+  const TeamInterval interval = team.next();
+  const GraphProblem problem{interval.to, interval.self, interval.edges};
+  for (auto _ : state) benchmark::DoNotOptimize(solve_pose_graph(problem, GraphConfig{}));
+}
+
+BENCHMARK(BM_TeamFilter)->Arg(5)->Arg(10)->Arg(20)->Arg(50)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_PoseGraph)->Arg(5)->Arg(10)->Arg(20)->Arg(50)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_MatrixProduct)->Unit(benchmark::kMicrosecond);
 BENCHMARK(BM_ImuStep)->Unit(benchmark::kMicrosecond);
 BENCHMARK(BM_FuseBearing)->Unit(benchmark::kMicrosecond);

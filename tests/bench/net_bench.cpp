@@ -3,8 +3,8 @@
 
 #include <chrono>
 
-#include "net/packet_seal.hpp"
-#include "net/peer_message.hpp"
+#include "net/mesh/packet_seal.hpp"
+#include "net/mesh/peer_message.hpp"
 
 namespace crepes {
 namespace {

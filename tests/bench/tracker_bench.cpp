@@ -24,7 +24,7 @@ void track(benchmark::State& state, std::size_t steady, std::size_t flickering) 
     if (!IdLibrary::from(swarm)) swarm.members.pop_back();
   }
   const IdLibrary library = *IdLibrary::from(swarm);
-  CameraConfig camera;
+  CameraCalibration camera;
   camera.intrinsics = {-0.1723, 0.5931, 316.9, 316.8, 638.2, 512.5};
   camera.resolution = {kWidth, kHeight};
   BlinkTracker tracker(camera, *CameraModel::from(camera), VisionConfig{}, library);

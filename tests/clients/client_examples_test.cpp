@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/child_process.hpp"
-#include "daemon/ctl/csv_file.hpp"
-#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/ctl/demo/child_process.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
+#include "drivers/base/text_file.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
 
@@ -42,7 +42,7 @@ class Clients : public LiveDaemon {
     }
     const Timestamp end = machine_.now() + kPatience;
     std::vector<std::string> lines;
-    while (lines.size() < enough && !child->ending() && machine_.now() < end) {
+    while (lines.size() < enough && !child->exit_reason() && machine_.now() < end) {
       ::poll(nullptr, 0, 20);
       std::istringstream text(read_text_file(log).value_or(""));
       lines.clear();

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/child_process.hpp"
-#include "daemon/ctl/csv_file.hpp"
-#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/ctl/demo/child_process.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/text_file.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
 
@@ -31,8 +31,8 @@ inline Ending run(const std::string& program, const std::vector<std::string>& ar
   if (!child) return {child.error().message, "", ""};
   const MonotonicClock clock;
   const Timestamp end = clock.now() + kPatience;
-  while (!child->ending() && clock.now() < end) ::poll(nullptr, 0, 20);
-  return {child->ending().value_or("still running"), read_text_file(output).value_or(""),
+  while (!child->exit_reason() && clock.now() < end) ::poll(nullptr, 0, 20);
+  return {child->exit_reason().value_or("still running"), read_text_file(output).value_or(""),
           read_text_file(errors).value_or("")};
 }
 

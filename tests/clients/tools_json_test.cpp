@@ -1,4 +1,5 @@
-/// What crepesctl --json tells: objects in lines, nothing else, and the same as the text.
+/// The output of crepesctl --json: one object a line, nothing else, with the same content as the
+/// text.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -9,9 +10,9 @@
 #include <vector>
 
 #include "daemon/runtime.hpp"
-#include "daemon/worker.hpp"
+#include "daemon/stages/worker.hpp"
 #include "tests/clients/tool_run.hpp"
-#include "tests/daemon/ctl_tiny_swarm.hpp"
+#include "tests/daemon/ctl/tiny_swarm.hpp"
 #include "tests/support/places.hpp"
 #include "tests/support/witmotion_sensor.hpp"
 
@@ -42,7 +43,7 @@ TEST(ToolsInJson, AreAllButTheOneThatPrintsAScript) {
 
 TEST(ToolsInJson, WriteSectionsThatAConfigurationTakes) {
   const Json library = object_of({"codebook", "--ids", "5", "--json"});
-  const std::string calibration = kSource + "/tests/daemon/calibration/";
+  const std::string calibration = kSource + "/tests/config/calibration/";
   const Json sections = object_of({"import-calibration", calibration + "camchain-imucam.yaml",
                                    calibration + "imu.yaml", "--json"});
   ASSERT_TRUE(library.is_object() && sections.is_object());
@@ -55,7 +56,7 @@ TEST(ToolsInJson, WriteSectionsThatAConfigurationTakes) {
   ASSERT_TRUE(checked.faults.empty()) << to_string(checked.faults.front());
   EXPECT_EQ(checked.config.swarm.members.size(), 5U);
   EXPECT_EQ(checked.config.cameras.size(), sections["cameras"].size());
-  EXPECT_EQ(checked.config.imu.update_rate, sections["imu"]["update_rate"]);
+  EXPECT_EQ(checked.config.imu.noise.update_rate, sections["imu"]["update_rate"]);
 }
 
 TEST(ToolsInJson, TellWhatAReplayGaveAndWhatItRefused) {
@@ -141,7 +142,7 @@ TEST(ToolsInJson, SumUpADemo) {
                       std::to_string(free_port()), "--json"});
   } while (demo.errors.find("choose another --port") != std::string::npos);
 
-  // A laden machine may give no pose in five seconds; that is said then, beside the summary.
+  // An overloaded machine may have no pose after five seconds; the summary then reports it.
   const std::vector<Json> told = objects_in(demo);
   ASSERT_EQ(told.size(), 1U) << demo.output << demo.errors;
   EXPECT_EQ(told[0]["scenario"], "two");

@@ -34,7 +34,7 @@ TEST_F(Tools, WaitForAPoseAndTellOfIt) {
   EXPECT_EQ(nobody.how, "exit code 1");
   EXPECT_NE(nobody.errors.find("no other robot of this swarm"), std::string::npos) << nobody.errors;
 
-  // A machine that is overloaded takes the pose away for a moment.
+  // On an overloaded machine the pose may disappear for a moment.
   constexpr int kAttempts = 10;
   Ending vague;
   for (int i = 0; i < kAttempts && vague.errors.find("is known to") == std::string::npos; ++i)
@@ -63,7 +63,7 @@ TEST_F(Tools, ShowTheStatusOnOneScreenAndInJson) {
   EXPECT_TRUE(json["neighbors"][0].contains("measurements"));
   EXPECT_GT(json["cpu_s"], 0.0);
   EXPECT_FALSE(json.contains("truncated"));
-  // What is no fault is not told as one: a camera that works well has none.
+  // Counts are not faults: a camera that works well reports no fault.
   for (const char* name : {"cam0", "cam0 spots"}) {
     EXPECT_FALSE(sensor_of(json, name).contains("faults")) << sensor_of(json, name);
     EXPECT_FALSE(sensor_of(json, name)["counts"].empty()) << name;
@@ -91,8 +91,12 @@ TEST_F(Tools, NameTheSourcesOfAPose) {
 TEST_F(Tools, WatchOnceAndAsAStream) {
   expect_true_poses(first_);
 
-  const Ending once = ask("watch", {"--once"});
-  EXPECT_EQ(once.how, "exit code 0");
+  // An overloaded machine loses the pose for a moment.
+  Ending once;
+  for (int i = 0; i < 5 && once.output.find("direct") == std::string::npos; ++i) {
+    once = ask("watch", {"--once"});
+    EXPECT_EQ(once.how, "exit code 0");
+  }
   EXPECT_NE(once.output.find("direct"), std::string::npos) << once.output;
 
   const Ending stream = ask("watch", {"--json", "--for", "1"});

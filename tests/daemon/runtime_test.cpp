@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/logging.hpp"
-#include "drivers/monotonic_clock.hpp"
+#include "daemon/service/logging.hpp"
+#include "drivers/base/monotonic_clock.hpp"
 #include "tests/support/live_daemon.hpp"
 
 namespace crepes {
@@ -20,7 +20,7 @@ TEST(Runtime, TellsWhatIsWrongWithDevicesThatAreNotThere) {
   const LogSession log(LogLevel::kError);
   const MonotonicClock machine;
   Config config = without_devices(free_port());
-  config.uwb.port = "/dev/nothing-here";
+  config.uwb.device.port = "/dev/nothing-here";
   const Runtime runtime(config, machine);
   Client client(config);
 

@@ -5,8 +5,8 @@
 #include <atomic>
 #include <cstring>
 
+#include "drivers/base/monotonic_clock.hpp"
 #include "drivers/camera/watched_camera.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "tests/support/counted.hpp"
 #include "tests/support/gige_camera.hpp"
 
@@ -28,13 +28,13 @@ class AravisCameraTest : public testing::Test {
  protected:
   void SetUp() override {
     if (!enter_own_network()) GTEST_SKIP() << "no right to a network of our own";
-    config_.name = "cam0";
-    config_.device = GigeCamera::kAddress;
-    config_.resolution = {640, 480};
-    config_.rate_hz = 50;
-    config_.exposure_us = 700;
-    config_.gain = 3;
-    config_.packet_size = 9000;
+    config_.calibration.name = "cam0";
+    config_.device.id = GigeCamera::kAddress;
+    config_.calibration.resolution = {640, 480};
+    config_.calibration.rate_hz = 50;
+    config_.device.exposure_us = 700;
+    config_.device.gain = 3;
+    config_.device.packet_size = 9000;
   }
 
   Result<std::unique_ptr<Camera>> open() { return open_aravis_camera(config_, 3, clock_); }
@@ -169,7 +169,7 @@ TEST_F(AravisCameraTest, EndsWhenTheCameraIsUnpluggedAndOpensItAgain) {
 }
 
 TEST_F(AravisCameraTest, NamesTheCameraThatIsNotThere) {
-  config_.device = GigeCamera::kId;
+  config_.device.id = GigeCamera::kId;
 
   const auto camera = open();
 
@@ -180,7 +180,7 @@ TEST_F(AravisCameraTest, NamesTheCameraThatIsNotThere) {
 
 TEST_F(AravisCameraTest, RefusesARegionOutsideOfTheSensor) {
   const GigeCamera device(changing_picture());
-  config_.offset = {2040, 0};
+  config_.device.offset = {2040, 0};
 
   const auto camera = open();
 
@@ -192,7 +192,7 @@ TEST_F(AravisCameraTest, RefusesARegionOutsideOfTheSensor) {
 
 TEST_F(AravisCameraTest, TellsAnExposureThatIsLongerThanAFrame) {
   const GigeCamera device(changing_picture());
-  config_.exposure_us = 30000;
+  config_.device.exposure_us = 30000;
 
   const auto camera = open();
 
@@ -202,7 +202,7 @@ TEST_F(AravisCameraTest, TellsAnExposureThatIsLongerThanAFrame) {
 
 TEST_F(AravisCameraTest, FindsTheOnlyCameraAndListsIt) {
   const GigeCamera device(changing_picture());
-  config_.device = "";
+  config_.device.id = "";
 
   const auto found = find_aravis_cameras();
   const auto camera = open();
@@ -213,7 +213,7 @@ TEST_F(AravisCameraTest, FindsTheOnlyCameraAndListsIt) {
 }
 
 TEST_F(AravisCameraTest, SaysThatThereIsNone) {
-  config_.device = "";
+  config_.device.id = "";
 
   const auto camera = open();
 

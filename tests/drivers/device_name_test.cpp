@@ -45,65 +45,65 @@ class DeviceNameTest : public testing::Test {
 TEST_F(DeviceNameTest, FollowsTheDeviceToAnotherTty) {
   plug("usb-LinkTrack", 0);
   DeviceName name(tty(0), by_id());
-  EXPECT_EQ(name.to_open(), tty(0));
-  name.remember();
+  EXPECT_EQ(name.path_to_open(), tty(0));
+  name.remember_link();
 
   unplug("usb-LinkTrack", 0);
   plug("usb-IMU", 0);
-  EXPECT_EQ(name.to_open(), link("usb-LinkTrack"));  // not there, and not the IMU
+  EXPECT_EQ(name.path_to_open(), link("usb-LinkTrack"));  // not there, and not the IMU
   plug("usb-LinkTrack", 1);
 
-  EXPECT_EQ(name.to_open(), link("usb-LinkTrack"));
-  EXPECT_TRUE(fs::equivalent(name.to_open(), tty(1)));
+  EXPECT_EQ(name.path_to_open(), link("usb-LinkTrack"));
+  EXPECT_TRUE(fs::equivalent(name.path_to_open(), tty(1)));
 }
 
 TEST_F(DeviceNameTest, KeepsTheConfiguredPathWhereNoLinkPointsAtIt) {
   plug("usb-IMU", 1);
   std::ofstream{tty(0)};
   DeviceName name(tty(0), by_id());
-  name.remember();
+  name.remember_link();
 
   fs::remove(tty(0));
 
-  EXPECT_EQ(name.to_open(), tty(0));
+  EXPECT_EQ(name.path_to_open(), tty(0));
 }
 
 TEST_F(DeviceNameTest, KeepsALinkThatIsConfigured) {
   plug("usb-IMU", 0);
   DeviceName name(link("usb-IMU"), by_id());
-  name.remember();
+  name.remember_link();
 
   unplug("usb-IMU", 0);
   plug("usb-IMU", 7);
 
-  EXPECT_EQ(name.to_open(), link("usb-IMU"));
+  EXPECT_EQ(name.path_to_open(), link("usb-IMU"));
 }
 
 TEST_F(DeviceNameTest, GoesByThePathWhereTwoAdaptersShareALink) {
   plug("usb-serial", 0);
   DeviceName name(tty(0), by_id());
-  name.remember();
+  name.remember_link();
   plug("usb-serial", 1);  // takes the link over
 
-  EXPECT_EQ(name.to_open(), tty(0));
+  EXPECT_EQ(name.path_to_open(), tty(0));
 }
 
 TEST_F(DeviceNameTest, SurvivesADirectoryThatIsNotThere) {
   DeviceName name(tty(0), "/no/such/directory");
-  name.remember();
+  name.remember_link();
 
-  EXPECT_EQ(name.to_open(), tty(0));
-  EXPECT_EQ(steady_name_of(tty(0), by_id()), std::nullopt);
+  EXPECT_EQ(name.path_to_open(), tty(0));
+  EXPECT_EQ(by_id_link_of(tty(0), by_id()), std::nullopt);
 }
 
 TEST_F(DeviceNameTest, NamesTheProgramThatHasADeviceOpen) {
   plug("usb-IMU", 0);
-  EXPECT_EQ(holder_of(tty(0)), std::nullopt);
+  EXPECT_EQ(process_using(tty(0)), std::nullopt);
 
   const std::ifstream open(link("usb-IMU"));
 
-  ASSERT_TRUE(holder_of(tty(0)));
-  EXPECT_NE(holder_of(tty(0))->find("(" + std::to_string(::getpid()) + ")"), std::string::npos);
+  ASSERT_TRUE(process_using(tty(0)));
+  EXPECT_NE(process_using(tty(0))->find("(" + std::to_string(::getpid()) + ")"), std::string::npos);
 }
 
 }  // namespace

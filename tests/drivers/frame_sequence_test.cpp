@@ -9,7 +9,7 @@ namespace {
 
 std::uint64_t missed_in(const std::vector<std::uint64_t>& numbers) {
   FrameSequence sequence;
-  for (const std::uint64_t number : numbers) sequence.note(number);
+  for (const std::uint64_t number : numbers) sequence.add(number);
   return sequence.missed();
 }
 

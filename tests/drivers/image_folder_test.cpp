@@ -28,7 +28,7 @@ class ImageFolderTest : public testing::Test {
   }
   /// 3 x 2 pixels; OpenCV reads portable gray maps as it does PNG.
   void write_picture(const std::string& name) const {
-    write("data/" + name, std::string("P5 3 2 255\n") + "\x01\x02\x03\x04\x05\xff");
+    write("data/" + name, "P5 3 2 255\n\x01\x02\x03\x04\x05\xff");
   }
   [[nodiscard]] std::string list_error() const {
     const auto list = read_picture_list(root_ / "data.csv", root_ / "data");

@@ -10,7 +10,7 @@ const ImuSample kSample{.stamp = Timestamp{std::chrono::seconds(3)},
                         .accel_mps2 = {1.0, 2.0, 9.5}};
 
 TEST(ImuCorrection, LeavesSamplesAloneUnlessToldOtherwise) {
-  const ImuSample same = ImuCorrection(ImuConfig{}).apply(kSample);
+  const ImuSample same = ImuCorrection(ImuDeviceConfig{}).apply(kSample);
 
   EXPECT_EQ(same.stamp, kSample.stamp);
   EXPECT_EQ(same.gyro_radps, kSample.gyro_radps);
@@ -18,7 +18,7 @@ TEST(ImuCorrection, LeavesSamplesAloneUnlessToldOtherwise) {
 }
 
 TEST(ImuCorrection, TakesOffTheBiasThenScalesThenStraightensThenTurns) {
-  ImuConfig config;
+  ImuDeviceConfig config;
   config.accelerometer.bias = {0.5, 1.0, -0.5};
   config.accelerometer.scale = {2.0, 1.5, 0.5};
   config.accelerometer.misalignment << 1, 0.1, 0, 0, 1, 0, 0, 0, 1;

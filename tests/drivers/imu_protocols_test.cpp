@@ -7,6 +7,7 @@
 #include "drivers/imu/hipnuc.hpp"
 #include "drivers/imu/mavlink.hpp"
 #include "drivers/imu/xsens.hpp"
+#include "estimator/core/constants.hpp"
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/recorded_files.hpp"
 
@@ -15,8 +16,6 @@ namespace {
 
 using namespace std::chrono_literals;
 using Json = nlohmann::json;
-
-constexpr double kGravity = 9.80665;
 
 Eigen::Vector3d vector_of(const Json& values) {
   return {values[0].get<double>(), values[1].get<double>(), values[2].get<double>()};
@@ -45,8 +44,8 @@ TEST(Hipnuc, ReadsTheRecordedFrameInSiUnits) {
   const RecordedFrame file = recorded_file("imu/hipnuc_hi91_official");
 
   ASSERT_EQ(Hipnuc::examine(file.bytes).length, file.bytes.size());
-  expect_sample(Hipnuc::read(file.bytes), vector_of(file.decoded["gyro_dps"]) * M_PI / 180.0,
-                vector_of(file.decoded["acc_g"]) * kGravity);
+  expect_sample(Hipnuc::read(file.bytes), vector_of(file.decoded["gyro_dps"]) * kRadPerDeg,
+                vector_of(file.decoded["acc_g"]) * kGravityMps2);
 }
 
 void expect_time(const ImuReading& reading, std::uint64_t ticks, Duration tick) {
@@ -167,7 +166,7 @@ TEST(Mavlink, ReadsRecordedMessagesInOurAxesAndUnits) {
     const RecordedFrame file = recorded_file(name);
     ASSERT_EQ(Mavlink::examine(file.bytes).length, file.bytes.size()) << name;
     expect_sample(Mavlink::read(file.bytes), turned(vector_of(file.decoded["gyro_mrads"])) / 1e3,
-                  turned(vector_of(file.decoded["acc_mg"])) * kGravity / 1e3);
+                  turned(vector_of(file.decoded["acc_mg"])) * kGravityMps2 / 1e3);
   }
 }
 
@@ -185,12 +184,12 @@ TEST(Mavlink, RefusesEveryTruncationSplitAndBitErrorOfEveryRecordedMessage) {
 TEST(Mavlink, RefusesRawImuWithAReason) {
   MavlinkParser parser;
   EXPECT_EQ(samples_in(parser, recorded_file("imu/mavlink_timesync_v2").bytes), 0U);
-  EXPECT_NE(parser.why_nothing().find("without an IMU message"), std::string::npos);
+  EXPECT_NE(parser.no_measurement_reason().find("without an IMU message"), std::string::npos);
 
   EXPECT_EQ(samples_in(parser, recorded_file("imu/mavlink_raw_imu_v2").bytes), 0U);
 
   EXPECT_EQ(parser.counts().unscaled, 1U);
-  EXPECT_NE(parser.why_nothing().find("RAW_IMU only"), std::string::npos);
+  EXPECT_NE(parser.no_measurement_reason().find("RAW_IMU only"), std::string::npos);
 }
 
 TEST(Mavlink, TakesTheBestMessageOnlyAndAnotherWhenThatIsGone) {

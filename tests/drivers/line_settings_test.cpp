@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdlib>
 
-#include "drivers/unique_fd.hpp"
+#include "drivers/base/unique_fd.hpp"
 
 namespace crepes {
 namespace {

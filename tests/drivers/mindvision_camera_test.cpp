@@ -25,11 +25,11 @@ class MindVisionCameraTest : public testing::Test {
     ASSERT_NE(stub_, nullptr);
     static const mindvision_stub kFresh = *stub_;
     *stub_ = kFresh;
-    config_.library = CREPES_MINDVISION_STUB;
-    config_.resolution = {64, 48};
-    config_.rate_hz = 200;
-    config_.exposure_us = 400;
-    config_.latency_ms = 3.0;
+    config_.device.library = CREPES_MINDVISION_STUB;
+    config_.calibration.resolution = {64, 48};
+    config_.calibration.rate_hz = 200;
+    config_.device.exposure_us = 400;
+    config_.device.latency_ms = 3.0;
     clock_.set(Timestamp{10s});
   }
 
@@ -49,7 +49,7 @@ class MindVisionCameraTest : public testing::Test {
 };
 
 TEST_F(MindVisionCameraTest, SaysWhatToInstallWhereTheLibraryIsAbsent) {
-  config_.library = "libnosuch.so";
+  config_.device.library = "libnosuch.so";
 
   const std::string told = open_error();
 
@@ -58,7 +58,7 @@ TEST_F(MindVisionCameraTest, SaysWhatToInstallWhereTheLibraryIsAbsent) {
 }
 
 TEST_F(MindVisionCameraTest, RefusesAnotherLibrary) {
-  config_.library = "libm.so.6";
+  config_.device.library = "libm.so.6";
 
   EXPECT_EQ(open_error(), "libm.so.6: no library of MindVision, CameraSdkInit is not in it");
 }
@@ -77,7 +77,7 @@ TEST_F(MindVisionCameraTest, SetsTheCameraUpAndClosesIt) {
 }
 
 TEST_F(MindVisionCameraTest, WaitsForHardwarePulsesIfSoConfigured) {
-  config_.trigger = CameraTrigger::kHardware;
+  config_.device.trigger = CameraTrigger::kHardware;
 
   const auto camera = open();
 
@@ -186,9 +186,9 @@ TEST_F(MindVisionCameraTest, TellsAnExposureThatIsLongerThanAFrame) {
 TEST_F(MindVisionCameraTest, FindsACameraByItsSerialNumber) {
   stub_->cameras = 3;
   EXPECT_EQ(open_error(), "several cameras: set device to one of MV1, MV2, MV3");
-  config_.device = "MV9";
+  config_.device.id = "MV9";
   EXPECT_EQ(open_error(), "MV9: no such camera; there is MV1, MV2, MV3");
-  config_.device = "MV2";
+  config_.device.id = "MV2";
   EXPECT_EQ(open_error(), "");
   stub_->cameras = 0;
   EXPECT_EQ(open_error(), "no MindVision camera");

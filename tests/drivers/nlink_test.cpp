@@ -142,14 +142,15 @@ TEST(Nlink, ReadsRangesOfEveryKindThatHasThem) {
 TEST(Nlink, SaysWhyThereAreNoRanges) {
   NlinkParser parser({{9, RobotId{9}}}, 200.0);
   ranges_in(parser, recorded_file("nlink/nodeframe1_01").bytes);
-  EXPECT_NE(parser.why_nothing().find("NodeFrame1, which has no ranges"), std::string::npos);
+  EXPECT_NE(parser.no_measurement_reason().find("NodeFrame1, which has no ranges"),
+            std::string::npos);
   EXPECT_EQ(parser.counts().without_ranges, 1U);
 
   ranges_in(parser, recorded_file("nlink/nodeframe3_02").bytes);
-  EXPECT_NE(parser.why_nothing().find("such as 0; see swarm.members"), std::string::npos);
+  EXPECT_NE(parser.no_measurement_reason().find("such as 0; see swarm.members"), std::string::npos);
 
   ranges_in(parser, encode_node_frame3(9, 0, {}));
-  EXPECT_NE(parser.why_nothing().find("are the others on"), std::string::npos);
+  EXPECT_NE(parser.no_measurement_reason().find("are the others on"), std::string::npos);
 }
 
 }  // namespace

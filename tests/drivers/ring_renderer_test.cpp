@@ -28,8 +28,8 @@ SwarmConfig swarm_of(int count) {
   return swarm;
 }
 
-CameraConfig forward_camera() {
-  CameraConfig camera;
+CameraCalibration forward_camera() {
+  CameraCalibration camera;
   camera.name = "cam0";
   camera.intrinsics = {-0.1723, 0.5931, 316.6, 316.5, 638.2, 513.0};
   camera.resolution = {1280, 1024};

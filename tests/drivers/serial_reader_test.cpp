@@ -97,7 +97,7 @@ TEST_F(SerialReaderTest, FindsMeasurementsAmongGarbageAndSaysHowMuchItSkipped) {
   EXPECT_EQ(reader.counts().skipped_bytes, 5U);
 }
 
-TEST_F(SerialReaderTest, TellsThatTheDeviceHungUp) {
+TEST_F(SerialReaderTest, ReportsThatTheDeviceHungUp) {
   auto reader = uwb_reader();
   const std::string path = line_->path();
   line_.reset();
@@ -144,7 +144,7 @@ TEST_F(SerialReaderTest, NamesWhatSpeaksInsteadOfTheConfiguredDevice) {
   EXPECT_EQ(reader.diagnosis(), line_->path() + ": another kind of device: it speaks witmotion");
 }
 
-TEST_F(SerialReaderTest, PassesOnWhyFramesHoldNoMeasurement) {
+TEST_F(SerialReaderTest, ReportsWhyFramesHoldNoMeasurement) {
   auto reader = this->reader(NlinkParser({}, 200.0), [](const UwbRange&) {});
   clock_.set(Timestamp{1s});
   send(recorded_node_frame3());
@@ -155,7 +155,7 @@ TEST_F(SerialReaderTest, PassesOnWhyFramesHoldNoMeasurement) {
   EXPECT_NE(reader.diagnosis()->find("no member carries"), std::string::npos);
 }
 
-TEST_F(SerialReaderTest, ThrowsAwayWhatCameBeforeItOpened) {
+TEST_F(SerialReaderTest, DiscardsBytesReceivedBeforeOpening) {
   send(recorded_node_frame3());
   auto reader = uwb_reader();
 
@@ -164,7 +164,7 @@ TEST_F(SerialReaderTest, ThrowsAwayWhatCameBeforeItOpened) {
   EXPECT_TRUE(ranges_.empty());
 }
 
-TEST_F(SerialReaderTest, KeepsTheDeviceToItself) {
+TEST_F(SerialReaderTest, OpensTheDeviceExclusively) {
   auto reader = uwb_reader();
 
   const auto second = SerialPort::open(line_->path(), 921600);

@@ -7,6 +7,7 @@
 #include "drivers/sim/sim_imu.hpp"
 #include "drivers/sim/sim_serial.hpp"
 #include "drivers/sim/sim_uwb.hpp"
+#include "estimator/core/constants.hpp"
 #include "tests/support/manual_clock.hpp"
 
 namespace crepes {
@@ -50,7 +51,7 @@ class SimUwbTest : public testing::Test {
 
   SimWorld world_;
   SwarmConfig swarm_;
-  UwbConfig config_;
+  RangeNoise config_;
 };
 
 struct SimUwbFour : SimUwbTest {
@@ -110,7 +111,7 @@ struct ImuErrors {
 };
 
 /// What 2000 samples of one robot's IMU are off.
-ImuErrors imu_errors(const SimWorld& world, RobotId robot, const ImuConfig& config) {
+ImuErrors imu_errors(const SimWorld& world, RobotId robot, const ImuNoise& config) {
   constexpr int kSamples = 2000;
   SimImu imu(world, robot, config);
   WitMotionParser parser;
@@ -134,7 +135,7 @@ ImuErrors imu_errors(const SimWorld& world, RobotId robot, const ImuConfig& conf
 }
 
 TEST(SimImu, ReadsWhatTheBodyFeelsWithinItsErrors) {
-  const ImuConfig config;
+  const ImuNoise config;
   const RobotId on_wheels{2};
 
   const ImuErrors errors = imu_errors(SimWorld(config_of(SimScenario::kFour)), on_wheels, config);
@@ -144,14 +145,14 @@ TEST(SimImu, ReadsWhatTheBodyFeelsWithinItsErrors) {
   EXPECT_LT(errors.accel_mean.cwiseAbs().maxCoeff(),
             4.0 * (config.accelerometer_bias_sigma + 9.81 * config.accelerometer_scale_sigma));
   // White noise of density s at rate f, quantized in steps of 2000/32768 deg/s.
-  const double step = 2000.0 * M_PI / 180.0 / 32768.0;
+  const double step = radians(2000.0) / 32768.0;
   const double expected =
       std::pow(config.gyroscope_noise_density, 2) * config.update_rate + step * step / 12.0;
   EXPECT_NEAR(errors.gyro_variance / expected, 1.0, 0.1);
 }
 
 TEST(SimImu, ShakesWithTheRotors) {
-  const ImuConfig config;
+  const ImuNoise config;
   const SimWorld world(config_of(SimScenario::kFour));
 
   const ImuErrors flying = imu_errors(world, RobotId{1}, config);
@@ -162,7 +163,7 @@ TEST(SimImu, ShakesWithTheRotors) {
 
 TEST(SimSerial, FeedsTheRealReaderOnASteadyBeatAndMissesWhatIsLate) {
   const SimWorld world(config_of(SimScenario::kTwo));
-  ImuConfig config;
+  ImuNoise config;
   SimImu imu(world, RobotId{1}, config);
   auto line = SimSerial::open([&](double t_s) { return imu.sample(t_s); }, 100.0);
   ASSERT_TRUE(line) << line.error().message;

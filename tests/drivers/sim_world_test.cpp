@@ -5,6 +5,7 @@
 
 #include "drivers/sim/sim_clock.hpp"
 #include "drivers/sim/world.hpp"
+#include "estimator/core/constants.hpp"
 #include "tests/support/manual_clock.hpp"
 
 namespace crepes {
@@ -51,7 +52,7 @@ TEST_P(EveryScenario, KeepsRobotsApartAndFacingOneAnother) {
         EXPECT_GT(T_B_N.p.norm(), 1.5) << t;
         if (world_.is_occluded(world_.T_W_B(a, t).p, world_.T_W_B(b, t).p)) continue;
         // Within a 185 degree camera that looks forward, also when swung about.
-        EXPECT_GT(T_B_N.p.normalized().x(), std::cos(92.0 * M_PI / 180.0)) << t;
+        EXPECT_GT(T_B_N.p.normalized().x(), std::cos(radians(92.0))) << t;
       }
     }
   }
@@ -92,7 +93,7 @@ TEST(SimWorld, AggressiveTurnsHundredsOfDegreesASecond) {
   for (double t = 0.0; t < 60.0; t += 0.01) {
     fastest = std::max(fastest, world.state(RobotId{1}, t).w_W_B_B.norm());
   }
-  EXPECT_GT(fastest * 180.0 / M_PI, 250.0);
+  EXPECT_GT(kDegPerRad * fastest, 250.0);
 }
 
 TEST(SimWorld, PillarHidesSomePairsNowAndThenAndNeighborsOnTheCircleNever) {

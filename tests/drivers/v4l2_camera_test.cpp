@@ -17,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// What a test wants of the device, and what it saw.
+/// The behaviour of the device in a test, and the requests that it received.
 struct FakeKernel {
   std::uint32_t abilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   std::set<std::uint32_t> formats{V4L2_PIX_FMT_GREY};
@@ -62,7 +62,7 @@ class FakeDevice final : public V4l2Device {
   FakeDevice& operator=(FakeDevice&&) = delete;
   ~FakeDevice() override { kernel_.is_open = false; }
 
-  [[nodiscard]] int request(unsigned long code, void* argument) override {
+  [[nodiscard]] int ioctl(unsigned long code, void* argument) override {
     if (const auto error = kernel_.errors.find(code); error != kernel_.errors.end())
       return error->second;
     switch (code) {
@@ -144,15 +144,15 @@ class FakeDevice final : public V4l2Device {
 class V4l2CameraTest : public testing::Test {
  protected:
   void SetUp() override {
-    config_.device = "/dev/video7";
-    config_.resolution = {32, 20};
-    config_.rate_hz = 100;
-    config_.latency_ms = 4.0;
+    config_.device.id = "/dev/video7";
+    config_.calibration.resolution = {32, 20};
+    config_.calibration.rate_hz = 100;
+    config_.device.latency_ms = 4.0;
     clock_.set(Timestamp{100s});
   }
 
   Result<std::unique_ptr<Camera>> open() {
-    return run_v4l2_camera(std::make_unique<FakeDevice>(kernel_), config_, 1, clock_);
+    return start_v4l2_camera(std::make_unique<FakeDevice>(kernel_), config_, 1, clock_);
   }
   std::string open_error() {
     const auto camera = open();
@@ -164,7 +164,7 @@ class V4l2CameraTest : public testing::Test {
   ManualClock clock_;
 };
 
-TEST_F(V4l2CameraTest, LendsGreyFramesWithTheirStrideAndTakesTheBuffersBack) {
+TEST_F(V4l2CameraTest, BorrowsGreyFramesWithTheirStrideAndRequeuesTheBuffers) {
   kernel_.padding = 32;
   auto camera = open();
   ASSERT_TRUE(camera) << camera.error().message;
@@ -205,7 +205,7 @@ TEST_F(V4l2CameraTest, NarrowsWiderLevelsAndUsesTheirMemoryAgain) {
   EXPECT_EQ((*frame)->data(), memory);
 }
 
-TEST_F(V4l2CameraTest, HandsOnTheNewestAndCountsWhatItSkippedAndWhatTheDeviceDid) {
+TEST_F(V4l2CameraTest, ReturnsTheNewestAndCountsSkippedAndMissedFrames) {
   auto camera = open();
   ASSERT_TRUE(camera) << camera.error().message;
   for (int i = 1; i <= 6; ++i) kernel_.shoot(static_cast<std::uint8_t>(i));  // four buffers
@@ -220,7 +220,7 @@ TEST_F(V4l2CameraTest, HandsOnTheNewestAndCountsWhatItSkippedAndWhatTheDeviceDid
   EXPECT_EQ(faults_of(**camera, "missed"), 2U);
 }
 
-TEST_F(V4l2CameraTest, GivesBrokenFramesBack) {
+TEST_F(V4l2CameraTest, RequeuesBrokenFrames) {
   auto camera = open();
   ASSERT_TRUE(camera) << camera.error().message;
   kernel_.shoot(1, V4L2_BUF_FLAG_ERROR);
@@ -250,7 +250,7 @@ TEST_F(V4l2CameraTest, StampsAsTheKernelDoesWhereThatIsPlausible) {
   EXPECT_EQ(stamp_of(V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN, Timestamp{99990ms}), Timestamp{100s} - 4ms);
 }
 
-TEST_F(V4l2CameraTest, SaysThatTheDeviceIsGone) {
+TEST_F(V4l2CameraTest, ReportsThatTheDeviceIsGone) {
   auto camera = open();
   ASSERT_TRUE(camera) << camera.error().message;
   kernel_.errors[VIDIOC_DQBUF] = ENODEV;
@@ -290,29 +290,29 @@ TEST_F(V4l2CameraTest, RefusesADeviceThatOffersSomethingElse) {
 }
 
 TEST_F(V4l2CameraTest, RefusesSettingsThatTheDeviceDoesNotHave) {
-  config_.gain = 3;
+  config_.device.gain = 3;
   EXPECT_EQ(open_error(), "/dev/video7: gain: Invalid argument");
-  config_.gain.reset();
-  config_.offset = {8, 0};
+  config_.device.gain.reset();
+  config_.device.offset = {8, 0};
   EXPECT_NE(open_error().find("offset"), std::string::npos);
 }
 
-TEST_F(V4l2CameraTest, SetsTheExposureAndTellsOneThatIsLongerThanAFrame) {
-  config_.exposure_us = 700;
+TEST_F(V4l2CameraTest, SetsTheExposureAndReportsOneLongerThanAFrame) {
+  config_.device.exposure_us = 700;
   {
     const auto camera = open();
     ASSERT_TRUE(camera) << camera.error().message;
     EXPECT_EQ(kernel_.controls[V4L2_CID_EXPOSURE_ABSOLUTE], 7);
     EXPECT_EQ((*camera)->diagnosis(), std::nullopt);
   }
-  config_.exposure_us.reset();
+  config_.device.exposure_us.reset();
   kernel_.controls[V4L2_CID_EXPOSURE_ABSOLUTE] = 101;
   const auto camera = open();
   ASSERT_TRUE(camera) << camera.error().message;
   EXPECT_NE((*camera)->diagnosis().value_or("").find("exposure"), std::string::npos);
 }
 
-TEST(V4l2Device, NamesAFileThatIsNotThere) {
+TEST(V4l2Device, NamesAMissingFile) {
   const auto device = open_v4l2_device("/dev/video99");
 
   ASSERT_FALSE(device);
@@ -329,7 +329,7 @@ TEST(GreyConversion, KeepsTheUpperEightBitsOfEachRow) {
   EXPECT_EQ(grey, (std::vector<std::uint8_t>{255, 128, 1, 255}));
 }
 
-TEST(GreyConversion, TakesTheHighByteOfSixteenBits) {
+TEST(GreyConversion, KeepsTheHighByteOfSixteenBits) {
   std::vector<std::uint8_t> grey;
 
   narrow_to_8_bits(std::vector<std::uint8_t>{0x34, 0x12, 0xff, 0xff}, 2, 1, 4, 16, grey);

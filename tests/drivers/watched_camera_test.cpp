@@ -12,7 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Delivers what the test lays there.
+/// Delivers the frames of the test.
 class FakeCamera final : public Camera {
  public:
   explicit FakeCamera(std::deque<Frame>& frames) : frames_(frames) {}
@@ -35,8 +35,8 @@ class WatchedCameraTest : public testing::Test {
   static constexpr int kHeight = 33;
 
   void SetUp() override {
-    config_.resolution = {kWidth, kHeight};
-    config_.rate_hz = 100;
+    config_.calibration.resolution = {kWidth, kHeight};
+    config_.calibration.rate_hz = 100;
   }
 
   WatchedCamera& camera() {
@@ -56,7 +56,7 @@ class WatchedCameraTest : public testing::Test {
     return frame ? "" : frame.error().message;
   }
 
-  /// The answer to such pictures for `duration`, or the first that is an error.
+  /// The result of such images for `duration`, or the first error.
   template <class Picture>
   std::string answer_for(Duration duration, const Picture& picture, Duration period = 10ms) {
     std::string told;
@@ -80,12 +80,12 @@ class WatchedCameraTest : public testing::Test {
   std::optional<WatchedCamera> camera_;
 };
 
-TEST_F(WatchedCameraTest, LetsLivingPicturesPass) {
+TEST_F(WatchedCameraTest, PassesChangingImages) {
   EXPECT_EQ(answer_for(5s, noisy), "");
   EXPECT_EQ(camera().diagnosis(), std::nullopt);
 }
 
-TEST_F(WatchedCameraTest, EndsAStreamOfTheSamePicture) {
+TEST_F(WatchedCameraTest, EndsAStreamOfEqualImages) {
   ASSERT_EQ(answer_for(1s, noisy), "");
   const Timestamp hung = clock_.now();
 
@@ -95,11 +95,11 @@ TEST_F(WatchedCameraTest, EndsAStreamOfTheSamePicture) {
   EXPECT_LT(clock_.now() - hung, 1500ms);
 }
 
-TEST_F(WatchedCameraTest, DoesNotTakeTheDarkForAFrozenPicture) {
+TEST_F(WatchedCameraTest, AcceptsEqualDarkImages) {
   EXPECT_EQ(answer_for(5s, [](int) { return gray(0); }), "");
 }
 
-TEST_F(WatchedCameraTest, SeesASinglePixelChangeBetweenTheRowsThatItGlancesAt) {
+TEST_F(WatchedCameraTest, DetectsASinglePixelChangeBetweenTheRowsThatItCompares) {
   EXPECT_EQ(answer_for(5s,
                        [](int turn) {
                          auto pixels = gray(20);
@@ -125,7 +125,7 @@ TEST_F(WatchedCameraTest, EndsAStalledStreamWithinTwoSeconds) {
 }
 
 TEST_F(WatchedCameraTest, WaitsForAHardwareTriggerAsLongAsItTakes) {
-  config_.trigger = CameraTrigger::kHardware;
+  config_.device.trigger = CameraTrigger::kHardware;
   ASSERT_EQ(answer_for(1s, noisy), "");
 
   clock_.advance(60s);
@@ -133,7 +133,7 @@ TEST_F(WatchedCameraTest, WaitsForAHardwareTriggerAsLongAsItTakes) {
   EXPECT_EQ(answer(), "");
 }
 
-TEST_F(WatchedCameraTest, TellsAnotherRateThanWasConfigured) {
+TEST_F(WatchedCameraTest, ReportsAnotherRateThanConfigured) {
   ASSERT_EQ(answer_for(2s, noisy, 15ms), "");
   EXPECT_NE(camera().diagnosis().value_or("").find("fewer frames"), std::string::npos);
 
@@ -144,14 +144,14 @@ TEST_F(WatchedCameraTest, TellsAnotherRateThanWasConfigured) {
   EXPECT_NE(camera().diagnosis().value_or("").find("more frames"), std::string::npos);
 }
 
-TEST_F(WatchedCameraTest, ReadsLentMemoryByItsStride) {
+TEST_F(WatchedCameraTest, ReadsBorrowedMemoryByItsStride) {
   auto memory = gray(20);
   memory.resize(static_cast<std::size_t>(kHeight) * 64, 20);
   const auto lend = [&](int turn) {
     memory[static_cast<std::size_t>(turn % kWidth)] ^= 1U;
     Frame frame{.stamp = clock_.now(), .width = kWidth, .height = kHeight};
-    frame.lent = LentPixels(memory.data(), [](const std::uint8_t*) {});
-    frame.lent_stride = 64;
+    frame.borrowed = BorrowedPixels(memory.data(), [](const std::uint8_t*) {});
+    frame.borrowed_stride = 64;
     return frame;
   };
   for (int i = 0; i < 300; ++i) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include "estimator/core/constants.hpp"
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/recorded_files.hpp"
 #include "tests/support/recorded_frames.hpp"
@@ -35,10 +36,10 @@ TEST(WitMotion, ReadsARecordingInSiUnits) {
 
   ASSERT_EQ(samples.size(), 2U);
   EXPECT_EQ(samples[0].stamp, kArrival);
-  EXPECT_NEAR(samples[0].accel_mps2.x(), 0.00048828125 * 9.80665, 1e-12);
-  EXPECT_NEAR(samples[0].accel_mps2.y(), -0.0009765625 * 9.80665, 1e-12);
-  EXPECT_NEAR(samples[0].accel_mps2.z(), 9.80665, 1e-12);
-  EXPECT_NEAR(samples[1].gyro_radps.z(), -0.06103515625 * M_PI / 180.0, 1e-12);
+  EXPECT_NEAR(samples[0].accel_mps2.x(), 0.00048828125 * kGravityMps2, 1e-12);
+  EXPECT_NEAR(samples[0].accel_mps2.y(), -0.0009765625 * kGravityMps2, 1e-12);
+  EXPECT_NEAR(samples[0].accel_mps2.z(), kGravityMps2, 1e-12);
+  EXPECT_NEAR(samples[1].gyro_radps.z(), radians(-0.06103515625), 1e-12);
   EXPECT_EQ(parser.counts().partial, 0U);
 }
 

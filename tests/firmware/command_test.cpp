@@ -39,7 +39,7 @@ struct Board {
   }
 };
 
-TEST(LedCommand, SetsKeepsAndTellsSettings) {
+TEST(LedCommand, SetsStoresAndReportsSettings) {
   Board board;
   const led_settings settings = pattern_settings(3, "00100100111100111111");
 
@@ -82,7 +82,7 @@ TEST(LedCommand, RefusesBadSettingsWithAReasonAndKeepsTheOld) {
   EXPECT_EQ(refused([](led_settings& s) { s.brightness[5] = 101; }), LED_BAD_BRIGHTNESS);
 }
 
-TEST(LedCommand, TellsThatFlashFailed) {
+TEST(LedCommand, ReportsThatFlashFailed) {
   Board board;
   ASSERT_EQ(board.set(pattern_settings(3, "0010010011")), LED_EFFECT_BLINK);
   board.flash.cut_power_after(5, 1);
@@ -101,7 +101,7 @@ TEST(LedCommand, LightsUpForATestOfAtMostAMinute) {
   EXPECT_EQ(board.fault(), LED_BAD_TIME);
 }
 
-TEST(LedCommand, TellsVersionClockAndWhatWasSkipped) {
+TEST(LedCommand, ReportsVersionClockAndSkippedBytes) {
   Board board;
   board.board.status = {LED_PROTOCOL_VERSION, {1, 2, 3}, LED_CLOCK_RC, 1, 517};
 

@@ -42,7 +42,7 @@ std::vector<led_frame> frames() {
   return all;
 }
 
-/// All that comes out of `bytes`, with the line silent at the end.
+/// All frames in `bytes`, with a silent line at the end.
 std::vector<led_frame> received(const ByteVector& bytes, led_receiver& receiver) {
   std::vector<led_frame> out;
   led_frame frame{};

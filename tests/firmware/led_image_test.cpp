@@ -3,10 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <set>
 #include <string>
 
-#include "daemon/config_file.hpp"
+#include "config/reading/config_file.hpp"
 #include "estimator/vision/id_decoder.hpp"
 #include "estimator/vision/id_library.hpp"
 #include "firmware/led_board/settings_store.h"
@@ -39,7 +40,7 @@ SwarmConfig swarm_of_64() {
   return checked.config.swarm;
 }
 
-/// What the log says of light: for each tick, whether the write of the port lit the LEDs.
+/// The light in the log: for each tick, whether the write to the port lit the LEDs.
 struct Waveform {
   std::vector<bool> lit;
   std::set<int> traces_per_write;  ///< how many lines on SysTick came between two writes
@@ -74,7 +75,7 @@ Result<QemuBoard> start_on_virtual_time(const led_settings& settings) {
                                   "-icount", "shift=0,sleep=off"});
 }
 
-/// Who a camera of 200 Hz takes the board for; empty where it cannot say.
+/// The robot that a camera of 200 Hz identifies; empty if undecided.
 std::set<int> named(const std::vector<bool>& lit, const IdDecoder& decoder, Duration first_frame) {
   BlinkEvidence evidence;
   std::set<int> ids;
@@ -133,8 +134,8 @@ TEST(LedImage, BlinksTheIdLibrarysCodesTickByTick) {
   }
 }
 
-/// Asks until there is an answer: a loaded machine may tear a frame apart by more than the silence
-/// that ends it.
+/// Repeats the request until there is a reply: on a loaded machine a gap inside a frame may exceed
+/// the silence that ends it.
 std::optional<led_frame> answer_to(const QemuBoard& board, const led_frame& request) {
   std::array<std::uint8_t, LED_MAX_FRAME> bytes{};
   const std::size_t size = led_frame_write(&request, bytes.data());
@@ -169,6 +170,8 @@ TEST(LedImage, AnswersOnItsSerialLineAndOutlivesDeadClockAndFlash) {
   ASSERT_TRUE(status && status->type == LED_STATUS);
   EXPECT_EQ(led_status_read(status->payload).protocol, LED_PROTOCOL_VERSION);
   EXPECT_EQ(led_status_read(status->payload).clock, LED_CLOCK_RC_NO_PLL);
+  EXPECT_TRUE(std::ranges::equal(led_status_read(status->payload).version,
+                                 std::array{CREPES_VERSION_NUMBERS}));
 
   const auto told = answer_to(*board, request_of(LED_GET));
   ASSERT_TRUE(told && told->type == LED_SETTINGS);

@@ -1,6 +1,7 @@
 #include "tests/firmware/qemu_board.hpp"
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <poll.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -33,7 +34,7 @@ Result<Pipe> make_pipe() {
   return Pipe{UniqueFd{ends[0]}, UniqueFd{ends[1]}};
 }
 
-/// Writes a page of flash to `folder` and says how QEMU loads it.
+/// Writes a page of flash to `folder` and returns the option with which QEMU loads it.
 std::string loader(RamFlash& flash, int page, const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / ("page_" + std::to_string(page));
   std::ofstream out(path, std::ios::binary);
@@ -57,7 +58,7 @@ Result<pid_t> spawn(std::vector<std::string> words, int in, int out, int log) {
   pid_t pid = 0;
   const int error = ::posix_spawn(&pid, kQemu, &actions, nullptr, argv.data(), environ);
   ::posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) return fail(ErrorCode::kIo, std::string(kQemu) + ": cannot be started");
+  if (error != 0) return fail(ErrorCode::kIo, fmt::format("{}: cannot be started", kQemu));
   return pid;
 }
 

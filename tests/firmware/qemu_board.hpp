@@ -11,19 +11,19 @@
 #include <string>
 #include <vector>
 
-#include "drivers/unique_fd.hpp"
+#include "drivers/base/unique_fd.hpp"
 #include "estimator/core/result.hpp"
 #include "tests/support/ram_flash.hpp"
 
 namespace crepes {
 
-/// Why the image cannot be run here; empty where it can.
+/// Why the image cannot run here; empty if it can.
 [[nodiscard]] std::string why_no_board();
 
-/// A running board. Destruction ends it.
+/// A running board. The destructor stops it.
 class QemuBoard {
  public:
-  /// `flash` is what its settings pages hold. `options` are QEMU's own.
+  /// `flash` is the content of its settings pages; `options` are for QEMU.
   [[nodiscard]] static Result<QemuBoard> start(RamFlash& flash,
                                                const std::vector<std::string>& options);
   QemuBoard(QemuBoard&& other) noexcept;

@@ -29,7 +29,7 @@ TEST(SettingsStore, IsUnsetWhenNothingWasEverSaved) {
   EXPECT_EQ(bytes_of(loaded(flash)), bytes_of(led_settings_unset()));
 }
 
-TEST(SettingsStore, GivesBackWhatWasSavedLast) {
+TEST(SettingsStore, ReturnsWhatWasSavedLast) {
   RamFlash flash;
   for (std::uint16_t id = 1; id < 1000; ++id) {
     ASSERT_TRUE(save(flash, pattern_settings(id, "0100110111")));
@@ -83,7 +83,7 @@ TEST(SettingsStore, ABitThatFlipsInOneCopyBringsBackTheOther) {
   EXPECT_EQ(recovered, 13 * 16) << "all bits of a record count, and no others";
 }
 
-TEST(SettingsStore, SaysWhenFlashDoesNotHoldTheSettings) {
+TEST(SettingsStore, ReportsWhenFlashDoesNotHoldTheSettings) {
   RamFlash flash;
   ASSERT_TRUE(save(flash, kOld));
   flash.cut_power_after(0, 1);

@@ -5,20 +5,20 @@
 #include <fstream>
 #include <sstream>
 
-#include "daemon/config_file.hpp"
+#include "config/reading/config_file.hpp"
+#include "drivers/detect_protocol.hpp"
 #include "drivers/device_clock.hpp"
 #include "drivers/imu/hipnuc.hpp"
 #include "drivers/imu/mavlink.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/imu/xsens.hpp"
-#include "drivers/recognize.hpp"
 #include "drivers/serial/byte_fields.hpp"
 #include "drivers/uwb/nlink.hpp"
 #include "estimator/core/contract.hpp"
 #include "firmware/protocol/led_messages.h"
-#include "net/crc32.hpp"
-#include "net/peer_message.hpp"
-#include "net/subscription_desk.hpp"
+#include "net/mesh/crc32.hpp"
+#include "net/mesh/peer_message.hpp"
+#include "net/subscription/subscription_service.hpp"
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/places.hpp"
 #include "tests/support/recorded_files.hpp"
@@ -36,8 +36,8 @@ void check(const UwbRange& range) {
   CREPES_EXPECT(range.range_m > 0.0 && range.range_m <= 200.0, "ranges within bounds");
 }
 
-/// A stream in pieces as long as its first byte says gives the same frames as in one piece, and
-/// what they hold makes sense.
+/// A stream in pieces, whose length is its first byte, yields the same frames as in one piece, and
+/// their measurements are plausible.
 template <class Parser>
 void run_stream(Bytes data, Parser parser) {
   if (data.empty()) return;
@@ -55,7 +55,7 @@ void run_stream(Bytes data, Parser parser) {
       check(measurement);
     });
   }
-  static_cast<void>(parser.why_nothing());
+  static_cast<void>(parser.no_measurement_reason());
 }
 
 /// A frame or stream as `run_stream` takes it.
@@ -76,12 +76,12 @@ void run_nlink(Bytes data) {
   run_stream(data, NlinkParser(modules, 200.0));
 }
 
-void run_recognize(Bytes data) {
-  const auto spoken = recognize(data);
-  CREPES_EXPECT(!spoken || !name_of(*spoken).empty(), "what is recognized has a name");
+void run_detect_protocol(Bytes data) {
+  const auto spoken = detect_protocol(data);
+  CREPES_EXPECT(!spoken || !name_of(*spoken).empty(), "a detected protocol has a name");
 }
 
-std::vector<FuzzInput> recognize_seeds() {
+std::vector<FuzzInput> detect_protocol_seeds() {
   std::vector<FuzzInput> seeds;
   for (const char* folder : {"imu", "nlink"}) {
     for (const RecordedFrame& file : recorded_files(folder))
@@ -128,7 +128,7 @@ void check(const PeerMessage& message) {
     CREPES_EXPECT(estimate.T_B_N.covariance.allFinite(), "finite covariances");
 }
 
-/// As it is, and with its checksum set right: else none but the first test would ever be reached.
+/// As it is, and with a valid checksum: otherwise only the first check would be reached.
 void run_peer_message(Bytes data) {
   if (const auto message = decode_peer_message(data)) check(*message);
   if (data.size() < 4) return;
@@ -168,11 +168,11 @@ std::string_view text_of(Bytes data) {
 FuzzInput input_of(std::string_view text) { return {text.begin(), text.end()}; }
 
 void run_subscription(Bytes data) {
-  SubscriptionDesk desk({}, "0", [] { return SystemStatus{}; }, {});
+  SubscriptionService service({}, "0", [] { return SystemStatus{}; }, {});
   const Timestamp now{std::chrono::seconds{1}};
-  const auto local = desk.answer(Endpoint::ipv4({127, 0, 0, 1}, 4000), text_of(data), now);
+  const auto local = service.answer(Endpoint::ipv4({127, 0, 0, 1}, 4000), text_of(data), now);
   CREPES_EXPECT(!local || local->size() <= kMaxSubscriptionDatagram, "answers fit a datagram");
-  const auto remote = desk.answer(Endpoint::ipv4({10, 0, 0, 1}, 4000), text_of(data), now);
+  const auto remote = service.answer(Endpoint::ipv4({10, 0, 0, 1}, 4000), text_of(data), now);
   CREPES_EXPECT(!remote || remote->size() <= data.size(), "nothing is amplified");
 }
 
@@ -182,7 +182,7 @@ std::vector<FuzzInput> subscription_seeds() {
           input_of(R"({"class":"POLL","peer":2,"cookie":"0123456789abcdef"})")};
 }
 
-/// What is valid is still that after it was written and read again.
+/// A valid configuration is still valid after writing and reading it.
 void run_config(Bytes data) {
   const CheckedConfig checked = check_config_text(std::string(text_of(data)), "file");
   if (!checked.faults.empty()) return;
@@ -240,7 +240,7 @@ constexpr std::array kTargets{
                [] { return recorded("imu", "xsens"); }},
     FuzzTarget{"mavlink", [](Bytes data) { run_stream(data, MavlinkParser()); },
                [] { return recorded("imu", "mavlink"); }},
-    FuzzTarget{"recognize", &run_recognize, &recognize_seeds},
+    FuzzTarget{"detect_protocol", &run_detect_protocol, &detect_protocol_seeds},
     FuzzTarget{"device_clock", &run_device_clock, &device_clock_seeds},
     FuzzTarget{"peer_message", &run_peer_message, &peer_message_seeds},
     FuzzTarget{"subscription", &run_subscription, &subscription_seeds},

@@ -1,4 +1,4 @@
-/// What takes bytes from outside, and what must hold of it whatever the bytes are.
+/// All code that receives external bytes, and what must hold for any bytes.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct FuzzTarget {
 /// Aborts when there is no such target.
 [[nodiscard]] const FuzzTarget& fuzz_target(std::string_view name);
 
-/// What earlier runs found worth keeping, in corpus/NAME.hex: an input a line.
+/// Inputs kept from earlier runs, in corpus/NAME.hex: one a line.
 [[nodiscard]] std::vector<FuzzInput> kept_inputs(std::string_view target);
 void keep_inputs(std::string_view target, std::vector<FuzzInput> inputs);
 

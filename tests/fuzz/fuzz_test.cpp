@@ -15,7 +15,7 @@ std::size_t below(Random& random, std::size_t end) {
   return std::uniform_int_distribution<std::size_t>(0, end - 1)(random);
 }
 
-/// One thing that goes wrong on a line, in memory, or in somebody's mind.
+/// One fault on a line, in memory or of a person.
 void damage(FuzzInput& input, const FuzzInput& other, Random& random) {
   constexpr std::array<std::uint8_t, 6> kTelling{0x00, 0x01, 0x7f, 0x80, 0xfe, 0xff};
   if (input.empty()) input.push_back(0);

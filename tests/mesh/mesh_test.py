@@ -1,4 +1,4 @@
-"""Starts the robots of run.sh, waits for what each found out, and judges it."""
+"""Starts the robots of run.sh, waits for the results of each, and checks them."""
 import json
 import pathlib
 import re
@@ -11,12 +11,12 @@ import time
 
 ROBOTS = 4
 SECONDS = 20  # each robot watches its neighbors
-RANGES_M = {1: 5.0, 2: 8.0, 3: 12.4}  # in the simulated line, which wanders 0.6 m about its places
+RANGES_M = {1: 5.0, 2: 8.0, 3: 12.4}  # in the simulated line, where robots move 0.6 m about their places
 source, build = map(pathlib.Path, sys.argv[1:])
 
 
 def links_of(robot, wires):
-    """The ends of wires at a robot, first towards the robots before it."""
+    """The ends of the wires at a robot, first those towards the preceding robots."""
     ends = []
     if robot > 1:
         ends.append(wires[robot - 2][1])
@@ -26,7 +26,7 @@ def links_of(robot, wires):
 
 
 def start(robot, wires, place):
-    """One user-mode Linux; its root is ours, read-only, and `place` is where it can write."""
+    """One user-mode Linux; its root is ours, read-only; it can write to `place`."""
     ends = links_of(robot, wires)
     command = ["linux.uml", "mem=384M", "root=/dev/root", "rootfstype=hostfs", "rootflags=/", "ro", f"uml_dir={place}/",
                f"umid=robot{robot}", f"init={source}/tests/mesh/robot.sh", "con=null", "con0=fd:0,fd:1"]
@@ -40,19 +40,19 @@ def start(robot, wires, place):
 
 
 def write_configurations(place):
-    """The examples' robots in one line, on the mesh, sealed, in a world that is to begin when all are up."""
+    """The examples' robots in one line, on the mesh, sealed, in a world that begins when all have started."""
     subprocess.run([build / "daemon/crepesctl", "keygen", place / "mesh.key"], check=True)
     for robot in range(1, ROBOTS + 1):
         text = (source / f"config/examples/four-simulated/r{robot}.yaml").read_text()
         assert "interface: lo" in text and "scenario: four" in text
-        # Robots are not switched on at the moment at which the world begins.
+        # Robots do not start at the time at which the world begins.
         text = re.sub(r"clock_offset_s: ([-\d.]+)", lambda offset: f"clock_offset_s: {1000 + float(offset[1])}", text)
         text = text.replace("interface: lo", f"interface: bat0, key_file: {place}/mesh.key").replace("scenario: four", "scenario: line, epoch_s: EPOCH")
         (place / f"r{robot}.yaml").write_text(text)
 
 
 def begin_together(robots, place):
-    """Tells the robots when their world began, once all of them have their mesh."""
+    """Sends the robots the time at which their world began, when all have joined the mesh."""
     end = time.monotonic() + 120
     while len(list(place.glob("*.up"))) < ROBOTS:
         if time.monotonic() > end or any(robot.poll() is not None for robot in robots):
@@ -63,11 +63,11 @@ def begin_together(robots, place):
 
 
 def judge(robot, peer, pair):
-    """Whether a robot knew another as it should: most of the time, the right way, about where it is."""
+    """Whether a robot estimated another as expected: most of the time, in the right mode, near the truth."""
     hops = abs(robot - peer)
     way = "direct" if hops == 1 else "graph"
     share = pair["modes"].get(way, 0) / sum(pair["modes"].values())
-    rate_hz = sum(pair["modes"].values()) / (SECONDS - pair["first_s"])  # 50, all the wanted way, where the machine keeps up
+    rate_hz = sum(pair["modes"].values()) / (SECONDS - pair["first_s"])  # 50, all in the expected mode, if the machine is fast enough
     good = (pair["first_s"] < 15 and share > 0.7 and rate_hz > 10
             and abs(pair["median_range_m"] - RANGES_M[hops]) < 1.5)
     print(f"{'ok    ' if good else 'FAILED'} robot {robot} knows robot {peer}, {hops} hop{'s' * (hops > 1)} away: first pose after "

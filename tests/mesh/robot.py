@@ -1,4 +1,4 @@
-"""One robot of mesh_test.py, inside its own Linux: waits for the mesh, runs crepesd, writes down what it finds."""
+"""One robot of mesh_test.py, inside its own Linux: waits for the mesh, runs crepesd, records the results."""
 import collections
 import json
 import os
@@ -21,7 +21,7 @@ def output_of(*command):
 
 
 def others():
-    """Robots that batman-adv knows a way to; the fifth byte of an address is the robot's id."""
+    """Robots that batman-adv has a route to; the fifth byte of an address is the robot's id."""
     known = output_of("batctl", "meshif", "bat0", "originators", "-H")
     return set(re.findall(r"^ \* 02:00:00:00:(\S\S)", known, re.MULTILINE))
 
@@ -45,7 +45,7 @@ config.write_text((here / f"r{robot}.yaml").read_text().replace("EPOCH", repr(ep
 begin = time.monotonic()
 daemon = subprocess.Popen([build / "daemon/crepesd", "--config", config])
 
-subscriber = Subscriber(47474 + robot)  # as the examples have it
+subscriber = Subscriber(47474 + robot)  # the port in the examples
 peers = {}
 for pose, came in subscriber.poses(begin + seconds):
     pair = peers.setdefault(pose["peer"], {"first_s": round(came - begin, 2), "modes": collections.Counter(), "ranges": []})

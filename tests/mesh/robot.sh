@@ -9,11 +9,11 @@ mount -t devpts devpts /dev/pts && mount -t hostfs none /run/place -o "$PLACE"
 ln -s /usr/lib/uml/modules /run/modules/lib/modules
 modprobe -d /run/modules batman-adv && modprobe -d /run/modules sch_netem
 
-# What is different on real robots too; the address of bat0 is made of it.
+# Differs on real robots, too; the address of bat0 is derived from it.
 printf '%032x\n' "$((0x1000 + ROBOT))" >/run/machine-id
 mount --bind /run/machine-id /etc/machine-id
 
-# The files as shipped; a second radio has a file like the first one's.
+# The files as shipped; a second radio needs a file like the first.
 cp /run/place/50-* /run/systemd/network/
 sed 's/wlan0/wlan1/' /run/place/50-mesh-wlan0.network >/run/systemd/network/50-mesh-wlan1.network
 link=0
@@ -23,7 +23,7 @@ while [ "$link" -lt "$LINKS" ]; do
   link=$((link + 1))
 done
 ip link set lo up
-mount -o remount,ro /sys  # tells networkd that there is no udev to wait for
+mount -o remount,ro /sys  # so that networkd does not wait for udev
 /lib/systemd/systemd-networkd &
 
 /usr/bin/python3 -u "$SOURCE/tests/mesh/robot.py"

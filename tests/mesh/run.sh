@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# A real BATMAN mesh of four robots in a line, each a user-mode Linux of its own with the files of systemd/mesh, delay and
-# loss on every hop, and crepesd with simulated sensors. A robot sees only the next one; those two and three hops away it
-# must know through the others. Half a minute on two cores.
+# A real BATMAN mesh of four robots in a line, each in a user-mode Linux with the files of systemd/mesh, delay and
+# loss on every hop, and crepesd with simulated sensors. A robot sees only the next one; it must estimate those two and
+# three hops away through the others. Half a minute on two cores.
 #   tests/mesh/run.sh [BUILD_DIRECTORY]
 set -euo pipefail
 source=$(cd "$(dirname "$0")/../.." && pwd)

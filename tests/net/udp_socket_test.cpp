@@ -25,7 +25,7 @@ std::vector<std::uint8_t> received_by(UdpSocket& socket) {
   return datagram && *datagram ? (*datagram)->bytes : std::vector<std::uint8_t>{};
 }
 
-TEST(UdpSocket, IsHeardByAllWhoShareTheBroadcastPort) {
+TEST(UdpSocket, IsReceivedByAllSocketsOfTheBroadcastPort) {
   auto first = UdpSocket::open_broadcast("lo", some_port());
   auto second = UdpSocket::open_broadcast("lo", some_port());
   auto third = UdpSocket::open_broadcast("lo", some_port());
@@ -56,7 +56,7 @@ TEST_P(Unicast, AnswersTheSenderOfADatagram) {
 
 INSTANTIATE_TEST_SUITE_P(Families, Unicast, testing::Values("127.0.0.1", "::1"));
 
-TEST(UdpSocket, GivesNothingWhenNothingComes) {
+TEST(UdpSocket, ReturnsNothingWhenNothingArrives) {
   auto socket = UdpSocket::bind("127.0.0.1", 0);
   ASSERT_TRUE(socket);
 
@@ -79,7 +79,7 @@ TEST(UdpSocket, KeepsABurstUntilItIsRead) {
   EXPECT_EQ(received, kBurst);
 }
 
-TEST(UdpSocket, CutsHugeDatagrams) {
+TEST(UdpSocket, TruncatesHugeDatagrams) {
   auto socket = UdpSocket::bind("127.0.0.1", 0);
   ASSERT_TRUE(socket);
   ASSERT_TRUE(socket->send_to(std::vector<std::uint8_t>(60000), socket->local()));
@@ -87,7 +87,7 @@ TEST(UdpSocket, CutsHugeDatagrams) {
   EXPECT_EQ(received_by(*socket).size(), UdpSocket::kMaxDatagram);
 }
 
-TEST(UdpSocket, SaysWhatIsWrongAndWhatToDo) {
+TEST(UdpSocket, NamesCauseAndRemedy) {
   auto holder = UdpSocket::bind("127.0.0.1", 0);
   ASSERT_TRUE(holder);
 
@@ -117,7 +117,7 @@ TEST(UdpSocket, ReportsWhatItCannotSend) {
 }
 
 // On a link of its own that passes a kilobyte a second.
-TEST(UdpSocket, TellsACongestedLinkFromABrokenOne) {
+TEST(UdpSocket, DistinguishesACongestedLinkFromABrokenOne) {
   bool is_permitted = false;
   std::optional<Error> refusal;
   std::thread([&] {

@@ -1,7 +1,8 @@
 /// What the tracker alone makes of whole recordings: who is identified, where, and how exactly.
 #include <gtest/gtest.h>
 
-#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "estimator/core/constants.hpp"
 #include "tests/scenario/recorded_swarm.hpp"
 #include "tests/support/bearing_truth.hpp"
 #include "tests/support/places.hpp"
@@ -11,8 +12,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::SeenNeighbor;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 using SeenPairs = std::vector<std::pair<std::string, SeenNeighbor>>;
 
@@ -44,7 +43,7 @@ TEST(Bearings, PointAtTheNeighborsThatWereThere) {
     ASSERT_GT(seen.visible, 300U) << name;
     EXPECT_GT(identified_share(seen), 0.97) << name;
     EXPECT_EQ(seen.wrong, 0U) << name;
-    EXPECT_LT(seen.rms_rad(), 0.06 * kDegree) << name;
+    EXPECT_LT(seen.rms_rad(), 0.06 * kRadPerDeg) << name;
   }
 }
 
@@ -61,7 +60,7 @@ class RecordedBearings : public testing::TestWithParam<const char*> {
 
 TEST_P(RecordedBearings, AreExactAndNeverAnothers) {
   for (const auto& [name, seen] : watch_all(dataset())) {
-    EXPECT_LT(seen.rms_rad(), 0.06 * kDegree) << name;
+    EXPECT_LT(seen.rms_rad(), 0.06 * kRadPerDeg) << name;
     EXPECT_EQ(seen.wrong, 0U) << name;
   }
 }
@@ -89,7 +88,7 @@ TEST_P(MirroringFloor, IsTheOnlyOtherPlaceWhereRobotsAreSeen) {
       const double azimuth = std::atan2(measured_W.y(), measured_W.x());
       const double true_azimuth = std::atan2(true_W.y(), true_W.x());
       EXPECT_LT(std::abs(std::remainder(azimuth - true_azimuth, 2.0 * std::numbers::pi)),
-                2.0 * kDegree)
+                2.0 * kRadPerDeg)
           << name;
     }
 }

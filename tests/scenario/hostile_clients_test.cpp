@@ -13,11 +13,11 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/ctl/child_process.hpp"
-#include "daemon/ctl/csv_file.hpp"
-#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/ctl/demo/child_process.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
-#include "drivers/unique_fd.hpp"
+#include "drivers/base/text_file.hpp"
+#include "drivers/base/unique_fd.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
 
@@ -237,12 +237,12 @@ TEST_F(HostileClients, GetNothingAmplifiedWhoeverTheyPretendToBe) {
                                    log);
   ASSERT_TRUE(child) << child.error().message;
   const Timestamp end = machine_.now() + kPatience;
-  while (!child->ending() && machine_.now() < end) ::poll(nullptr, 0, 50);
+  while (!child->exit_reason() && machine_.now() < end) ::poll(nullptr, 0, 50);
 
   const std::string told = read_text_file(log).value_or("");
   std::printf("%s", told.c_str());
-  if (child->ending() == "exit code 77") GTEST_SKIP() << told;
-  EXPECT_EQ(child->ending(), "exit code 0");
+  if (child->exit_reason() == "exit code 77") GTEST_SKIP() << told;
+  EXPECT_EQ(child->exit_reason(), "exit code 0");
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "daemon/runtime.hpp"
-#include "daemon/sim_stage.hpp"
+#include "daemon/stages/sim_stage.hpp"
 #include "drivers/sim/ring_renderer.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/live_daemon.hpp"
@@ -36,8 +36,9 @@ class LiveCamera : public LiveDaemon {
     simulated_ = pair_config(1, mesh_port_);
     if (!kIsSlow) {
       CameraConfig& camera = simulated_.cameras.front();
-      for (int& side : camera.resolution) side *= 2;
-      for (std::size_t i = 2; i < camera.intrinsics.size(); ++i) camera.intrinsics[i] *= 2.0;
+      for (int& side : camera.calibration.resolution) side *= 2;
+      for (std::size_t i = 2; i < camera.calibration.intrinsics.size(); ++i)
+        camera.calibration.intrinsics[i] *= 2.0;
     }
     world_.emplace(simulated_.sim);
     imu_.emplace(open_sim_imu(*world_, simulated_).value());
@@ -49,20 +50,20 @@ class LiveCamera : public LiveDaemon {
     }
     real_ = simulated_;
     real_.sim.enabled = false;
-    real_.imu.port = imu_->path();
-    real_.uwb.port = uwb_->path();
+    real_.imu.device.port = imu_->path();
+    real_.uwb.device.port = uwb_->path();
     CameraConfig& camera = real_.cameras.front();
-    camera.driver = CameraDriver::kAravis;
-    camera.device = GigeCamera::kAddress;
-    camera.exposure_us = 500;
-    camera.packet_size = 9000;
-    camera.latency_ms = 1.0;
+    camera.device.driver = CameraDriver::kAravis;
+    camera.device.id = GigeCamera::kAddress;
+    camera.device.exposure_us = 500;
+    camera.device.packet_size = 9000;
+    camera.device.latency_ms = 1.0;
   }
 
   /// Shows what robot 1 sees at the time of each picture.
   std::unique_ptr<GigeCamera> plug_camera_in() {
-    auto renderer =
-        RingRenderer::make(*world_, RobotId{1}, simulated_.swarm, simulated_.cameras.front(), 0);
+    auto renderer = RingRenderer::make(*world_, RobotId{1}, simulated_.swarm,
+                                       simulated_.cameras.front().calibration, 0);
     EXPECT_TRUE(renderer) << renderer.error().message;
     auto drawn = std::make_shared<RingRenderer>(std::move(*renderer));
     return std::make_unique<GigeCamera>([this, drawn](std::uint8_t* pixels, int width, int height) {

@@ -48,7 +48,7 @@ TEST_F(LiveDaemon, OpensASerialDeviceThatComesGoesAndComesAgain) {
   const std::filesystem::path port =
       std::filesystem::path(::testing::TempDir()) / ("crepes-imu-" + std::to_string(mesh_port_));
   Config config = without_devices(mesh_port_);
-  config.imu.port = port;
+  config.imu.device.port = port;
   const Runtime runtime(config, machine_);
   Client client(config);
   auto sample = [turn = 0]() mutable {  // what repeats itself is taken for stuck

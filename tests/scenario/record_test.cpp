@@ -1,5 +1,5 @@
 /// What live daemons measure, recorded and replayed.
-#include "daemon/ctl/record.hpp"
+#include "daemon/ctl/dataset/record.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -17,14 +17,14 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/csv_file.hpp"
-#include "daemon/ctl/scratch_directory.hpp"
-#include "daemon/ctl/swarm_dataset.hpp"
-#include "daemon/ctl/swarm_replay.hpp"
-#include "daemon/mesh_key.hpp"
-#include "daemon/recorder_stage.hpp"
+#include "config/keys/mesh_key.hpp"
+#include "daemon/ctl/dataset/swarm_dataset.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "daemon/ctl/replay/swarm_replay.hpp"
+#include "daemon/recording/recorder_stage.hpp"
+#include "daemon/recording/unix_socket.hpp"
 #include "daemon/runtime.hpp"
-#include "daemon/unix_socket.hpp"
+#include "drivers/dataset/csv_file.hpp"
 #include "tests/support/live_daemon.hpp"
 
 namespace crepes {
@@ -84,7 +84,7 @@ TEST_F(Record, ReplaysTogetherWithTheOtherRobotsRecording) {
   const auto& others = from_thread.value();
   ASSERT_TRUE(own) << own.error().message;
   ASSERT_TRUE(others) << others.error().message;
-  EXPECT_EQ(own->why, "--duration is over");
+  EXPECT_EQ(own->end_reason, "--duration is over");
   EXPECT_EQ(own->progress.missing, 0U);
 
   // As swarm.yaml says: the other folder beside this one, and the # off its line.
@@ -155,7 +155,7 @@ TEST_F(Record, StopsAtItsSizeAndRefusesToWriteOverADataSet) {
   const auto recorded = record(wanted);
 
   ASSERT_TRUE(recorded) << recorded.error().message;
-  EXPECT_EQ(recorded->why, "--max-size is reached");
+  EXPECT_EQ(recorded->end_reason, "--max-size is reached");
   EXPECT_LT(recorded->progress.bytes, 100'000U);
   EXPECT_FALSE(record(wanted));
 }
@@ -182,10 +182,10 @@ TEST_F(Record, DropsTheNewestForAToolThatDoesNotReadAndTellsHowMany) {
   RecordQueue events{100, Overflow::kDropNewest};
   std::deque<PictureTap> pictures;
   Counter turns;
-  SettingsQueue settings{1, Overflow::kDropOldest};
-  const StageContext context{machine_, [](SensorStatus) {}, turns, settings};
+  LiveSettings<Config> settings(config);
+  const StageContext context{machine_, [](SensorStatus) {}, turns};
   const Worker recorder("recorder", [&](const std::stop_token& stop) {
-    run_recorder({config, events, pictures}, context, stop);
+    run_recorder({settings, events, pictures}, context, stop);
   });
   await_socket(config);
   UniqueFd lazy = connect_unix(config.recording.socket).value();
@@ -209,7 +209,7 @@ TEST_F(Record, DropsTheNewestForAToolThatDoesNotReadAndTellsHowMany) {
   std::vector<char> chunk(1 << 20);
   std::size_t gap = std::string::npos;
   while (machine_.now() < end && gap == std::string::npos) {
-    measure();  // a gap is told before what comes next
+    measure();  // a gap is reported before the next rows
     const ssize_t count = ::recv(lazy.get(), chunk.data(), chunk.size(), MSG_DONTWAIT);
     if (count < 0 && errno == EAGAIN) {
       wait_for(1ms, {});

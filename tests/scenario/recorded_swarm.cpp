@@ -6,11 +6,11 @@
 #include <iomanip>
 #include <vector>
 
-#include "daemon/config_file.hpp"
-#include "daemon/ctl/demo_swarm.hpp"
-#include "daemon/ctl/robot_folder.hpp"
-#include "daemon/ctl/swarm_manifest.hpp"
-#include "daemon/dataset_rows.hpp"
+#include "config/reading/config_file.hpp"
+#include "daemon/ctl/dataset/swarm_manifest.hpp"
+#include "daemon/ctl/demo/demo_swarm.hpp"
+#include "drivers/dataset/dataset_rows.hpp"
+#include "drivers/dataset/robot_folder.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/sim/ring_renderer.hpp"
 #include "drivers/sim/sim_imu.hpp"
@@ -45,7 +45,7 @@ void record_truth(const fs::path& file, const SimWorld& world, RobotId robot, do
 
 std::string imu_rows(const SimWorld& world, const DemoRobot& robot, double duration_s) {
   std::string rows;
-  SimImu imu(world, robot.config.robot.id, robot.config.imu);
+  SimImu imu(world, robot.config.robot.id, robot.config.imu.noise);
   WitMotionParser parser;
   for (int i = 1; i * 0.01 <= duration_s; ++i) {
     const auto bytes = imu.sample(i * 0.01);
@@ -58,9 +58,9 @@ std::string imu_rows(const SimWorld& world, const DemoRobot& robot, double durat
 std::string range_rows(const SimWorld& world, const DemoRobot& robot, double duration_s) {
   std::string rows;
   const auto module =
-      SimUwb::make(world, robot.config.robot.id, robot.config.swarm, robot.config.uwb);
+      SimUwb::make(world, robot.config.robot.id, robot.config.swarm, robot.config.uwb.noise);
   EXPECT_TRUE(module) << module.error().message;
-  NlinkParser parser(uwb_modules_of(robot.config.swarm), robot.config.uwb.max_range_m);
+  NlinkParser parser(uwb_modules_of(robot.config.swarm), robot.config.uwb.noise.max_range_m);
   for (int i = 1; i * 0.02 <= duration_s; ++i) {
     const double t = i * 0.02 - 0.003;
     const auto bytes = module->sample(t);
@@ -75,8 +75,8 @@ class CameraRecorder {
   CameraRecorder(const SimWorld& world, const DemoRobot& robot, const RecordingOptions& options)
       : robots_(world.robots()),
         self_(robot.config.robot.id),
-        renderer_(
-            RingRenderer::make(world, self_, robot.config.swarm, robot.config.cameras.at(0), 0)),
+        renderer_(RingRenderer::make(world, self_, robot.config.swarm,
+                                     robot.config.cameras.at(0).calibration, 0)),
         detector_(robot.config.vision),
         source_(options.spots) {}
 

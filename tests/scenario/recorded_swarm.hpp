@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "estimator/core/config.hpp"
+#include "config/schema/config.hpp"
 
 namespace crepes::test {
 

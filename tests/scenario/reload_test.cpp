@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/ctl/child_process.hpp"
-#include "daemon/ctl/scratch_directory.hpp"
-#include "daemon/mesh_key.hpp"
+#include "config/keys/mesh_key.hpp"
+#include "daemon/ctl/demo/child_process.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
@@ -70,8 +70,8 @@ TEST_F(Reload, ChangesRatesNoiseAndLimitsWithoutLosingThePose) {
   }));
   Config wanted = first;
   wanted.estimator.output_rate_hz = 10;
-  wanted.uwb.noise_m = 0.2;
-  wanted.imu.gyroscope_noise_density *= 2;
+  wanted.uwb.noise.noise_m = 0.2;
+  wanted.imu.noise.gyroscope_noise_density *= 2;
   wanted.vision.gate_px = 10;
   wanted.graph.rate_hz = 5;
   wanted.net.report_rate_hz = 40;
@@ -166,7 +166,7 @@ TEST_F(Reload, NamesWhatHasToWaitAndRefusesWhatCannotBe) {
   Runtime runtime(first, machine_);
   Client client(first);
   Config wanted = first;
-  wanted.cameras[0].rate_hz = 100;
+  wanted.cameras[0].calibration.rate_hz = 100;
   wanted.log.level = LogLevel::kWarning;
   ASSERT_TRUE(runtime.reconfigure(wanted));
   EXPECT_TRUE(client.await_status([](const Json& status) {
@@ -178,7 +178,7 @@ TEST_F(Reload, NamesWhatHasToWaitAndRefusesWhatCannotBe) {
   std::erase_if(wanted.swarm.members, [](const auto& member) { return member.id == RobotId{1}; });
   const Result<ConfigChange> refused = runtime.reconfigure(wanted);
   ASSERT_FALSE(refused);
-  runtime.tell_reload_refused(refused.error().message);
+  runtime.report_refused_reload(refused.error().message);
 
   EXPECT_NE(refused.error().message.find("1 is not among swarm.members"), std::string::npos);
   EXPECT_TRUE(client.await_status([](const Json& status) {
@@ -193,8 +193,8 @@ TEST_F(Reload, OpensOtherPortsOfMeshSubscriptionAndSensors) {
   Config wanted = first;
   wanted.net.interface = "nosuch0";
   wanted.subscription.port = free_port();
-  wanted.imu.port = "/nowhere/imu";
-  wanted.uwb.port = "/nowhere/uwb";
+  wanted.imu.device.port = "/nowhere/imu";
+  wanted.uwb.device.port = "/nowhere/uwb";
 
   ASSERT_TRUE(runtime.reconfigure(wanted));
 

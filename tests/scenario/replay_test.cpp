@@ -5,12 +5,12 @@
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <sstream>
 
-#include "daemon/ctl/scratch_directory.hpp"
-#include "daemon/ctl/swarm_replay.hpp"
-#include "daemon/ctl/swarm_score.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "daemon/ctl/replay/swarm_replay.hpp"
+#include "daemon/ctl/score/swarm_score.hpp"
+#include "estimator/core/constants.hpp"
 #include "tests/scenario/recorded_swarm.hpp"
 #include "tests/support/places.hpp"
 
@@ -21,8 +21,6 @@ namespace fs = std::filesystem;
 using test::record_swarm;
 using test::RecordingOptions;
 using test::SpotSource;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 class Replay : public testing::Test {
  protected:
@@ -104,7 +102,7 @@ void expect_sound(const SwarmScore& score, double max_clock_error_s) {
 void expect_accuracy(const SwarmScore& score, double median_m, double median_deg) {
   for (const ScoredPair& pair : score.pairs) {
     EXPECT_LE(statistics_of(pair.score.position_errors_m).median, median_m) << name_of(pair);
-    EXPECT_LE(statistics_of(pair.score.rotation_errors_rad).median, median_deg * kDegree)
+    EXPECT_LE(statistics_of(pair.score.rotation_errors_rad).median, median_deg * kRadPerDeg)
         << name_of(pair);
   }
 }
@@ -167,7 +165,7 @@ TEST_F(Replay, PicturesGiveThePosesOfIdealSpots) {
       if (same == other.end()) continue;
       const Vector6d d = pose_difference(pose.T_B_N.pose, same->second);
       meters.push_back(d.head<3>().norm());
-      degrees.push_back(d.tail<3>().norm() / kDegree);
+      degrees.push_back(d.tail<3>().norm() / kRadPerDeg);
     }
     ASSERT_GT(meters.size(), 300U);
     EXPECT_LT(statistics_of(meters).rmse, 0.02);

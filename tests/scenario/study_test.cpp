@@ -6,7 +6,8 @@
 #include <filesystem>
 #include <numbers>
 
-#include "daemon/ctl/scratch_directory.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "estimator/core/constants.hpp"
 #include "tests/study/imu_noise.hpp"
 #include "tests/study/simulated_swarm.hpp"
 #include "tests/study/swarm_writer.hpp"
@@ -17,7 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kAfter = 5.0;  // s
 
 const Scenario& scenario(std::string_view name) {
@@ -59,7 +59,7 @@ TEST_P(PublishedBound, IsReproduced) {
 
   // They know their noise; we read it off the recordings.
   EXPECT_NEAR(std::sqrt(position2 / n) / GetParam().position_m, 1.0, 0.08);
-  EXPECT_NEAR(std::sqrt(rotation2 / n) / (GetParam().rotation_deg * kDegree), 1.0, 0.08);
+  EXPECT_NEAR(std::sqrt(rotation2 / n) / (GetParam().rotation_deg * kRadPerDeg), 1.0, 0.08);
 }
 INSTANTIATE_TEST_SUITE_P(
     Datasets, PublishedBound,

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Installs the package on a copy of this machine, boots that with a real systemd in a container, and does to the
-# service what happens to services: kills, hangs, reloads, faulty files, removal. About a minute; needs root.
+# Installs the package on a copy of this machine, boots the copy with a real systemd in a container, and tests the
+# service: kills, hangs, reloads, faulty files, removal. About a minute; needs root.
 #   tests/service/run.sh [PACKAGE.deb]
-# The copy is an overlay over / in memory: nothing of this machine is changed. It has no network but its own loopback.
+# The copy is an overlay over / in memory: this machine is not changed. Its only network is its own loopback.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 source=$(cd "$here/../.." && pwd)
@@ -20,7 +20,7 @@ mount -t tmpfs -o size=2G tmpfs "$place/memory"
 mkdir "$place"/memory/{upper,work}
 mount -t overlay -o "lowerdir=/,upperdir=$place/memory/upper,workdir=$place/memory/work" overlay "$place/tree"
 
-# Nothing of this machine's own services is to start there; packages may start theirs.
+# No service of this machine may start there; packages may start theirs.
 rm -rf "$place"/tree/etc/systemd/system/* "$place/tree/usr/sbin/policy-rc.d" "$place/tree/var/log/journal"
 mkdir "$place/tree/crepes"
 cp "$package" "$place/tree/crepes/crepes.deb"

@@ -1,4 +1,4 @@
-"""What a real systemd and the package's service do to each other. Run by run.sh as a unit in a container."""
+"""Tests the package's service with a real systemd. Run by run.sh as a unit in a container."""
 import os
 import pathlib
 import re
@@ -10,7 +10,7 @@ import time
 from subscriber import Subscriber
 
 CONFIG = pathlib.Path("/etc/crepes/crepesd.yaml")
-# With the socket for recordings where it is by default.
+# With the default socket for recordings.
 FIRST = re.sub(r"(?m)^recording:.*\n?", "", pathlib.Path("/crepes/r1.yaml").read_text())
 NEIGHBOR = 2
 
@@ -36,7 +36,7 @@ def pid():
 
 
 def awaited(holds, seconds=30.0):
-    """Whether and after how many seconds it holds."""
+    """Whether the condition becomes true, and after how many seconds."""
     begin = time.monotonic()
     while time.monotonic() - begin < seconds:
         if holds():
@@ -46,13 +46,13 @@ def awaited(holds, seconds=30.0):
 
 
 def comes_back(subscriber, what, harm, limit_s):
-    """Does harm to the daemon and measures until another one tells where the neighbor is."""
+    """Damages the daemon and measures the time until a new one publishes the neighbor's pose."""
     before = pid()
     subscriber.drain()
     begin = time.monotonic()
     harm(before)
     replaced, _ = awaited(lambda: pid() not in (0, before) and shown("ActiveState") == "active")
-    subscriber.drain()  # what the old one sent
+    subscriber.drain()  # poses of the old one
     _, came = subscriber.pose(NEIGHBOR)
     seconds = came - begin if came else float("inf")
     check(f"{what}, it is back with a pose within {limit_s} s", replaced and seconds < limit_s, f"{seconds:.2f} s")
@@ -68,7 +68,7 @@ def install():
 
 
 def udev_says(device):
-    """What udev does with one of devices.umockdev when it is plugged in."""
+    """The result of udev for a device of devices.umockdev that is connected."""
     path = f"/sys/devices/pci0000:00/0000:00:14.0/usb1/{device}"
     return run("umockdev-run", "--device=/crepes/devices.umockdev", "--", "udevadm", "test", "--action=add", path)
 
@@ -87,7 +87,7 @@ def device_rules():
 
 
 def give_key():
-    """As systemd/MESH.md says, to this robot and its neighbor."""
+    """Follows systemd/MESH.md for this robot and its neighbor."""
     made = run("crepesctl", "keygen", "/crepes/mesh.key")
     run("install", "-m640", "-gcrepes", "/crepes/mesh.key", "/etc/crepes/")
     for fragments in (pathlib.Path("/etc/crepes/crepesd.d"), pathlib.Path("/crepes/r2.d")):
@@ -151,6 +151,10 @@ def reloading(subscriber):
     check("but is told", told, shown("StatusText"))
     CONFIG.write_text(FIRST)
     run("systemctl", "reload", "crepesd")
+    for _ in range(10):  # longer than WatchdogSec
+        run("systemctl", "kill", "--signal=HUP", "crepesd")
+        time.sleep(0.5)
+    check("reloads one after the other do not end it", pid() == before, shown("Result"))
 
 
 def recording():
@@ -191,7 +195,10 @@ def main():
     stop()
     neighbor.terminate()
     neighbor.wait()
+    journal = run("journalctl", "--no-pager", "-o", "short-monotonic", "-u", "crepesd", "-n", "80").stdout
     remove()
+    if failures:
+        print(journal)
     print(f"{len(failures)} failed" if failures else "the service does what it should")
     sys.exit(bool(failures))
 

@@ -1,4 +1,4 @@
-"""Poses of a crepesd on this machine, as any program on a robot would get them."""
+"""Poses of a crepesd on this machine, as any program on a robot receives them."""
 import json
 import socket
 import time
@@ -12,7 +12,7 @@ class Subscriber:
         self.socket.settimeout(0.02)
 
     def _next(self, request, wanted, seconds):
-        """The first object that is as wanted, and the moment it came; asked for ten times a second."""
+        """The first object that meets the condition, and its arrival; requested ten times a second."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             if time.monotonic() - self.asked > 0.1:
@@ -20,7 +20,7 @@ class Subscriber:
                 try:
                     self.socket.sendto(json.dumps(request).encode(), self.daemon)
                 except OSError:
-                    pass  # nobody there yet
+                    pass  # not started yet
             try:
                 message = json.loads(self.socket.recv(2000))
             except OSError:
@@ -30,7 +30,7 @@ class Subscriber:
         return None, None
 
     def drain(self):
-        """Forgets what came before now."""
+        """Discards what was received before now."""
         self.socket.setblocking(False)
         try:
             while True:
@@ -44,7 +44,7 @@ class Subscriber:
         return self._next({"class": "WATCH", "enable": True}, wanted, seconds)
 
     def poses(self, end):
-        """All poses with the moments at which they came, until the clock shows `end`."""
+        """All poses with their arrivals, until the clock reads `end`."""
         while time.monotonic() < end:
             pose, came = self._next({"class": "WATCH", "enable": True}, lambda m: m["class"] == "POSE",
                                     end - time.monotonic())

@@ -9,15 +9,15 @@
 #include <sstream>
 #include <vector>
 
-#include "daemon/ctl/daemon_client.hpp"
-#include "daemon/ctl/scratch_directory.hpp"
-#include "daemon/logging.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
+#include "daemon/service/logging.hpp"
+#include "drivers/base/monotonic_clock.hpp"
 #include "drivers/imu/witmotion.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "drivers/uwb/nlink_frame.hpp"
 #include "estimator/core/contract.hpp"
-#include "net/peer_message.hpp"
+#include "net/client/daemon_client.hpp"
+#include "net/mesh/peer_message.hpp"
 #include "net/udp_socket.hpp"
 #include "tests/soak/soak_camera.hpp"
 
@@ -27,19 +27,21 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 
+constexpr double kGyroStep = 0.05;  // rad/s
+
 /// The six numbers of sample `number` tell each other: any two samples mixed, or a bit changed,
-/// shows.
+/// shows. From one sample to the next they change as little as a robot's motion does.
 ImuSample sample_of(std::uint32_t number) {
   const unsigned x = number % 16;
   const unsigned y = number / 16 % 16;
   const unsigned z = (x + 3 * y + 5) % 16;
-  return {.gyro_radps = Eigen::Vector3d(x, y, z) * 0.1,
-          .accel_mps2 = Eigen::Vector3d(x, y, z + 10.0) * 0.5};
+  return {.gyro_radps = Eigen::Vector3d(x, y, z) * kGyroStep,
+          .accel_mps2 = Eigen::Vector3d(x, y, z + 60.0) * 0.15};
 }
 
 bool was_sent(const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& accel_mps2) {
   const auto level = [&](Eigen::Index i) {
-    return static_cast<std::uint32_t>(std::lround(std::max(gyro_radps[i], 0.0) / 0.1));
+    return static_cast<std::uint32_t>(std::lround(std::max(gyro_radps[i], 0.0) / kGyroStep));
   };
   const ImuSample sent = sample_of(level(0) + 16 * level(1));
   return (gyro_radps - sent.gyro_radps).norm() < 5e-3 &&
@@ -142,8 +144,8 @@ class Soak {
       member.duty = 0.2 + 0.2 * static_cast<double>(i);
     }
     config.cameras = {camera_.config()};
-    config.imu.port = scratch_.path() / "imu";
-    config.uwb.port = scratch_.path() / "uwb";
+    config.imu.device.port = scratch_.path() / "imu";
+    config.uwb.device.port = scratch_.path() / "uwb";
     config.net.interface = "lo";
     config.net.port = free_port();
     config.subscription.port = free_port();

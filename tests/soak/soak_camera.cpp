@@ -35,16 +35,16 @@ void SoakCamera::write_pictures() const {
 
 CameraConfig SoakCamera::config() const {
   CameraConfig camera;
-  camera.name = "cam0";
+  camera.calibration.name = "cam0";
   const int size = is_gige_ ? 256 : 64;
-  camera.intrinsics = {-0.17, 0.59, size / 4.0, size / 4.0, size / 2.0, size / 2.0};
-  camera.resolution = {size, size};
-  camera.rate_hz = is_gige_ ? 100.0 : 20.0;
-  camera.driver = is_gige_ ? CameraDriver::kAravis : CameraDriver::kFolder;
-  camera.folder = folder_ / "data";
-  camera.device = GigeCamera::kAddress;
-  camera.exposure_us = 500;
-  camera.packet_size = 9000;
+  camera.calibration.intrinsics = {-0.17, 0.59, size / 4.0, size / 4.0, size / 2.0, size / 2.0};
+  camera.calibration.resolution = {size, size};
+  camera.calibration.rate_hz = is_gige_ ? 100.0 : 20.0;
+  camera.device.driver = is_gige_ ? CameraDriver::kAravis : CameraDriver::kFolder;
+  camera.device.folder = folder_ / "data";
+  camera.device.id = GigeCamera::kAddress;
+  camera.device.exposure_us = 500;
+  camera.device.packet_size = 9000;
   return camera;
 }
 

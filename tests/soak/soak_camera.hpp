@@ -6,7 +6,7 @@
 #include <optional>
 #include <random>
 
-#include "estimator/core/config.hpp"
+#include "config/schema/config.hpp"
 #include "estimator/core/time.hpp"
 #include "tests/support/gige_camera.hpp"
 

@@ -25,7 +25,7 @@ Eigen::Vector3d mean_of(const Series& x) {
 }  // namespace
 
 ImuNoise imu_noise(const RobotRecording& robot, const TrueMotion& truth) {
-  const double period_s = 1.0 / robot.config.imu.update_rate;
+  const double period_s = 1.0 / robot.config.imu.noise.update_rate;
   Series gyro;
   Series accel;
   for (const ImuSample& sample : robot.imu) {

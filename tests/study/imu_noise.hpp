@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "daemon/ctl/swarm_dataset.hpp"
+#include "daemon/ctl/dataset/swarm_dataset.hpp"
 #include "tests/study/true_motion.hpp"
 
 namespace crepes::study {

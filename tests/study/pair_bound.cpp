@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daemon/ctl/pair_score.hpp"
+#include "daemon/ctl/score/pair_score.hpp"
 #include "estimator/relative/small_product.hpp"
 #include "tests/study/imu_noise.hpp"
 #include "tests/study/true_motion.hpp"

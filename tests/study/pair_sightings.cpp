@@ -22,7 +22,7 @@ std::optional<Pose> relative(const SwarmTruth& truth, RobotId from, RobotId to, 
 
 void add_sightings(const Swarm& swarm, const RobotRecording& observer, RobotId to,
                    std::size_t camera, std::vector<Sighting>& sightings) {
-  const CameraConfig& config = observer.config.cameras.at(camera);
+  const CameraCalibration& config = observer.config.cameras.at(camera).calibration;
   const CameraModel model = CameraModel::from(config).value();
   const Pose T_B_C = config.T_cam_imu.inverse();
   const Eigen::Vector3d& p_to_led = member_of(swarm.dataset, to).p_body_led;
@@ -89,7 +89,7 @@ OneWay true_sightings(const Swarm& swarm, RobotId from, RobotId to) {
   std::stable_sort(all.sightings.begin(), all.sightings.end(),
                    [](const Sighting& a, const Sighting& b) { return a.true_s < b.true_s; });
 
-  const double late_path_db = observer.config.uwb.late_path_db;
+  const double late_path_db = observer.config.uwb.noise.late_path_db;
   for (const UwbRange& range : observer.ranges) {
     if (range.neighbor != to || range.received_dbm - range.first_path_dbm > late_path_db) continue;
     const double true_s = observer.robot.clock.true_s(range.stamp);

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "daemon/ctl/swarm_dataset.hpp"
-#include "daemon/ctl/truth.hpp"
+#include "daemon/ctl/dataset/swarm_dataset.hpp"
+#include "daemon/ctl/dataset/truth.hpp"
 
 namespace crepes::study {
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/study/load_swarm.hpp"
 #include "tests/study/simulated_swarm.hpp"
 #include "tests/study/study.hpp"
 #include "tests/study/swarm_writer.hpp"
@@ -22,14 +23,6 @@ struct Options {
   double after_s = 5.0;
   std::string write_dir;
 };
-
-Result<Swarm> load(const std::string& dir) {
-  auto dataset = load_swarm(dir);
-  if (!dataset) return tl::unexpected(dataset.error());
-  auto truth = SwarmTruth::load(dir, dataset->manifest);
-  if (!truth) return tl::unexpected(truth.error());
-  return Swarm{std::move(*dataset), std::move(*truth)};
-}
 
 /// Runs one swarm after the other; false if one failed.
 class Study {
@@ -63,7 +56,7 @@ class Study {
 int run(const Options& options) {
   Study study(options);
   for (const std::string& dir : options.sets)
-    if (!study.add(load(dir), dir)) return 1;
+    if (!study.add(load_swarm_with_truth(dir), dir)) return 1;
   study.print();
   for (const Scenario& scenario : kScenarios) {
     const auto& wanted = options.scenarios;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "estimator/core/contract.hpp"
 
@@ -28,27 +29,40 @@ constexpr double kGlintShare = 0.6;
 
 }  // namespace
 
-SimulatedSpots::SimulatedSpots(const SimWorld& world, const Config& config, bool interference)
+SimulatedSpots::SimulatedSpots(const SimWorld& world, const Config& config, Disturbance disturbance)
     : world_(world),
       self_(config.robot.id),
       members_(config.swarm.members),
-      renderer_(RingRenderer::make(world, self_, config.swarm, config.cameras.front(), 0).value()),
-      interference_(interference),
+      renderer_(
+          RingRenderer::make(world, self_, config.swarm, config.cameras.front().calibration, 0)
+              .value()),
+      p_B_C_(config.cameras.front().calibration.T_cam_imu.inverse().p),
+      disturbance_(std::move(disturbance)),
       noise_{kSpotKey, static_cast<std::uint64_t>(world.seed()), self_.value} {}
 
 std::vector<Spot> SimulatedSpots::at(double t_s) {
   std::vector<Spot> spots;
+  if (t_s >= disturbance_.dark_from_s && t_s < disturbance_.dark_to_s) return spots;
   const auto views = renderer_.views(t_s);
   for (const RingRenderer::View& view : views) {
+    if (is_hidden(view.robot, t_s)) continue;
     const double distance = world_.T_B_N(self_, view.robot, t_s).p.norm();
     if (noise_.uniform(drawn_++) < kDropOut) continue;
     add(view.spot, std::hypot(kNearNoise, kNoiseByMeter * distance), spots);
   }
-  if (interference_) {
+  if (disturbance_.interference) {
     add_mirror_images(views, t_s, spots);
     add_lights(t_s, spots);
   }
   return spots;
+}
+
+bool SimulatedSpots::is_hidden(RobotId neighbor, double t_s) const {
+  const auto member = std::find_if(members_.begin(), members_.end(),
+                                   [&](const MemberConfig& m) { return m.id == neighbor; });
+  CREPES_EXPECT(member != members_.end(), "views are of members");
+  return disturbance_.obstacles.blocks_light(world_.T_W_B(self_, t_s) * p_B_C_,
+                                             world_.T_W_B(neighbor, t_s) * member->p_body_led);
 }
 
 void SimulatedSpots::add(Spot spot, double sigma_px, std::vector<Spot>& spots) {

@@ -4,21 +4,32 @@
 #include <cstdint>
 #include <vector>
 
+#include "config/schema/config.hpp"
 #include "drivers/sim/ring_renderer.hpp"
 #include "drivers/sim/seeded_noise.hpp"
+#include "tests/study/obstacles.hpp"
 
 namespace crepes::study {
+
+/// What disturbs a camera beside its own noise.
+struct Disturbance {
+  bool interference = false;  ///< glints, mains lamps, mirror images in the floor
+  ObstacleField obstacles{Obstacles::kNone, 0};
+  double dark_from_s = 0.0;  ///< no spot from here
+  double dark_to_s = 0.0;    ///< to here
+};
 
 /// One robot's first camera: noise that grows with distance, drop-outs, spots that merge; with
 /// interference also glints, lamps on the mains and mirror images in the floor.
 class SimulatedSpots {
  public:
   /// `world` must outlive this.
-  SimulatedSpots(const SimWorld& world, const Config& config, bool interference);
+  SimulatedSpots(const SimWorld& world, const Config& config, Disturbance disturbance);
 
   [[nodiscard]] std::vector<Spot> at(double t_s);
 
  private:
+  [[nodiscard]] bool is_hidden(RobotId neighbor, double t_s) const;
   void add_mirror_images(const std::vector<RingRenderer::View>& views, double t_s,
                          std::vector<Spot>& spots);
   void add_lights(double t_s, std::vector<Spot>& spots);
@@ -28,7 +39,8 @@ class SimulatedSpots {
   RobotId self_;
   std::vector<MemberConfig> members_;
   RingRenderer renderer_;
-  bool interference_;
+  Eigen::Vector3d p_B_C_;
+  Disturbance disturbance_;
   SeededNoise noise_;
   std::uint64_t drawn_ = 0;
 };

@@ -5,12 +5,9 @@
 #include <string>
 #include <utility>
 
-#include "daemon/ctl/demo_swarm.hpp"
+#include "daemon/ctl/demo/demo_swarm.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/sim/sim_imu.hpp"
-#include "drivers/sim/sim_uwb.hpp"
-#include "drivers/uwb/nlink.hpp"
-#include "tests/study/pair_bound.hpp"
 #include "tests/study/simulated_spots.hpp"
 
 namespace crepes::study {
@@ -22,7 +19,7 @@ constexpr std::uint64_t kCalibrationKey = 0x63616c69U;
 std::vector<ImuSample> record_imu(const SimWorld& world, const DemoRobot& robot,
                                   double duration_s) {
   // The robot goes by its configuration, the sensor by what it is.
-  ImuConfig sensor = robot.config.imu;
+  ImuNoise sensor = robot.config.imu.noise;
   const SensorPriors truth;
   sensor.gyroscope_bias_sigma = truth.gyro_bias_radps;
   sensor.accelerometer_bias_sigma = truth.accel_bias_mps2;
@@ -41,27 +38,10 @@ std::vector<ImuSample> record_imu(const SimWorld& world, const DemoRobot& robot,
   return samples;
 }
 
-std::vector<UwbRange> record_ranges(const SimWorld& world, const DemoRobot& robot,
-                                    double duration_s) {
-  const Config& config = robot.config;
-  const SimUwb module = SimUwb::make(world, config.robot.id, config.swarm, config.uwb).value();
-  NlinkParser parser(uwb_modules_of(config.swarm), config.uwb.max_range_m);
-  std::vector<UwbRange> ranges;
-  // Modules take turns.
-  const double phase_s = 0.004 * config.robot.id.value;
-  for (int i = 0; i * 0.02 + phase_s <= duration_s; ++i) {
-    const double t = i * 0.02 + phase_s;
-    const auto bytes = module.sample(t);
-    parser.parse(Bytes(bytes), robot.clock.local(t),
-                 [&ranges](const UwbRange& range) { ranges.push_back(range); });
-  }
-  return ranges;
-}
-
 std::vector<SpotFrame> record_spots(const SimWorld& world, const DemoRobot& robot,
-                                    bool interference, double duration_s) {
-  const CameraConfig& camera = robot.config.cameras.front();
-  SimulatedSpots source(world, robot.config, interference);
+                                    const Disturbance& disturbance, double duration_s) {
+  const CameraCalibration& camera = robot.config.cameras.front().calibration;
+  SimulatedSpots source(world, robot.config, disturbance);
   std::vector<SpotFrame> frames;
   const double period_s = 1.0 / camera.rate_hz;
   const double phase_s = 0.0007 * robot.config.robot.id.value;
@@ -75,7 +55,7 @@ std::vector<SpotFrame> record_spots(const SimWorld& world, const DemoRobot& robo
 /// What calibration leaves beside the camera's misalignment, which the renderer has.
 void miscalibrate(Config& config, int seed) {
   const SeededNoise noise{kCalibrationKey, static_cast<std::uint64_t>(seed), config.robot.id.value};
-  std::vector<double>& intrinsics = config.cameras.front().intrinsics;
+  std::vector<double>& intrinsics = config.cameras.front().calibration.intrinsics;
   for (std::size_t i = 4; i < 6; ++i) intrinsics.at(i) += kPrincipalPointSigma * noise.gaussian(i);
 }
 
@@ -90,11 +70,21 @@ Trajectory record_truth(const SimWorld& world, RobotId robot, double duration_s)
 
 }  // namespace
 
+SensorPriors priors_of(const Scenario& scenario) {
+  SensorPriors priors;
+  if (scenario.ranges == RangeModel::kLinkTrack) priors.range_bias_m = kLinkTrackBias;
+  return priors;
+}
+
 Swarm simulate_swarm(const Scenario& scenario, int seed, double duration_s) {
   SimConfig sim;
   sim.scenario = scenario.world;
   sim.seed = seed;
   const SimWorld world(sim);
+  const Disturbance disturbance{.interference = scenario.interference,
+                                .obstacles = ObstacleField(scenario.obstacles, seed),
+                                .dark_from_s = scenario.dark_from_s,
+                                .dark_to_s = scenario.dark_to_s};
   SwarmDataset dataset;
   dataset.manifest = {.scenario = std::string(scenario.name),
                       .duration_s = duration_s,
@@ -110,9 +100,10 @@ Swarm simulate_swarm(const Scenario& scenario, int seed, double duration_s) {
     RobotRecording recording;
     recording.robot = entry;
     recording.imu = record_imu(world, robot, duration_s);
-    recording.ranges = record_ranges(world, robot, duration_s);
+    recording.ranges = simulated_ranges(world, robot.config, robot.clock, scenario.ranges,
+                                        disturbance.obstacles, duration_s);
     recording.cameras.push_back(
-        {.spots = record_spots(world, robot, scenario.interference, duration_s), .images = {}});
+        {.spots = record_spots(world, robot, disturbance, duration_s), .images = {}});
     miscalibrate(robot.config, seed);
     recording.config = std::move(robot.config);
     dataset.robots.push_back(std::move(recording));

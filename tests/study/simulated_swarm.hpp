@@ -5,8 +5,11 @@
 #include <array>
 #include <string_view>
 
-#include "estimator/core/config.hpp"
+#include "config/schema/config.hpp"
+#include "tests/study/obstacles.hpp"
+#include "tests/study/pair_bound.hpp"
 #include "tests/study/pair_sightings.hpp"
+#include "tests/study/simulated_ranges.hpp"
 
 namespace crepes::study {
 
@@ -16,6 +19,10 @@ struct Scenario {
   SimScenario world = SimScenario::kTwo;
   NetworkModel network{.latency_ms = 3.0, .jitter_ms = 3.0, .loss = 0.02, .seed = 0};
   bool interference = false;  ///< glints, mains lamps, mirror images in the floor
+  Obstacles obstacles = Obstacles::kNone;
+  double dark_from_s = 0.0;  ///< no camera sees anything from here
+  double dark_to_s = 0.0;    ///< to here
+  RangeModel ranges = RangeModel::kSimulated;
 };
 
 inline constexpr std::array kScenarios{
@@ -28,7 +35,16 @@ inline constexpr std::array kScenarios{
     Scenario{.name = "interference", .world = SimScenario::kFour, .interference = true},
     Scenario{.name = "bad-network",
              .world = SimScenario::kFour,
-             .network = {.latency_ms = 5.0, .jitter_ms = 60.0, .loss = 0.33, .seed = 0}}};
+             .network = {.latency_ms = 5.0, .jitter_ms = 60.0, .loss = 0.33, .seed = 0}},
+    Scenario{
+        .name = "cluttered", .world = SimScenario::kFour, .obstacles = Obstacles::kThinPillars},
+    Scenario{.name = "fence", .world = SimScenario::kFour, .obstacles = Obstacles::kFence},
+    Scenario{
+        .name = "blackout", .world = SimScenario::kFour, .dark_from_s = 15.0, .dark_to_s = 30.0},
+    Scenario{.name = "thin-ranges", .world = SimScenario::kFour, .ranges = RangeModel::kLinkTrack}};
+
+/// What constants of the scenario's sensors are drawn from.
+[[nodiscard]] SensorPriors priors_of(const Scenario& scenario);
 
 /// All errors are drawn anew from `seed`: biases and scales of both IMUs, misalignment and
 /// principal point of each camera, range bias of each pair, noise, outliers, drop-outs, the

@@ -2,30 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <numbers>
-#include <optional>
 #include <utility>
 
-#include "daemon/ctl/pair_score.hpp"
-#include "daemon/ctl/swarm_replay.hpp"
+#include "daemon/ctl/score/pair_score.hpp"
 #include "daemon/ctl/text_table.hpp"
+#include "estimator/core/constants.hpp"
+#include "tests/study/replay_scores.hpp"
 
 namespace crepes::study {
 namespace {
-
-using Pair = std::pair<RobotId, RobotId>;
-
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-
-std::vector<Pair> pairs_of(const Swarm& swarm) {
-  std::vector<Pair> pairs;
-  for (const SwarmRobot& observer : swarm.dataset.manifest.robots) {
-    for (const SwarmRobot& neighbor : swarm.dataset.manifest.robots)
-      if (neighbor.id != observer.id) pairs.emplace_back(observer.id, neighbor.id);
-  }
-  return pairs;
-}
 
 void append(std::vector<double>& all, const std::vector<double>& more) {
   all.insert(all.end(), more.begin(), more.end());
@@ -80,7 +65,7 @@ Trial pooled(const std::vector<Trial>& trials) {
 }  // namespace
 
 PairBound swarm_bound(const Swarm& swarm, const SensorPriors& priors, double after_s) {
-  const std::vector<Pair> pairs = pairs_of(swarm);
+  const std::vector<OrderedPair> pairs = pairs_of(swarm);
   const auto n = static_cast<double>(pairs.size());
   PairBound all;
   for (const auto& [observer, neighbor] : pairs) {
@@ -99,27 +84,15 @@ Result<Quality> replay_quality(const Swarm& swarm, Profile profile, double after
   ReplayOptions options;
   options.profile = profile;
   options.graph = false;
-  std::map<Pair, std::vector<NeighborPose>> poses;
-  ReplaySinks sinks;
-  sinks.on_pose = [&poses](RobotId observer, const NeighborPose& pose) {
-    poses[{observer, pose.neighbor}].push_back(pose);
-  };
-  const auto report = replay_dataset(swarm.dataset, std::nullopt, options, sinks);
-  if (!report) return tl::unexpected(report.error());
+  const auto scores = replay_scores(swarm, options, after_s);
+  if (!scores) return tl::unexpected(scores.error());
 
   Quality quality;
   quality.worst_availability = 1.0;
   std::vector<double> position_errors;
   std::vector<double> rotation_errors;
   std::vector<double> nees;
-  for (const Pair& pair : pairs_of(swarm)) {
-    const RobotClock& clock = recording_of(swarm.dataset, pair.first).robot.clock;
-    const auto truth = [&](Timestamp local) {
-      return swarm.truth.relative(pair.first, pair.second, local);
-    };
-    const PairScore score =
-        score_pair(poses[pair], truth, clock.local(0.0),
-                   {clock.local(after_s), clock.local(swarm.dataset.manifest.duration_s)});
+  for (const auto& [pair, score] : *scores) {
     append(position_errors, score.position_errors_m);
     append(rotation_errors, score.rotation_errors_rad);
     append(nees, score.nees);

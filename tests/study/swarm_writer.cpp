@@ -1,10 +1,10 @@
 #include "tests/study/swarm_writer.hpp"
 
-#include "daemon/config_file.hpp"
-#include "daemon/ctl/robot_folder.hpp"
-#include "daemon/ctl/swarm_manifest.hpp"
-#include "daemon/dataset_rows.hpp"
-#include "daemon/number_text.hpp"
+#include "config/reading/config_file.hpp"
+#include "daemon/ctl/dataset/swarm_manifest.hpp"
+#include "drivers/base/number_text.hpp"
+#include "drivers/dataset/dataset_rows.hpp"
+#include "drivers/dataset/robot_folder.hpp"
 
 namespace crepes::study {
 namespace {

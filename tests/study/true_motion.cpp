@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/sim/motion.hpp"
 #include "estimator/core/contract.hpp"
 
 namespace crepes::study {
 namespace {
 
 constexpr double kStep = 0.01;  // s; the truth's own
-constexpr double kGravity = 9.81;
 
 }  // namespace
 
@@ -20,9 +20,10 @@ TrueMotion::TrueMotion(const SwarmTruth& truth, RobotId robot, double duration_s
     const auto after = truth.pose(robot, (i + 1) * kStep);
     if (!before || !here || !after) break;
     const Eigen::Vector3d a_W = (after->p - 2.0 * here->p + before->p) / (kStep * kStep);
-    samples_.push_back({.v_W_B = (after->p - before->p) / (2.0 * kStep),
-                        .w_B = so3_log(before->q.conjugate() * after->q) / (2.0 * kStep),
-                        .f_B = here->q.conjugate() * (a_W + kGravity * Eigen::Vector3d::UnitZ())});
+    samples_.push_back(
+        {.v_W_B = (after->p - before->p) / (2.0 * kStep),
+         .w_B = so3_log(before->q.conjugate() * after->q) / (2.0 * kStep),
+         .f_B = here->q.conjugate() * (a_W + kWorldGravityMps2 * Eigen::Vector3d::UnitZ())});
   }
   CREPES_EXPECT(samples_.size() > 1, "a path of more than a moment");
 }

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "daemon/ctl/truth.hpp"
+#include "daemon/ctl/dataset/truth.hpp"
 
 namespace crepes::study {
 

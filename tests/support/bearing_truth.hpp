@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <vector>
 
-#include "daemon/ctl/swarm_dataset.hpp"
-#include "daemon/ctl/truth.hpp"
+#include "daemon/ctl/dataset/swarm_dataset.hpp"
+#include "daemon/ctl/dataset/truth.hpp"
 #include "drivers/camera/image_folder.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/vision/blink_tracker.hpp"
 #include "estimator/vision/spot_detector.hpp"
 
@@ -59,8 +59,8 @@ inline void detect_spots(RobotRecording& robot) {
 /// Runs the tracker alone over what `robot`'s first camera recorded, from `after` its first frame.
 inline std::map<RobotId, SeenNeighbor> watch_neighbors(const RobotRecording& robot,
                                                        const SwarmTruth& truth, Duration after) {
-  constexpr double kSpotRadius = 0.6 * std::numbers::pi / 180.0;  // mounting error and noise
-  const CameraConfig& camera = robot.config.cameras.front();
+  constexpr double kSpotRadius = radians(0.6);  // mounting error and noise
+  const CameraCalibration& camera = robot.config.cameras.front().calibration;
   const CameraModel model = CameraModel::from(camera).value();
   const IdLibrary library = IdLibrary::from(robot.config.swarm).value();
   BlinkTracker tracker(camera, model, robot.config.vision, library, robot.robot.id);

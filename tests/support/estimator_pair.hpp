@@ -8,10 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/core/constants.hpp"
 #include "estimator/swarm/estimator.hpp"
 #include "estimator/vision/camera_model.hpp"
 #include "estimator/vision/id_library.hpp"
-#include "net/peer_link.hpp"
+#include "net/mesh/peer_link.hpp"
 #include "tests/support/simulated_pair.hpp"
 
 namespace crepes::test {
@@ -43,9 +44,9 @@ class EstimatorPair {
   };
 
   explicit EstimatorPair(std::uint64_t seed)
-      : pair_(seed, noise()), config_(config_of(pair_)), estimator_(config_) {
+      : pair_(seed, noise()), settings_(settings_of(pair_)), estimator_(settings_) {
     RandomGeometry random(seed + 1'000'000);  // apart from the pair's
-    for (const CameraConfig& camera : config_.cameras)
+    for (const CameraCalibration& camera : settings_.cameras)
       cameras_.push_back({CameraModel::from(camera).value(), camera.T_cam_imu.inverse(),
                           random.vector(noise().priors.misalignment_rad)});
     cameras_.front().misalignment = pair_.truth({}).misalignment_B;
@@ -56,9 +57,9 @@ class EstimatorPair {
   }
 
   /// Our estimator goes on with other settings.
-  void reconfigure(const std::function<void(Config&)>& change) {
-    change(config_);
-    estimator_.reconfigure(config_);
+  void reconfigure(const std::function<void(EstimatorSettings&)>& change) {
+    change(settings_);
+    estimator_.reconfigure(settings_);
   }
 
   /// Our clock goes on from elsewhere, or the neighbor starts anew with another clock.
@@ -76,12 +77,13 @@ class EstimatorPair {
     return found_.empty() || found_.back().at != last_tick_ ? nullptr : &found_.back();
   }
   [[nodiscard]] NeighborStatus status() const { return estimator_.status().neighbors.at(0); }
+  [[nodiscard]] EstimatorStatus estimator_status() const { return estimator_.status(); }
   [[nodiscard]] std::uint64_t count(MeasurementKind kind, Verdict verdict) const {
     return status()
         .measurements.at(static_cast<std::size_t>(kind))
         .at(static_cast<std::size_t>(verdict));
   }
-  [[nodiscard]] const Config& config() const { return config_; }
+  [[nodiscard]] const EstimatorSettings& settings() const { return settings_; }
   /// From now on all events are also written down.
   void log_to(std::vector<Event>& log) { log_ = &log; }
   [[nodiscard]] Timestamp own_time(Duration t) const { return Timestamp{t + own_clock_}; }
@@ -110,22 +112,22 @@ class EstimatorPair {
   }
 
   /// A camera ahead and one 6 cm behind it, which see all around between them.
-  static Config config_of(const SimulatedPair& pair) {
-    Config config;
-    config.robot.id = kSelf;
-    config.swarm.members.resize(2);
-    config.swarm.members[0].id = kSelf;
-    config.swarm.members[0].pattern = "011111111111111111";
-    config.swarm.members[0].p_body_led = pair.mounting_B.led;
-    config.swarm.members[0].p_body_uwb = pair.mounting_B.antenna;
-    config.swarm.members[1].id = kOther;
-    config.swarm.members[1].pattern = "001001011111111111";
-    config.swarm.members[1].p_body_led = pair.mounting_N.led;
-    config.swarm.members[1].p_body_uwb = pair.mounting_N.antenna;
+  static EstimatorSettings settings_of(const SimulatedPair& pair) {
+    EstimatorSettings settings;
+    settings.self = kSelf;
+    settings.swarm.members.resize(2);
+    settings.swarm.members[0].id = kSelf;
+    settings.swarm.members[0].pattern = "011111111111111111";
+    settings.swarm.members[0].p_body_led = pair.mounting_B.led;
+    settings.swarm.members[0].p_body_uwb = pair.mounting_B.antenna;
+    settings.swarm.members[1].id = kOther;
+    settings.swarm.members[1].pattern = "001001011111111111";
+    settings.swarm.members[1].p_body_led = pair.mounting_N.led;
+    settings.swarm.members[1].p_body_uwb = pair.mounting_N.antenna;
     Eigen::Matrix3d R_B_C;  // x to the right, y down, z ahead
     R_B_C << 0, 0, 1, -1, 0, 0, 0, -1, 0;
     for (const double heading : {0.0, std::numbers::pi}) {
-      CameraConfig camera;
+      CameraCalibration camera;
       camera.name = heading == 0.0 ? "ahead" : "behind";
       camera.intrinsics = {-0.1723, 0.5931, 316.9, 316.8, 638.2, 512.5};
       camera.resolution = {1280, 1024};
@@ -133,22 +135,22 @@ class EstimatorPair {
       const Eigen::Vector3d p_B_C =
           pair.mounting_B.camera - Eigen::Vector3d(heading == 0.0 ? 0.0 : 0.06, 0.0, 0.0);
       camera.T_cam_imu = Pose{p_B_C, q_B_C}.inverse();
-      config.cameras.push_back(camera);
+      settings.cameras.push_back(camera);
     }
     const double root_period = std::sqrt(to_seconds(SimulatedPair::kImuPeriod));
     const PairNoise n = noise();
-    config.imu.gyroscope_noise_density = n.gyro * root_period;
-    config.imu.accelerometer_noise_density = n.accel * root_period;
-    config.imu.gyroscope_bias_sigma = n.priors.gyro_bias_radps;
-    config.imu.accelerometer_bias_sigma = n.priors.accel_bias_mps2;
-    config.imu.gyroscope_scale_sigma = n.priors.gyro_scale;
-    config.imu.accelerometer_scale_sigma = n.priors.accel_scale;
-    config.uwb.noise_m = n.range;
-    config.uwb.bias_sigma_m = n.priors.range_bias_m;
-    config.vision.bearing_sigma_px = n.bearing * 316.9;
-    config.estimator.camera_misalignment_deg = n.priors.misalignment_rad * 180.0 / std::numbers::pi;
-    config.graph.enabled = false;
-    return config;
+    settings.imu.gyroscope_noise_density = n.gyro * root_period;
+    settings.imu.accelerometer_noise_density = n.accel * root_period;
+    settings.imu.gyroscope_bias_sigma = n.priors.gyro_bias_radps;
+    settings.imu.accelerometer_bias_sigma = n.priors.accel_bias_mps2;
+    settings.imu.gyroscope_scale_sigma = n.priors.gyro_scale;
+    settings.imu.accelerometer_scale_sigma = n.priors.accel_scale;
+    settings.range.noise_m = n.range;
+    settings.range.bias_sigma_m = n.priors.range_bias_m;
+    settings.vision.bearing_sigma_px = n.bearing * 316.9;
+    settings.filters.camera_misalignment_deg = kDegPerRad * n.priors.misalignment_rad;
+    settings.solves_graph = false;
+    return settings;
   }
 
   void advance(const Conditions& with) {
@@ -208,7 +210,7 @@ class EstimatorPair {
   void look(const Conditions& with) {
     static constexpr Duration kHandover = std::chrono::milliseconds{100};
     static constexpr Duration kPhase = std::chrono::microseconds{37123};  // of the neighbor's board
-    const IdLibrary library = IdLibrary::from(config_.swarm).value();
+    const IdLibrary library = IdLibrary::from(settings_.swarm).value();
     const bool is_lit = with.in_view && library.entries()[1].code.is_lit(now_ + kPhase);
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
       SpotFrame frame{own_time(now_), static_cast<std::uint8_t>(k), {}};
@@ -254,7 +256,7 @@ class EstimatorPair {
   }
 
   SimulatedPair pair_;
-  Config config_;
+  EstimatorSettings settings_;
   Estimator estimator_;
   std::vector<Camera> cameras_;
   PeerLink own_link_{kSelf, {kSelf, kOther}};

@@ -15,7 +15,7 @@
 #include <memory>
 #include <string>
 
-#include "drivers/unique_fd.hpp"
+#include "drivers/base/unique_fd.hpp"
 
 namespace crepes {
 

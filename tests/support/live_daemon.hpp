@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/config_file.hpp"
-#include "daemon/logging.hpp"
-#include "drivers/monotonic_clock.hpp"
+#include "config/reading/config_file.hpp"
+#include "daemon/service/logging.hpp"
+#include "drivers/base/monotonic_clock.hpp"
 #include "drivers/sim/sim_clock.hpp"
 #include "drivers/sim/world.hpp"
 #include "net/udp_socket.hpp"
@@ -42,8 +42,9 @@ inline Config pair_config(std::uint16_t id, int mesh_port) {
   // Two robots render and search 400 frames a second; a sanitizer makes pixels ten times as dear.
   const int binning = kIsSanitized ? 4 : 2;
   CameraConfig& camera = config.cameras.front();
-  for (int& side : camera.resolution) side /= binning;
-  for (std::size_t i = 2; i < camera.intrinsics.size(); ++i) camera.intrinsics[i] /= binning;
+  for (int& side : camera.calibration.resolution) side /= binning;
+  for (std::size_t i = 2; i < camera.calibration.intrinsics.size(); ++i)
+    camera.calibration.intrinsics[i] /= binning;
   config.net.port = mesh_port;
   config.subscription.port = free_port();
   return config;

@@ -126,7 +126,7 @@ class RingScene {
 
 /// A camera of 185 degrees, small enough to render a sweep of pictures quickly.
 inline CameraModel small_fisheye() {
-  CameraConfig config;
+  CameraCalibration config;
   config.intrinsics = {-0.1723, 0.5931, 316.8, 316.6, 160.2, 127.6};
   config.resolution = {320, 256};
   return CameraModel::from(config).value();
@@ -138,8 +138,7 @@ inline Pose random_board(std::mt19937& random, double range_m, double tilt_rad) 
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   const Eigen::Vector3d toward =
       Eigen::Vector3d(0.15 * part(random), 0.12 * part(random), 1.0).normalized();
-  const Eigen::Quaterniond facing =
-      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), -toward);
+  const Eigen::Quaterniond facing = shortest_rotation(Eigen::Vector3d::UnitX(), -toward);
   const double roll = std::numbers::pi * part(random);
   const double around = std::numbers::pi * part(random);
   const Eigen::Quaterniond tilt =

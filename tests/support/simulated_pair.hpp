@@ -4,7 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "estimator/relative/imu_history.hpp"
+#include "estimator/core/constants.hpp"
+#include "estimator/core/imu_history.hpp"
 #include "estimator/relative/neighbor_filter.hpp"
 #include "estimator/relative/raw_pose.hpp"
 #include "tests/support/random_geometry.hpp"
@@ -116,7 +117,7 @@ class SimulatedPair {
                           const ImuBias& bias) {
       const Eigen::Vector3d true_up = T_W_X.q.conjugate() * Eigen::Vector3d::UnitZ();
       const Eigen::Vector3d up =
-          (true_up + bias.accel_scale * true_up + bias.accel_mps2 / 9.80665).normalized();
+          (true_up + bias.accel_scale * true_up + bias.accel_mps2 / kGravityMps2).normalized();
       return Sighting{
           .u = u.u,
           .up = (up + tangent_basis(up) * random_.normal_vector<2>(noise_.tilt)).normalized(),
@@ -158,7 +159,7 @@ class SimulatedPair {
     const Pose after = flight.T_W_B(t + dt);
     const Eigen::Vector3d w = so3_log(before.q.conjugate() * after.q) / dt;
     const Eigen::Vector3d f_W =
-        (flight.v_W_B(t + dt) - flight.v_W_B(t)) / dt + 9.80665 * Eigen::Vector3d::UnitZ();
+        (flight.v_W_B(t + dt) - flight.v_W_B(t)) / dt + kGravityMps2 * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d f = flight.T_W_B(t + 0.5 * dt).q.conjugate() * f_W;
     return {sampled_ + kImuPeriod,
             w + bias.gyro_scale * w + bias.gyro_radps + random_.vector(noise_.gyro),

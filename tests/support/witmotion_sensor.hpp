@@ -5,8 +5,8 @@
 #include <stop_token>
 #include <vector>
 
+#include "drivers/base/monotonic_clock.hpp"
 #include "drivers/imu/witmotion.hpp"
-#include "drivers/monotonic_clock.hpp"
 #include "drivers/sim/pseudo_terminal.hpp"
 #include "tests/support/hex.hpp"
 

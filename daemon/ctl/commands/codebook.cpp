@@ -1,4 +1,4 @@
-#include "daemon/ctl/codebook.hpp"
+#include "daemon/ctl/setup/codebook.hpp"
 
 #include <unistd.h>
 
@@ -19,28 +19,28 @@ Result<void> run_codebook(CodebookOptions options, const std::string& out) {
   }
   const Result<std::string> text = codebook(options);
   if (options.search.on_progress) std::fputs("\r", stderr);
-  return text.and_then([&](const std::string& library) { return deliver(library, out); });
+  return text.and_then([&](const std::string& library) { return write_output(library, out); });
 }
 
 }  // namespace
 
 void add_codebook(CommandLine& line) {
-  auto& options = line.keep<CodebookOptions>();
-  auto& out = line.keep<std::string>();
-  CLI::App* sub =
-      line.add("codebook",
-               "Search blink patterns that a camera tells apart and write them as swarm.members");
-  sub->add_option("--ids", options.ids, "how many")->capture_default_str();
+  auto& options = line.make<CodebookOptions>();
+  auto& out = line.make<std::string>();
+  CLI::App* sub = line.add(
+      "codebook",
+      "Search blink patterns that a camera can distinguish and write them as swarm.members");
+  sub->add_option("--ids", options.ids, "number of patterns")->capture_default_str();
   sub->add_option("--slots", options.rules.slots, "length of a pattern, 8 to 32")
       ->capture_default_str();
   sub->add_option("--distance", options.rules.distance,
                   "slots in which any two patterns differ, however they are shifted")
       ->capture_default_str();
-  sub->add_option("--max-dark", options.rules.max_dark, "dark slots in a row")
+  sub->add_option("--max-dark", options.rules.max_dark, "maximum number of dark slots in a row")
       ->capture_default_str();
-  sub->add_option("--seed", options.search.seed, "of the search")->capture_default_str();
-  sub->add_option("--out", out, "file; left out: standard output");
-  add_json_flag(sub, options.json, "the section swarm, good for a configuration, too");
+  sub->add_option("--seed", options.search.seed, "seed of the search")->capture_default_str();
+  sub->add_option("--out", out, "output file; default: standard output");
+  add_json_flag(sub, options.json, "the section swarm, which is also valid in a configuration");
   line.run(sub, [&options, &out] { return run_codebook(options, out); });
 }
 

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "daemon/ctl/live_screen.hpp"
+#include "daemon/ctl/live/live_screen.hpp"
 
 namespace crepes {
 
@@ -29,7 +29,7 @@ Result<void> print_result(const Result<std::string>& text) {
   return fail(ErrorCode::kIo, "standard output: " + std::generic_category().message(errno));
 }
 
-Result<void> deliver(const std::string& text, const std::string& file) {
+Result<void> write_output(const std::string& text, const std::string& file) {
   if (file.empty()) return print_result(text);
   std::ofstream out(file, std::ios::binary);
   out << text;

@@ -1,4 +1,4 @@
-/// How a subcommand puts itself on crepesctl's command line.
+/// How a subcommand registers itself on the command line of crepesctl.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,28 +9,28 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/daemon_client.hpp"
-#include "estimator/core/config.hpp"
+#include "config/schema/config.hpp"
 #include "estimator/core/result.hpp"
+#include "net/client/daemon_client.hpp"
 
 namespace crepes {
 
-/// What was asked for; runs after all options have been read.
+/// The selected subcommand; it runs after all options have been read.
 using Command = std::function<Result<void>()>;
 
 class CommandLine {
  public:
   explicit CommandLine(CLI::App& app) : app_(app) {}
 
-  /// A subcommand, and options that live as long as this.
+  /// Adds a subcommand.
   CLI::App* add(const std::string& name, const std::string& help) {
     return app_.add_subcommand(name, help);
   }
   template <class Options>
-  Options& keep() {
+  Options& make() {
     return std::any_cast<Options&>(kept_.emplace_back(Options{}));
   }
-  /// What `sub` does.
+  /// Sets what `sub` does.
   void run(CLI::App* sub, const Command& command) {
     sub->callback([this, command] { command_ = command; });
   }
@@ -44,7 +44,7 @@ class CommandLine {
   Command command_;
 };
 
-/// An option that takes one of the names of an enumeration.
+/// An option whose value is one of the names of an enumeration.
 template <class Enum, std::size_t N, class Set>
 void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<Enum>, N>& choices,
                 const Set& set, const std::string& help) {
@@ -61,19 +61,20 @@ void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<
       ->check(CLI::IsMember(names));
 }
 
-/// --address and --port of the daemon that is asked.
+/// --address and --port of the daemon.
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon);
 
-/// --json, which means the same everywhere: `daemon/ctl/json_line.hpp`. `which` says what objects.
+/// --json, which means the same for all subcommands: see `daemon/ctl/json_line.hpp`. `which`
+/// describes the objects.
 void add_json_flag(CLI::App* sub, bool& json, const std::string& which = "one object");
 
-/// Prints the text, or hands the error on; an error also when nobody takes the text.
+/// Prints the text, or returns its error. A failure to write is an error, too.
 [[nodiscard]] Result<void> print_result(const Result<std::string>& text);
 
-/// To a file, or to standard output where none is named.
-[[nodiscard]] Result<void> deliver(const std::string& text, const std::string& file);
+/// Writes to `file`, or to standard output if the name is empty.
+[[nodiscard]] Result<void> write_output(const std::string& text, const std::string& file);
 
-/// Shows a share from 0 to 1 on standard error; empty if that is not a terminal.
+/// Shows progress (0 to 1) on standard error; empty if that is not a terminal.
 [[nodiscard]] std::function<void(double)> progress_on_terminal();
 
 }  // namespace crepes

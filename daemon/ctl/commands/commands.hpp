@@ -25,7 +25,7 @@ void add_status(CommandLine& line);
 void add_waitpose(CommandLine& line);
 void add_watch(CommandLine& line);
 
-/// In the order of --help: what runs, what was recorded, what is set up.
+/// In the order of --help: running daemons, recordings, setup.
 inline constexpr std::array kCommands{&add_status,   &add_watch,     &add_sources,
                                       &add_waitpose, &add_record,    &add_replay,
                                       &add_evaluate, &add_plot,      &add_spots,

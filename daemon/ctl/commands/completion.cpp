@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <set>
 #include <sstream>
 
@@ -7,7 +9,7 @@
 namespace crepes {
 namespace {
 
-/// "--address --port --json replay ...": what may follow a command.
+/// The words that may follow a command, as in "--address --port --json".
 std::string words_of(const CLI::App& app) {
   std::string words;
   for (const CLI::Option* option : app.get_options())
@@ -17,14 +19,17 @@ std::string words_of(const CLI::App& app) {
   return words.empty() ? words : words.substr(1);
 }
 
-/// One case for a command and those below it; `path` is what leads there.
+/// Writes one case for a command and for each command below it. `path` is the list of commands
+/// above.
 void write_cases(const CLI::App& app, const std::string& path, std::ostream& out) {
   out << "    \"" << path << "\") words=\"" << words_of(app) << "\" ;;\n";
-  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; }))
-    write_cases(*sub, path.empty() ? sub->get_name() : path + " " + sub->get_name(), out);
+  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
+    write_cases(*sub, path.empty() ? sub->get_name() : fmt::format("{} {}", path, sub->get_name()),
+                out);
+  }
 }
 
-/// The commands of all levels: words of the line that lead further.
+/// Collects the commands of all levels.
 void collect_names(const CLI::App& app, std::set<std::string>& names) {
   for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
     names.insert(sub->get_name());
@@ -63,8 +68,9 @@ std::string bash_completion(const CLI::App& app) {
 }  // namespace
 
 void add_completion(CommandLine& line) {
-  auto& shell = line.keep<std::string>();
-  CLI::App* sub = line.add("completion", "Print a script that completes crepesctl's words");
+  auto& shell = line.make<std::string>();
+  CLI::App* sub = line.add("completion",
+                           "Print a shell script that completes crepesctl's commands and options");
   sub->add_option("SHELL", shell, "bash")->required()->check(CLI::IsMember({"bash"}));
   line.run(sub, [&line] { return print_result(bash_completion(line.app())); });
 }

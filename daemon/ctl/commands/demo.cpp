@@ -1,4 +1,4 @@
-#include "daemon/ctl/demo.hpp"
+#include "daemon/ctl/demo/demo.hpp"
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
@@ -19,24 +19,25 @@ Result<void> run_demo(DemoOptions options, bool json) {
 }  // namespace
 
 void add_demo(CommandLine& line) {
-  auto& options = line.keep<DemoOptions>();
-  auto& json = line.keep<bool>();
+  auto& options = line.make<DemoOptions>();
+  auto& json = line.make<bool>();
   CLI::App* sub = line.add(
       "demo", "Start real daemons in a simulated world and compare their poses with its truth");
-  sub->add_option("--for", options.for_s, "seconds")
+  sub->add_option("--for", options.for_s, "duration in seconds")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 600.0));
   add_choice(
       sub, "--scenario", kSimScenarios,
       [&options](SimScenario scenario) { options.scenario = scenario; },
-      "what the robots do; four if left out");
-  sub->add_option("--seed", options.seed, "of the world")
+      "what the robots do; default: four");
+  sub->add_option("--seed", options.seed, "seed of the world")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
-  sub->add_option("--port", options.port, "the first robot's subscription; the others follow")
+  sub->add_option("--port", options.port,
+                  "UDP port of the first robot's subscription; the others follow")
       ->capture_default_str()
       ->check(CLI::Range(1024, 65000));
-  sub->add_option("--keep", options.keep, "directory in which configurations and logs stay");
+  sub->add_option("--keep", options.keep, "directory in which configurations and logs are kept");
   add_json_flag(sub, json, "one object at the end");
   line.run(sub, [&options, &json] { return run_demo(options, json); });
 }

@@ -1,4 +1,4 @@
-#include "daemon/ctl/devices.hpp"
+#include "daemon/ctl/setup/devices.hpp"
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
@@ -6,9 +6,9 @@
 namespace crepes {
 
 void add_devices(CommandLine& line) {
-  auto& options = line.keep<DevicesOptions>();
-  CLI::App* sub = line.add(
-      "devices", "List cameras and serial devices, and what to write into the configuration");
+  auto& options = line.make<DevicesOptions>();
+  CLI::App* sub =
+      line.add("devices", "List cameras and serial devices with their lines for the configuration");
   add_json_flag(sub, options.json);
   line.run(sub, [&options] { return print_result(list_devices(options)); });
 }

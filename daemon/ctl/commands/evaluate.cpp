@@ -1,4 +1,4 @@
-#include "daemon/ctl/evaluate.hpp"
+#include "daemon/ctl/score/evaluate.hpp"
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
@@ -6,18 +6,18 @@
 namespace crepes {
 
 void add_evaluate(CommandLine& line) {
-  auto& options = line.keep<EvaluateOptions>();
+  auto& options = line.make<EvaluateOptions>();
   CLI::App* sub =
       line.add("evaluate",
                "Compare the poses of a replay with ground truth: errors without alignment "
                "(ATE), availability, consistency, clocks");
-  sub->add_option("DIR", options.results, "what replay wrote")->required();
+  sub->add_option("DIR", options.results, "output directory of replay")->required();
   sub->add_option("--truth", options.swarm, "the data set, with its truth/")->required();
   sub->add_option("--after", options.after_s, "seconds at the start that are not scored")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
   sub->add_option("--against", options.against,
-                  "other results of the same data set; both are scored over common rows");
+                  "other results of the same data set; both are scored over their common rows");
   add_json_flag(sub, options.json);
   line.run(sub, [&options] {
     options.on_progress = progress_on_terminal();

@@ -1,4 +1,4 @@
-#include "daemon/ctl/import_calibration.hpp"
+#include "daemon/ctl/setup/import_calibration.hpp"
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
@@ -6,19 +6,19 @@
 namespace crepes {
 
 void add_import_calibration(CommandLine& line) {
-  auto& files = line.keep<std::vector<std::filesystem::path>>();
-  auto& out = line.keep<std::string>();
-  auto& json = line.keep<bool>();
+  auto& files = line.make<std::vector<std::filesystem::path>>();
+  auto& out = line.make<std::string>();
+  auto& json = line.make<bool>();
   CLI::App* sub = line.add(
       "import-calibration",
       "Read calibrations of Kalibr (camchain-imucam.yaml, imu.yaml) or Basalt (calibration.json) "
       "and write the sections cameras and imu of a configuration");
-  sub->add_option("FILE", files, "calibration files; together one robot's")->required();
-  sub->add_option("--out", out, "file; left out: standard output");
-  add_json_flag(sub, json, "these sections, good for a configuration, too");
+  sub->add_option("FILE", files, "calibration files of one robot")->required();
+  sub->add_option("--out", out, "output file; default: standard output");
+  add_json_flag(sub, json, "these sections, which are also valid in a configuration");
   line.run(sub, [&files, &out, &json] {
     return import_calibration(files, json).and_then([&](const std::string& text) {
-      return deliver(text, out);
+      return write_output(text, out);
     });
   });
 }

@@ -1,4 +1,4 @@
-#include "daemon/ctl/led.hpp"
+#include "daemon/ctl/setup/led.hpp"
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
@@ -19,20 +19,21 @@ CLI::App* add_led_command(CommandLine& line, CLI::App* led, const std::string& n
 }  // namespace
 
 void add_led(CommandLine& line) {
-  auto& options = line.keep<LedOptions>();
+  auto& options = line.make<LedOptions>();
   CLI::App* led = line.add("led", "Program the board that blinks a robot's ID");
   led->add_option("--port", options.port, "its serial line")->required();
   led->require_subcommand(1);
   CLI::App* set = add_led_command(
-      line, led, "set", "Keep an ID's pattern on the board and read it back", led_set, options);
-  set->add_option("--id", options.id, "the robot's")->required()->check(CLI::Range(1, 65534));
+      line, led, "set", "Store a robot's pattern on the board and read it back", led_set, options);
+  set->add_option("--id", options.id, "id of the robot")->required()->check(CLI::Range(1, 65534));
   set->add_option("--library", options.library, "a configuration or library with swarm.members")
       ->required();
-  set->add_option("--brightness", options.brightness, "in percent: of all LEDs, or of each of six")
+  set->add_option("--brightness", options.brightness,
+                  "in percent: one value for all LEDs, or one for each of six")
       ->expected(1, LED_COUNT)
       ->capture_default_str()
       ->check(CLI::Range(0, 100));
-  add_led_command(line, led, "get", "Show what the board holds", led_get, options);
+  add_led_command(line, led, "get", "Show the board's settings and status", led_get, options);
   add_led_command(line, led, "test", "Steady light for a while", led_test, options)
       ->add_option("--for", options.test_s, "seconds; 0 ends it")
       ->capture_default_str()

@@ -1,4 +1,4 @@
-#include "daemon/ctl/plot.hpp"
+#include "daemon/ctl/score/plot.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -9,13 +9,13 @@
 namespace crepes {
 
 void add_plot(CommandLine& line) {
-  auto& options = line.keep<PlotOptions>();
-  auto& json = line.keep<bool>();
+  auto& options = line.make<PlotOptions>();
+  auto& json = line.make<bool>();
   CLI::App* sub = line.add(
       "plot", "Draw a replay as one HTML page: errors, innovations, biases, modes, latency");
-  sub->add_option("DIR", options.results, "what replay wrote")->required();
+  sub->add_option("DIR", options.results, "output directory of replay")->required();
   sub->add_option("--truth", options.swarm, "the data set, with its truth/");
-  sub->add_option("--out", options.out, "the page; plot.html in DIR if left out");
+  sub->add_option("--out", options.out, "the page; default: plot.html in DIR");
   add_json_flag(sub, json);
   line.run(sub, [&options, &json] {
     return plot(options).and_then([&](const std::filesystem::path& page) {

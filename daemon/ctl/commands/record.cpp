@@ -1,5 +1,6 @@
-#include "daemon/ctl/record.hpp"
+#include "daemon/ctl/dataset/record.hpp"
 
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -15,12 +16,12 @@ namespace {
 
 std::string text_of(const RecordSummary& summary) {
   const RecordProgress& progress = summary.progress;
-  std::string text = summary.why + ": " + fixed(progress.seconds, 1) + " s, " +
-                     std::to_string(progress.rows) + " rows, " + std::to_string(progress.pictures) +
-                     " pictures, " + fixed(1e-6 * static_cast<double>(progress.bytes), 2) +
-                     " MB in " + summary.folder.string() + "\n";
+  std::string text =
+      fmt::format("{}: {} s, {} rows, {} pictures, {} MB in {}\n", summary.end_reason,
+                  fixed(progress.seconds, 1), progress.rows, progress.pictures,
+                  fixed(1e-6 * static_cast<double>(progress.bytes), 2), summary.folder.string());
   if (progress.missing > 0)
-    text += std::to_string(progress.missing) + " events are missing: the disk was too slow\n";
+    text += fmt::format("{} events are missing: the disk was too slow\n", progress.missing);
   if (progress.configurations > 1)
     text += "the daemon was reloaded meanwhile; crepesd.yaml is what it ended with\n";
   return text;
@@ -29,7 +30,7 @@ std::string text_of(const RecordSummary& summary) {
 std::string json_of(const RecordSummary& summary) {
   const RecordProgress& progress = summary.progress;
   return json_line({{"folder", summary.folder.string()},
-                    {"ended", summary.why},
+                    {"ended", summary.end_reason},
                     {"duration_s", progress.seconds},
                     {"rows", progress.rows},
                     {"pictures", progress.pictures},
@@ -55,23 +56,24 @@ Result<void> run_record(RecordOptions options, bool json) {
 }  // namespace
 
 void add_record(CommandLine& line) {
-  auto& options = line.keep<RecordOptions>();
-  auto& json = line.keep<bool>();
-  CLI::App* sub = line.add(
-      "record", "Write what a running daemon's sensors measure as a data set that replays");
-  sub->add_option("DIR", options.dir, "for swarm.yaml and the robot's folder; has no data set yet")
+  auto& options = line.make<RecordOptions>();
+  auto& json = line.make<bool>();
+  CLI::App* sub =
+      line.add("record", "Record the measurements of a running daemon as a data set for replay");
+  sub->add_option("DIR", options.dir,
+                  "directory for swarm.yaml and the robot's folder, without a data set")
       ->required();
-  sub->add_flag("--images", options.pictures, "pictures, too, as many as there is time for");
+  sub->add_flag("--images", options.pictures, "also record pictures, as many as time permits");
   sub->add_option_function<double>(
          "--duration", [&options](double seconds) { options.duration_s = seconds; },
-         "stop after so many seconds; left out: Ctrl-C")
+         "stop after this many seconds; default: stop with Ctrl-C")
       ->check(CLI::Range(0.1, 1e6));
   sub->add_option_function<double>(
          "--max-size",
          [&options](double megabytes) {
            options.max_bytes = static_cast<std::uint64_t>(1e6 * megabytes);
          },
-         "stop at so many MB; left out: 1074, a gibibyte")
+         "stop at this many MB; default: 1074, a gibibyte")
       ->check(CLI::Range(0.1, 1e7));
   sub->add_option("--socket", options.socket, "the daemon's recording.socket")
       ->capture_default_str();

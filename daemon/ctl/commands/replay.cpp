@@ -1,18 +1,20 @@
+#include <fmt/core.h>
+
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
 #include "daemon/ctl/json_line.hpp"
-#include "daemon/ctl/swarm_replay.hpp"
+#include "daemon/ctl/replay/swarm_replay.hpp"
 #include "daemon/ctl/text_table.hpp"
 
 namespace crepes {
 namespace {
 
 std::string text_of(const ReplaySummary& summary, const std::string& out) {
-  return std::to_string(summary.robots) + " robots, " + fixed(summary.duration_s, 1) + " s, " +
-         std::to_string(summary.poses) + " poses in " + out + "\n";
+  return fmt::format("{} robots, {} s, {} poses in {}\n", summary.robots,
+                     fixed(summary.duration_s, 1), summary.poses, out);
 }
 
 std::string json_of(const ReplaySummary& summary, const std::string& out) {
@@ -36,8 +38,8 @@ Result<void> run_replay(ReplayOptions options, bool json) {
 }  // namespace
 
 void add_replay(CommandLine& line) {
-  auto& options = line.keep<ReplayOptions>();
-  auto& json = line.keep<bool>();
+  auto& options = line.make<ReplayOptions>();
+  auto& json = line.make<bool>();
   CLI::App* sub = line.add(
       "replay", "Run all robots of a recorded swarm on virtual time and write their poses");
   sub->add_option("SWARM_DIR", options.swarm_dir, "the data set")->required();
@@ -46,15 +48,16 @@ void add_replay(CommandLine& line) {
       ->required();
   add_choice(
       sub, "--profile", kProfiles, [&options](Profile profile) { options.profile = profile; },
-      "filter, instead of what the configuration files say");
-  sub->add_flag("--no-graph{false},--graph{true}", options.graph, "no pose graph");
+      "filter profile; overrides the configuration files");
+  sub->add_flag("--no-graph{false},--graph{true}", options.graph,
+                "do not estimate the team as a whole, only pairs");
   sub->add_option_function<std::uint64_t>(
       "--seed", [&options](std::uint64_t seed) { options.seed = seed; },
-      "of the simulated network, instead of swarm.yaml's");
+      "seed of the simulated network; overrides swarm.yaml");
   sub->add_flag(
       "--debug-innovations", options.records,
-      "also <neighbor>.innovations.csv and .calibration.csv: every measurement's residual, "
-      "sigma, NIS and verdict, and the biases that the filter believes in");
+      "also write <neighbor>.innovations.csv and .calibration.csv: every measurement's residual, "
+      "sigma, NIS and verdict, and the estimated biases");
   add_json_flag(sub, json, "one object at the end");
   line.run(sub, [&options, &json] { return run_replay(options, json); });
 }

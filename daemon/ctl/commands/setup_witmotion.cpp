@@ -1,4 +1,6 @@
-#include "daemon/ctl/setup_witmotion.hpp"
+#include "daemon/ctl/setup/setup_witmotion.hpp"
+
+#include <fmt/core.h>
 
 #include <nlohmann/json.hpp>
 
@@ -17,23 +19,22 @@ Result<void> run_setup(const WitMotionSetup& setup, bool json) {
       return print_result(json_line(
           {{"port", setup.port}, {"update_rate", setup.rate_hz}, {"measured_hz", measured_hz}}));
     }
-    return print_result(setup.port + ": " + fixed(measured_hz, 0) +
-                        " samples a second; set imu.update_rate to " +
-                        std::to_string(setup.rate_hz) + ".0\n");
+    return print_result(fmt::format("{}: {} samples a second; set imu.update_rate to {}.0\n",
+                                    setup.port, fixed(measured_hz, 0), setup.rate_hz));
   });
 }
 
 }  // namespace
 
 void add_setup_witmotion(CommandLine& line) {
-  auto& setup = line.keep<WitMotionSetup>();
-  auto& json = line.keep<bool>();
+  auto& setup = line.make<WitMotionSetup>();
+  auto& json = line.make<bool>();
   CLI::App* sub = line.add(
       "setup-witmotion",
-      "Have a WitMotion IMU send acceleration and rate alone, fast enough, and keep it so");
+      "Configure a WitMotion IMU to send only acceleration and angular rate, at the given rate");
   sub->add_option("--port", setup.port, "its serial line")->required();
-  sub->add_option("--baud", setup.baud, "its rate now")->capture_default_str();
-  sub->add_option("--rate", setup.rate_hz, "samples a second: 10, 20, 50, 100 or 200")
+  sub->add_option("--baud", setup.baud, "its current baud rate")->capture_default_str();
+  sub->add_option("--rate", setup.rate_hz, "samples per second: 10, 20, 50, 100 or 200")
       ->capture_default_str();
   add_json_flag(sub, json);
   line.run(sub, [&setup, &json] { return run_setup(setup, json); });

@@ -1,4 +1,4 @@
-#include "daemon/ctl/sources.hpp"
+#include "daemon/ctl/live/sources.hpp"
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
@@ -6,11 +6,11 @@
 namespace crepes {
 
 void add_sources(CommandLine& line) {
-  auto& options = line.keep<SourcesOptions>();
-  CLI::App* sub =
-      line.add("sources",
-               "What each neighbor's pose rests on: bearings each way, ranges, reports; their "
-               "rates and ages, and what was refused and why");
+  auto& options = line.make<SourcesOptions>();
+  CLI::App* sub = line.add(
+      "sources",
+      "Show the measurements behind each neighbor's pose: bearings both ways, ranges, reports; "
+      "their rates, ages, and refusals by reason");
   add_daemon_options(sub, options.daemon);
   sub->add_option("--over", options.over_s, "seconds over which rates are counted")
       ->capture_default_str()

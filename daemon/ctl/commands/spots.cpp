@@ -1,10 +1,10 @@
-#include "daemon/ctl/spots.hpp"
+#include "daemon/ctl/setup/spots.hpp"
 
 #include <cstdio>
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
-#include "daemon/ctl/live_screen.hpp"
+#include "daemon/ctl/live/live_screen.hpp"
 
 namespace crepes {
 namespace {
@@ -21,23 +21,24 @@ Result<void> run_spots(SpotsOptions options) {
 }  // namespace
 
 void add_spots(CommandLine& line) {
-  auto& options = line.keep<SpotsOptions>();
+  auto& options = line.make<SpotsOptions>();
   CLI::App* sub = line.add(
       "spots",
-      "Show what the detector and the tracker find in recorded pictures: for setting up exposure "
-      "and threshold");
+      "Show what the detector and the tracker find in recorded pictures, to set exposure and "
+      "threshold");
   sub->add_option("IMAGE_OR_FOLDER", options.source,
                   "a picture, a data set's cam0, or any folder of pictures")
       ->required();
   sub->add_option("--config", options.config, "crepesd.yaml of the robot that took them")
       ->required();
   sub->add_option("--out", options.out, "directory for PNGs with spots, robots and their trails");
-  sub->add_option("--every", options.every, "draw one picture in so many")
+  sub->add_option("--every", options.every, "draw every n-th picture")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
-  sub->add_option("--camera", options.camera,
-                  "its name in the configuration; left out: that of cam0, cam1, ... in the path");
-  add_json_flag(sub, options.json, "an object a picture, and one for all");
+  sub->add_option(
+      "--camera", options.camera,
+      "camera name in the configuration; default: the one of cam0, cam1, ... in the path");
+  add_json_flag(sub, options.json, "one object per picture, and one summary");
   line.run(sub, [&options] { return run_spots(options); });
 }
 

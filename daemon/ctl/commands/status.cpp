@@ -1,4 +1,4 @@
-#include "daemon/ctl/status.hpp"
+#include "daemon/ctl/live/status.hpp"
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
@@ -6,11 +6,11 @@
 namespace crepes {
 
 void add_status(CommandLine& line) {
-  auto& options = line.keep<StatusOptions>();
+  auto& options = line.make<StatusOptions>();
   CLI::App* sub =
-      line.add("status", "One look at a daemon: sensors, neighbors, clocks, mesh, load");
+      line.add("status", "Show the state of a daemon: sensors, neighbors, clocks, mesh, load");
   add_daemon_options(sub, options.daemon);
-  add_json_flag(sub, options.json, "the daemon's own words, as one object");
+  add_json_flag(sub, options.json, "the daemon's own JSON, as one object");
   line.run(sub, [&options] { return print_result(status(options)); });
 }
 

@@ -1,4 +1,4 @@
-#include "daemon/ctl/waitpose.hpp"
+#include "daemon/ctl/live/waitpose.hpp"
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
@@ -6,21 +6,22 @@
 namespace crepes {
 
 void add_waitpose(CommandLine& line) {
-  auto& options = line.keep<WaitposeOptions>();
-  CLI::App* sub = line.add(
-      "waitpose", "Wait until a neighbor's pose is there; exit code 1 and the reason if it is not");
+  auto& options = line.make<WaitposeOptions>();
+  CLI::App* sub =
+      line.add("waitpose",
+               "Wait for a neighbor's pose; exit code 1 and the reason if there is none in time");
   add_daemon_options(sub, options.daemon);
   sub->add_option_function<int>(
          "--peer", [&options](int id) { options.peer = RobotId{static_cast<std::uint16_t>(id)}; },
          "the neighbor's id")
       ->required()
       ->check(CLI::Range(1, 65534));
-  sub->add_option("--timeout", options.timeout_s, "seconds")
+  sub->add_option("--timeout", options.timeout_s, "seconds to wait")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 1e6));
   sub->add_option_function<double>(
          "--max-sigma", [&options](double sigma_m) { options.max_sigma_m = sigma_m; },
-         "wait until its position is known so well [m]")
+         "wait until the sigma of its position is at most this [m]")
       ->check(CLI::PositiveNumber);
   add_json_flag(sub, options.json, "the daemon's own POSE");
   line.run(sub, [&options] { return print_result(wait_for_pose(options)); });

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -131,6 +132,18 @@ TEST(So3, TheTwoJacobiansAreEachOthersInverse) {
     const Eigen::Matrix3d product = so3_right_jacobian(theta) * so3_right_jacobian_inverse(theta);
 
     EXPECT_LT(largest_difference(product, Eigen::Matrix3d::Identity()), 1e-12);
+  }
+}
+
+TEST(So3, ShortestRotationTurnsOneDirectionIntoTheOther) {
+  RandomGeometry random(2);
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector3d a = random.direction();
+    const Eigen::Vector3d b = i % 4 == 0 ? Eigen::Vector3d(-a) : random.direction();
+    const Eigen::Quaterniond q = shortest_rotation(2.0 * a, 3.0 * b);
+    EXPECT_NEAR(q.norm(), 1.0, 1e-12);
+    EXPECT_LT((q * a - b).norm(), 1e-6);
+    EXPECT_NEAR(so3_log(q).norm(), std::acos(std::clamp(a.dot(b), -1.0, 1.0)), 1e-6);
   }
 }
 

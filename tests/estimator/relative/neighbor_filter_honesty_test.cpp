@@ -69,7 +69,7 @@ TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysOnceOtherCamerasLook) {
     NeighborFilter filter = tight_filter(pair, 3s);
     pair.change_cameras();
     for (const MeasurementKind kind : {MeasurementKind::kBearing, MeasurementKind::kPeerBearing})
-      filter.change_camera(kind, pair.priors().misalignment_rad);
+      filter.reset_misalignment(kind, pair.priors().misalignment_rad);
     run(filter, pair, 2s);
     return filter;
   });

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "estimator/core/constants.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
 
@@ -167,7 +168,7 @@ Sighting without(const Faults& faults, Sighting z) {
   const Eigen::Vector3d bias = faults.segment<3>(3);
   const auto scale = faults.tail<9>().reshaped(3, 3);
   z.u = so3_exp(-misalignment) * z.u;
-  z.up = (z.up - bias / 9.80665 - scale * z.up).normalized();
+  z.up = (z.up - bias / kGravityMps2 - scale * z.up).normalized();
   return z;
 }
 

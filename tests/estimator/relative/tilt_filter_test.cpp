@@ -4,8 +4,8 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "estimator/core/constants.hpp"
 #include "tests/support/random_geometry.hpp"
 
 namespace crepes {
@@ -13,9 +13,6 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::RandomGeometry;
-
-constexpr double kGravity = 9.80665;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
@@ -25,21 +22,21 @@ TEST(TiltFilter, FindsGravityOnARobotThatStandsStillWithBiasedSensors) {
   RandomGeometry random(1);
   const Eigen::Vector3d up_B = Eigen::Vector3d(0.2, -0.3, 0.9).normalized();
   const Eigen::Vector3d gyro_bias(0.005, -0.004, 0.003);
-  TiltFilter filter{ImuConfig{}};
+  TiltFilter filter{ImuNoise{}};
   for (int i = 0; i < 3000; ++i) {
     ASSERT_TRUE(filter.add({Timestamp{i * 10ms}, gyro_bias + random.vector(0.004),
-                            kGravity * up_B + random.vector(0.02)}));
+                            kGravityMps2 * up_B + random.vector(0.02)}));
   }
 
   ASSERT_TRUE(filter.tilt());
-  EXPECT_LT(angle_between(filter.tilt()->up_B, up_B), 0.3 * kDegree);
-  EXPECT_LT(filter.tilt()->sigma_rad, 1.0 * kDegree);
+  EXPECT_LT(angle_between(filter.tilt()->up_B, up_B), 0.3 * kRadPerDeg);
+  EXPECT_LT(filter.tilt()->sigma_rad, 1.0 * kRadPerDeg);
   EXPECT_EQ(filter.tilt()->stamp, Timestamp{29990ms});
 }
 
 TEST(TiltFilter, CarriesTheAttitudeWhereAMultirotorsAccelerometerAlwaysShowsItsOwnAxis) {
   RandomGeometry random(2);
-  TiltFilter filter{ImuConfig{}};
+  TiltFilter filter{ImuNoise{}};
   double squared = 0.0;
   double squared_by_force = 0.0;
   int count = 0;
@@ -53,7 +50,7 @@ TEST(TiltFilter, CarriesTheAttitudeWhereAMultirotorsAccelerometerAlwaysShowsItsO
     const Eigen::Quaterniond q = attitude(t);
     const Eigen::Vector3d w = so3_log(attitude(t - 0.01).conjugate() * q) / 0.01;
     const Eigen::Vector3d up_B = q.conjugate() * Eigen::Vector3d::UnitZ();
-    const Eigen::Vector3d thrust(0.0, 0.0, kGravity / up_B.z());  // holds its height
+    const Eigen::Vector3d thrust(0.0, 0.0, kGravityMps2 / up_B.z());  // holds its height
     filter.add({Timestamp{i * 10ms}, w + random.vector(0.004), thrust + random.vector(0.05)});
     if (t < 20.0) continue;
     squared += std::pow(angle_between(filter.tilt()->up_B, up_B), 2);
@@ -61,25 +58,25 @@ TEST(TiltFilter, CarriesTheAttitudeWhereAMultirotorsAccelerometerAlwaysShowsItsO
     ++count;
   }
 
-  EXPECT_GT(std::sqrt(squared_by_force / count), 5.0 * kDegree);
-  EXPECT_LT(std::sqrt(squared / count), 4.0 * kDegree);
+  EXPECT_GT(std::sqrt(squared_by_force / count), 5.0 * kRadPerDeg);
+  EXPECT_LT(std::sqrt(squared / count), 4.0 * kRadPerDeg);
   EXPECT_LT(squared, squared_by_force / 4.0);
 }
 
 TEST(TiltFilter, SaysNothingBeforeTheFirstSamplesAreAveraged) {
-  TiltFilter filter{ImuConfig{}};
+  TiltFilter filter{ImuNoise{}};
   EXPECT_FALSE(filter.tilt());
 
-  filter.add({Timestamp{10ms}, Eigen::Vector3d::Zero(), {0, 0, kGravity}});
+  filter.add({Timestamp{10ms}, Eigen::Vector3d::Zero(), {0, 0, kGravityMps2}});
 
   EXPECT_FALSE(filter.tilt());
 }
 
 /// A filter that knows which way is up, at 1 s.
 TiltFilter settled() {
-  TiltFilter filter{ImuConfig{}};
+  TiltFilter filter{ImuNoise{}};
   for (int i = 1; i <= 100; ++i)
-    filter.add({Timestamp{i * 10ms}, Eigen::Vector3d::Zero(), {0, 0, kGravity}});
+    filter.add({Timestamp{i * 10ms}, Eigen::Vector3d::Zero(), {0, 0, kGravityMps2}});
   return filter;
 }
 
@@ -88,26 +85,26 @@ TEST(TiltFilter, RefusesWhatIsNotFiniteOrGoesBackAndLosesNothing) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Eigen::Vector3d up_before = filter.tilt()->up_B;
 
-  EXPECT_FALSE(filter.add({Timestamp{1010ms}, {nan, 0, 0}, {0, 0, kGravity}}));
-  EXPECT_FALSE(filter.add({Timestamp{1010ms}, Eigen::Vector3d::Zero(), {0, nan, kGravity}}));
-  EXPECT_FALSE(filter.add({Timestamp{1000ms}, {1, 0, 0}, {kGravity, 0, 0}}));
-  EXPECT_FALSE(filter.add({Timestamp{500ms}, {1, 0, 0}, {kGravity, 0, 0}}));
+  EXPECT_FALSE(filter.add({Timestamp{1010ms}, {nan, 0, 0}, {0, 0, kGravityMps2}}));
+  EXPECT_FALSE(filter.add({Timestamp{1010ms}, Eigen::Vector3d::Zero(), {0, nan, kGravityMps2}}));
+  EXPECT_FALSE(filter.add({Timestamp{1000ms}, {1, 0, 0}, {kGravityMps2, 0, 0}}));
+  EXPECT_FALSE(filter.add({Timestamp{500ms}, {1, 0, 0}, {kGravityMps2, 0, 0}}));
 
   EXPECT_EQ(filter.tilt()->up_B, up_before);
-  EXPECT_TRUE(filter.add({Timestamp{1010ms}, Eigen::Vector3d::Zero(), {0, 0, kGravity}}));
+  EXPECT_TRUE(filter.add({Timestamp{1010ms}, Eigen::Vector3d::Zero(), {0, 0, kGravityMps2}}));
 }
 
 TEST(TiltFilter, RefusesWhatNoSensorMeasures) {
   TiltFilter filter = settled();
 
-  EXPECT_FALSE(filter.add({Timestamp{1010ms}, {1e200, 0, 0}, {0, 0, kGravity}}));
+  EXPECT_FALSE(filter.add({Timestamp{1010ms}, {1e200, 0, 0}, {0, 0, kGravityMps2}}));
   EXPECT_FALSE(filter.add({Timestamp{1010ms}, Eigen::Vector3d::Zero(), {0, 0, 1e200}}));
 }
 
 TEST(TiltFilter, StartsAnewAfterAGap) {
   TiltFilter filter = settled();
 
-  EXPECT_TRUE(filter.add({Timestamp{2s}, Eigen::Vector3d::Zero(), {kGravity, 0, 0}}));
+  EXPECT_TRUE(filter.add({Timestamp{2s}, Eigen::Vector3d::Zero(), {kGravityMps2, 0, 0}}));
 
   EXPECT_FALSE(filter.tilt());
 }
@@ -118,7 +115,7 @@ TEST(TiltFilter, AFreeFallTeachesItNothing) {
     filter.add({Timestamp{1s + i * 10ms}, Eigen::Vector3d::Zero(), {0.3, 0.0, 0.0}});
   }
 
-  EXPECT_LT(angle_between(filter.tilt()->up_B, Eigen::Vector3d::UnitZ()), 0.1 * kDegree);
+  EXPECT_LT(angle_between(filter.tilt()->up_B, Eigen::Vector3d::UnitZ()), 0.1 * kRadPerDeg);
   EXPECT_GT(filter.tilt()->sigma_rad, settled().tilt()->sigma_rad);
 }
 

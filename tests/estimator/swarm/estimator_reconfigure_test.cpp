@@ -25,7 +25,8 @@ TEST(EstimatorReconfigure, GoesOnWithWhatItKnowsAndTrustsTheImuLess) {
   ASSERT_NE(reloaded.latest(), nullptr);
   const std::uint32_t resets = reloaded.latest()->pose.reset_counter;
 
-  reloaded.reconfigure([](Config& config) { config.imu.accelerometer_noise_density *= 30; });
+  reloaded.reconfigure(
+      [](EstimatorSettings& settings) { settings.imu.accelerometer_noise_density *= 30; });
   reloaded.run_for(20ms);
   ASSERT_NE(reloaded.latest(), nullptr);
   EXPECT_EQ(reloaded.latest()->pose.reset_counter, resets);
@@ -45,7 +46,7 @@ TEST(EstimatorReconfigure, GatesAsItIsToldFromNowOn) {
   pair.run_for(4s);
   const std::uint64_t loosely = refused(pair);
 
-  pair.reconfigure([](Config& config) { config.estimator.gate_probability = 0.9; });
+  pair.reconfigure([](EstimatorSettings& settings) { settings.filters.gate_probability = 0.9; });
   pair.run_for(2s);
 
   EXPECT_GT(refused(pair), loosely + 10);  // of some 400, a tenth
@@ -57,7 +58,7 @@ TEST(EstimatorReconfigure, StartsAnewWithAnotherProfile) {
   ASSERT_NE(pair.latest(), nullptr);
   const std::uint32_t resets = pair.latest()->pose.reset_counter;
 
-  pair.reconfigure([](Config& config) { config.estimator.profile = Profile::kPaper; });
+  pair.reconfigure([](EstimatorSettings& settings) { settings.filters.profile = Profile::kPaper; });
   pair.run_for(20ms);
   EXPECT_EQ(pair.latest(), nullptr);
   pair.run_for(2s);
@@ -73,7 +74,7 @@ TEST(EstimatorReconfigure, ReadsIdsAgainAfterAChangeOfVisionAndCoastsMeanwhile) 
   const std::uint32_t resets = pair.found().back().pose.reset_counter;
   const std::size_t poses = pair.found().size();
 
-  pair.reconfigure([](Config& config) { config.vision.flip_rate = 0.03; });
+  pair.reconfigure([](EstimatorSettings& settings) { settings.vision.flip_rate = 0.03; });
   pair.run_for(1s);
 
   EXPECT_EQ(pair.found().size(), poses + 50);
@@ -86,7 +87,7 @@ TEST(EstimatorReconfigure, ForgetsANeighborWhoseMountingHasChanged) {
   pair.run_for(4s);
   ASSERT_NE(pair.latest(), nullptr);
 
-  pair.reconfigure([](Config& config) { config.swarm.members[1].name = "renamed"; });
+  pair.reconfigure([](EstimatorSettings& settings) { settings.swarm.members[1].name = "renamed"; });
   pair.run_for(20ms);
 
   EXPECT_EQ(pair.latest(), nullptr);

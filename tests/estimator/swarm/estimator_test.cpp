@@ -17,22 +17,22 @@ using test::SimulatedPair;
 constexpr RobotId kSelf{1};
 constexpr RobotId kOther{2};
 
-Config two_robots() {
-  Config config;
-  config.robot.id = kSelf;
+EstimatorSettings two_robots() {
+  EstimatorSettings settings;
+  settings.self = kSelf;
   for (const double duty : {0.3, 0.7}) {
     MemberConfig member;
-    member.id = RobotId{static_cast<std::uint16_t>(config.swarm.members.size() + 1)};
+    member.id = RobotId{static_cast<std::uint16_t>(settings.swarm.members.size() + 1)};
     member.name = "robot" + std::to_string(member.id.value);
     member.duty = duty;
-    config.swarm.members.push_back(member);
+    settings.swarm.members.push_back(member);
   }
-  CameraConfig camera;
+  CameraCalibration camera;
   camera.name = "cam0";
   camera.intrinsics = {-0.1723, 0.5931, 316.9, 316.8, 638.2, 512.5};
   camera.resolution = {1280, 1024};
-  config.cameras.push_back(camera);
-  return config;
+  settings.cameras.push_back(camera);
+  return settings;
 }
 
 /// Two seconds of what robot 1 hears: its IMU, ranges, reports and frames with one steady spot; the
@@ -135,7 +135,7 @@ TEST(Estimator, TellsOfEveryMeasurementIfAskedAndGivesTheSamePoses) {
   EXPECT_EQ(told, status.measurements);
   ASSERT_FALSE(records.calibrations.empty());
   // The first belief is the prior.
-  EXPECT_NEAR(records.calibrations.front().sigma[0], ImuConfig{}.gyroscope_bias_sigma, 1e-3);
+  EXPECT_NEAR(records.calibrations.front().sigma[0], ImuNoise{}.gyroscope_bias_sigma, 1e-3);
 }
 
 TEST(Estimator, CountsReportsOfUnknownSendersAndIgnoresThem) {

@@ -33,7 +33,7 @@ class Dazzled {
  public:
   Dazzled(std::uint64_t seed, Nuisance nuisance)
       : pair_(seed, {.bearing = 0.001}), random_(seed), nuisance_(nuisance) {
-    neighbor_.keep_records();
+    neighbor_.outcomes().keep_records();
   }
 
   void run_until(Timestamp end) {
@@ -52,9 +52,9 @@ class Dazzled {
         send_report(z.N.up);
         neighbor_.tick(now_, self_);
       }
-      if (!neighbor_.pose() && !first_pose_) continue;
+      if (!neighbor_.output().pose() && !first_pose_) continue;
       if (!first_pose_) first_pose_ = now_;
-      judge(neighbor_.take_records());
+      judge(neighbor_.outcomes().drain_records());
     }
   }
 
@@ -66,10 +66,12 @@ class Dazzled {
   }
   [[nodiscard]] std::optional<Timestamp> first_pose() const { return first_pose_; }
   [[nodiscard]] Vector6d error() const {
-    return pose_difference(neighbor_.pose()->T_B_N.pose,
-                           pair_.truth(neighbor_.pose()->stamp).motion.T_B_N);
+    return pose_difference(neighbor_.output().pose()->T_B_N.pose,
+                           pair_.truth(neighbor_.output().pose()->stamp).motion.T_B_N);
   }
-  [[nodiscard]] const std::optional<NeighborPose>& pose() const { return neighbor_.pose(); }
+  [[nodiscard]] const std::optional<NeighborPose>& pose() const {
+    return neighbor_.output().pose();
+  }
 
  private:
   static MemberConfig member(RobotId id, const Mounting& mounting) {
@@ -136,7 +138,7 @@ class Dazzled {
   Nuisance nuisance_;
   RobotState self_;
   Neighbor neighbor_{member(kSelf, pair_.mounting_B), member(kOther, pair_.mounting_N),
-                     filter_settings(EstimatorConfig{}, ImuConfig{}, UwbConfig{})};
+                     filter_settings(EstimatorConfig{}, ImuNoise{}, RangeNoise{})};
   Report report_;
   Timestamp now_{5ms};
   int frames_ = 0;

@@ -43,7 +43,7 @@ struct Ingredients {
 FilterSettings settings(Profile profile) {
   EstimatorConfig estimator;
   estimator.profile = profile;
-  return filter_settings(estimator, ImuConfig{}, UwbConfig{});
+  return filter_settings(estimator, ImuNoise{}, RangeNoise{});
 }
 
 /// Robot 1's view of robot 2, fed from a simulated pair every 10 ms.
@@ -88,8 +88,8 @@ class View {
   }
 
   [[nodiscard]] Vector6d error() const {
-    return pose_difference(neighbor_.pose()->T_B_N.pose,
-                           pair_.truth(neighbor_.pose()->stamp).motion.T_B_N);
+    return pose_difference(neighbor_.output().pose()->T_B_N.pose,
+                           pair_.truth(neighbor_.output().pose()->stamp).motion.T_B_N);
   }
   [[nodiscard]] Neighbor& neighbor() { return neighbor_; }
   [[nodiscard]] NoPoseReason reason() const { return neighbor_.status().reason; }
@@ -148,12 +148,12 @@ TEST(Neighbor, IsLocatedWithinTwoSeconds) {
 
   view.run_until(Timestamp{2s});
 
-  ASSERT_TRUE(view.neighbor().pose());
+  ASSERT_TRUE(view.neighbor().output().pose());
   EXPECT_EQ(view.reason(), NoPoseReason::kNone);
-  EXPECT_EQ(view.neighbor().pose()->mode, PoseMode::kDirect);
+  EXPECT_EQ(view.neighbor().output().pose()->mode, PoseMode::kDirect);
   EXPECT_LT(view.error().head<3>().norm(), 0.35);  // mostly the range's bias of 0.1 m, one sigma
   EXPECT_LT(view.error().tail<3>().norm(), 0.06);
-  EXPECT_LE(Timestamp{2s} - view.neighbor().pose()->stamp, Duration{20ms});
+  EXPECT_LE(Timestamp{2s} - view.neighbor().output().pose()->stamp, Duration{20ms});
 }
 
 TEST(Neighbor, IsLocatedUnderThePapersProfileToo) {
@@ -161,7 +161,7 @@ TEST(Neighbor, IsLocatedUnderThePapersProfileToo) {
 
   view.run_until(Timestamp{3s});
 
-  ASSERT_TRUE(view.neighbor().pose());
+  ASSERT_TRUE(view.neighbor().output().pose());
   EXPECT_LT(view.error().head<3>().norm(), 0.4);
   EXPECT_LT(view.error().tail<3>().norm(), 0.1);
 }
@@ -179,7 +179,7 @@ TEST_P(WithoutAnIngredient, ThereIsNoPoseAndAReason) {
 
   view.run_until(Timestamp{3s}, GetParam().with);
 
-  EXPECT_FALSE(view.neighbor().pose());
+  EXPECT_FALSE(view.neighbor().output().pose());
   EXPECT_EQ(view.reason(), GetParam().reason) << name_of(view.reason());
 }
 
@@ -199,19 +199,19 @@ TEST(Neighbor, IsSilentAfterTwoSecondsWithoutAReport) {
 
   view.run_until(Timestamp{60s}, {.reports = false, .bearings = false, .ranges = false});
 
-  EXPECT_FALSE(view.neighbor().pose());
+  EXPECT_FALSE(view.neighbor().output().pose());
   EXPECT_EQ(view.reason(), NoPoseReason::kSilent);
 }
 
 TEST(Neighbor, LocatedInAMirrorIsFoundWithinASecondOfBeingSeenItself) {
   View view;
   view.run_until(Timestamp{1500ms}, {.heading_rad = 0.8});
-  ASSERT_TRUE(view.neighbor().pose());
+  ASSERT_TRUE(view.neighbor().output().pose());
   ASSERT_GT(view.error().head<3>().norm(), 2.0);  // its own sightings of us and ranges agree
 
   view.run_until(Timestamp{2500ms});
 
-  ASSERT_TRUE(view.neighbor().pose());
+  ASSERT_TRUE(view.neighbor().output().pose());
   EXPECT_LT(view.error().head<3>().norm(), 0.35);
   EXPECT_LT(view.error().tail<3>().norm(), 0.06);
 }
@@ -221,10 +221,10 @@ TEST(Neighbor, IsLocatedInTimeAlthoughItDoesNotSeeUs) {
 
   view.run_until(Timestamp{8s}, {.peer_bearings = false});
 
-  ASSERT_TRUE(view.neighbor().pose());
+  ASSERT_TRUE(view.neighbor().output().pose());
   EXPECT_LT(view.error().head<3>().norm(), 0.35);  // the range's bias
   EXPECT_LT(view.error().tail<3>().norm(), 0.15);
-  EXPECT_EQ(view.neighbor().pose()->reset_counter, 1U);
+  EXPECT_EQ(view.neighbor().output().pose()->reset_counter, 1U);
 }
 
 TEST(Neighbor, IsLocatedByItsOwnEstimateOfUsWhereWeDoNotSeeIt) {
@@ -235,7 +235,7 @@ TEST(Neighbor, IsLocatedByItsOwnEstimateOfUsWhereWeDoNotSeeIt) {
   view.add_estimate_of_us();
   view.run_until(Timestamp{4s}, {.bearings = false});
 
-  ASSERT_TRUE(view.neighbor().pose());
+  ASSERT_TRUE(view.neighbor().output().pose());
   EXPECT_LT(view.error().head<3>().norm(), 0.35);
   EXPECT_LT(view.error().tail<3>().norm(), 0.1);
 }
@@ -243,15 +243,15 @@ TEST(Neighbor, IsLocatedByItsOwnEstimateOfUsWhereWeDoNotSeeIt) {
 TEST(Neighbor, IsPredictedForAWhileAndSaysSo) {
   View view;
   view.run_until(Timestamp{3s});
-  const double sigma_before = view.neighbor().pose()->T_B_N.covariance.trace();
+  const double sigma_before = view.neighbor().output().pose()->T_B_N.covariance.trace();
 
   view.run_until(Timestamp{3800ms}, {.bearings = false, .peer_bearings = false, .ranges = false});
 
-  ASSERT_TRUE(view.neighbor().pose());
-  EXPECT_EQ(view.neighbor().pose()->mode, PoseMode::kPredicted);
-  EXPECT_GT(view.neighbor().pose()->age_s, 0.5);
-  EXPECT_GT(view.neighbor().pose()->T_B_N.covariance.trace(), sigma_before);
-  EXPECT_FALSE(view.neighbor().estimate());  // nothing for the graph
+  ASSERT_TRUE(view.neighbor().output().pose());
+  EXPECT_EQ(view.neighbor().output().pose()->mode, PoseMode::kPredicted);
+  EXPECT_GT(view.neighbor().output().pose()->age_s, 0.5);
+  EXPECT_GT(view.neighbor().output().pose()->T_B_N.covariance.trace(), sigma_before);
+  EXPECT_FALSE(view.neighbor().output().estimate());  // nothing for the graph
 }
 
 TEST(Neighbor, HalfAnHourWithoutAReadingCostsNoMoreThanASecond) {
@@ -260,11 +260,11 @@ TEST(Neighbor, HalfAnHourWithoutAReadingCostsNoMoreThanASecond) {
 
   // Were every look ahead to start at the last reading, this alone would run into the timeout.
   view.coast_until(Timestamp{30min});
-  EXPECT_FALSE(view.neighbor().pose());
+  EXPECT_FALSE(view.neighbor().output().pose());
   view.run_until(Timestamp{30min + 3s});
 
-  ASSERT_TRUE(view.neighbor().pose());
-  EXPECT_EQ(view.neighbor().pose()->reset_counter, 2U);
+  ASSERT_TRUE(view.neighbor().output().pose());
+  EXPECT_EQ(view.neighbor().output().pose()->reset_counter, 2U);
   EXPECT_LT(view.error().head<3>().norm(), 0.35);
 }
 
@@ -291,6 +291,22 @@ TEST(Neighbor, RefusesRangesThatNoModuleCanMeanAndCountsThem) {
   EXPECT_EQ(view.count(MeasurementKind::kRange, Verdict::kGated), gated + 4);
 }
 
+TEST(Neighbor, BelievesNoRangeWhileManyComeLateAlthoughItIsSeen) {
+  View view;
+  view.run_until(Timestamp{1s});
+  const auto gated = view.count(MeasurementKind::kRange, Verdict::kGated);
+  const auto add = [&](Duration t, double first_path_dbm) {
+    view.neighbor().add_range({Timestamp{1s} + t, kOther, 3.0, first_path_dbm, -79.0});
+  };
+
+  for (int i = 1; i <= 8; ++i) add(i * 20ms, -95.0);
+  add(180ms, -80.0);
+  EXPECT_EQ(view.count(MeasurementKind::kRange, Verdict::kGated), gated + 9);
+
+  add(2180ms, -80.0);  // where ranges are rare, the next one is believed
+  EXPECT_EQ(view.count(MeasurementKind::kRange, Verdict::kGated), gated + 9);
+}
+
 TEST(Neighbor, SurvivesAReportFullOfNotANumber) {
   View view;
   view.run_until(Timestamp{2s});
@@ -304,7 +320,7 @@ TEST(Neighbor, SurvivesAReportFullOfNotANumber) {
   view.neighbor().add_report(bad, view.self());
   view.run_until(Timestamp{4s});
 
-  ASSERT_TRUE(view.neighbor().pose());
+  ASSERT_TRUE(view.neighbor().output().pose());
   EXPECT_LT(view.error().norm(), 0.35);
   EXPECT_GT(view.count(MeasurementKind::kPeerBearing, Verdict::kGated) +
                 view.count(MeasurementKind::kPeerBearing, Verdict::kDegenerate),
@@ -321,7 +337,7 @@ TEST(Neighbor, CountsTheBearingsOfASecondCameraAsSkippedWhileTheFirstSees) {
 
     view.run_until(Timestamp{4s}, {.second_camera = when});
 
-    ASSERT_TRUE(view.neighbor().pose());
+    ASSERT_TRUE(view.neighbor().output().pose());
     EXPECT_EQ(view.count(MeasurementKind::kBearing, Verdict::kFused), fused + 100);
     EXPECT_NEAR(view.count(MeasurementKind::kBearing, Verdict::kSkipped), 100 - 5, 1);  // lag
     EXPECT_EQ(view.count(MeasurementKind::kBearing, Verdict::kGated), gated);
@@ -348,10 +364,10 @@ TEST(Neighbor, IsReachedByTheGraphWhenItIsNotSeen) {
   view.neighbor().add_graph_pose(Timestamp{1s}, pose);
   view.run_until(Timestamp{1100ms}, unseen);
 
-  ASSERT_TRUE(view.neighbor().pose());
-  EXPECT_EQ(view.neighbor().pose()->mode, PoseMode::kGraph);
-  EXPECT_TRUE(view.neighbor().pose()->sources.graph);
-  EXPECT_FALSE(view.neighbor().estimate());  // the graph does not hear its own echo
+  ASSERT_TRUE(view.neighbor().output().pose());
+  EXPECT_EQ(view.neighbor().output().pose()->mode, PoseMode::kGraph);
+  EXPECT_TRUE(view.neighbor().output().pose()->sources.graph);
+  EXPECT_FALSE(view.neighbor().output().estimate());  // the graph does not hear its own echo
 }
 
 // New settings forget what the last look ahead found, equal ones as well.
@@ -370,11 +386,11 @@ TEST(Neighbor, LooksAheadFromTheLastLookAsFromTheStart) {
       fresh.neighbor().reconfigure(settings(profile));
       for (View* each : {&view, &fresh}) each->run_until(t, with);
 
-      const auto& pose = view.neighbor().pose();
-      ASSERT_EQ(pose.has_value(), fresh.neighbor().pose().has_value());
+      const auto& pose = view.neighbor().output().pose();
+      ASSERT_EQ(pose.has_value(), fresh.neighbor().output().pose().has_value());
       if (pose) most = std::max(most, (view.error() - fresh.error()).norm());
     }
-    ASSERT_TRUE(view.neighbor().pose());
+    ASSERT_TRUE(view.neighbor().output().pose());
     EXPECT_LT(most, 1e-4);
   }
 }

@@ -23,8 +23,8 @@ const IdLibrary& library() {
   return kLibrary;
 }
 
-CameraConfig camera() {
-  CameraConfig config;
+CameraCalibration camera() {
+  CameraCalibration config;
   config.intrinsics = {-0.1723, 0.5931, 316.9, 316.8, 638.2, 512.5};
   config.resolution = {1280, 1024};
   Eigen::Matrix3d R_C_B;
@@ -99,7 +99,7 @@ class Swarm {
     frame.spots.push_back({uv.x(), uv.y(), 12.0, 255.0, 1.0});
   }
 
-  CameraConfig camera_ = camera();
+  CameraCalibration camera_ = camera();
   CameraModel model_ = *CameraModel::from(camera_);
   std::mt19937 random_;
   std::vector<Wanderer> boards_;

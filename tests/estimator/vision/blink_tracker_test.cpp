@@ -29,8 +29,8 @@ class BlinkTrackerTest : public testing::Test {
     }
     return swarm;
   }
-  static CameraConfig camera() {
-    CameraConfig config;
+  static CameraCalibration camera() {
+    CameraCalibration config;
     config.name = "cam0";
     config.intrinsics = {-0.1723, 0.5931, 316.9, 316.8, 638.2, 512.5};
     config.resolution = {1280, 1024};
@@ -85,7 +85,7 @@ class BlinkTrackerTest : public testing::Test {
     return std::acos(std::min(1.0, (p_B - bearing.p_B_C).normalized().dot(bearing.u_B)));
   }
 
-  CameraConfig camera_ = camera();
+  CameraCalibration camera_ = camera();
   CameraModel model_ = *CameraModel::from(camera_);
   IdLibrary library_ = *IdLibrary::from(swarm());
   BlinkTracker tracker_{camera_, model_, VisionConfig{}, library_};

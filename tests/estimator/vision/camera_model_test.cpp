@@ -10,8 +10,8 @@
 namespace crepes {
 namespace {
 
-CameraConfig fisheye(double xi = -0.1723, double alpha = 0.5931) {
-  CameraConfig config;
+CameraCalibration fisheye(double xi = -0.1723, double alpha = 0.5931) {
+  CameraCalibration config;
   config.name = "cam0";
   config.intrinsics = {xi, alpha, 316.9, 316.8, 638.2, 512.5};
   config.resolution = {1280, 1024};
@@ -19,8 +19,8 @@ CameraConfig fisheye(double xi = -0.1723, double alpha = 0.5931) {
 }
 
 /// The coefficients of a calibrated 185 degree lens, if none are given.
-CameraConfig kannala_brandt(std::vector<double> k = {-0.0124, 0.0208, -0.0173, 0.0041}) {
-  CameraConfig config = fisheye();
+CameraCalibration kannala_brandt(std::vector<double> k = {-0.0124, 0.0208, -0.0173, 0.0041}) {
+  CameraCalibration config = fisheye();
   config.camera_model = CameraModelKind::kPinhole;
   config.intrinsics = {316.9, 316.8, 638.2, 512.5};
   config.distortion_model = DistortionModel::kEquidistant;
@@ -122,7 +122,7 @@ Eigen::Vector2d any_pixel() {
   return {638.2 + radius * std::cos(azimuth), 512.5 + radius * std::sin(azimuth)};
 }
 
-void expect_projects_what_it_unprojected(const CameraConfig& config) {
+void expect_projects_what_it_unprojected(const CameraCalibration& config) {
   const CameraModel camera = *CameraModel::from(config);
   EXPECT_TRUE(rc::check([&] {
     const Eigen::Vector2d uv = any_pixel();
@@ -211,7 +211,7 @@ TEST(CameraModel, ProjectionJacobianMatchesDifferences) {
   }));
 }
 
-void expect_unprojection_jacobian_matches_differences(const CameraConfig& config) {
+void expect_unprojection_jacobian_matches_differences(const CameraCalibration& config) {
   const CameraModel camera = *CameraModel::from(config);
   EXPECT_TRUE(rc::check([&] {
     const Eigen::Vector2d uv = any_pixel();
@@ -234,7 +234,7 @@ TEST(CameraModel, UnprojectionJacobianMatchesDifferences) {
 }
 
 TEST(CameraModel, JacobiansOnTheOpticalAxisAreThoseBesideIt) {
-  for (const CameraConfig& config : {fisheye(), kannala_brandt()}) {
+  for (const CameraCalibration& config : {fisheye(), kannala_brandt()}) {
     const CameraModel camera = *CameraModel::from(config);
     CameraModel::ProjectionJacobian J_p;
     CameraModel::ProjectionJacobian J_p_beside;
@@ -262,7 +262,7 @@ TEST(CameraModel, SeesNothingBehindItAtItsCenterOrOutsideTheImageCircle) {
   EXPECT_FALSE(camera.unproject({kNan, 0.0}));
 }
 
-std::string refusal(const CameraConfig& config) {
+std::string refusal(const CameraCalibration& config) {
   const auto camera = CameraModel::from(config);
   return camera ? std::string() : camera.error().message;
 }
@@ -271,7 +271,7 @@ constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 TEST(CameraModel, RefusesWhatIsNoDoubleSphere) {
   const auto refused = [](std::vector<double> intrinsics) {
-    CameraConfig config = fisheye();
+    CameraCalibration config = fisheye();
     config.intrinsics = std::move(intrinsics);
     return refusal(config);
   };
@@ -289,9 +289,9 @@ TEST(CameraModel, RefusesWhatIsNoDoubleSphere) {
 
 TEST(CameraModel, RefusesWhatIsNoKannalaBrandt) {
   const auto refused = [](std::vector<double> k) { return refusal(kannala_brandt(std::move(k))); };
-  CameraConfig of_five = kannala_brandt();
+  CameraCalibration of_five = kannala_brandt();
   of_five.intrinsics.push_back(1.0);
-  CameraConfig undistorted = kannala_brandt();
+  CameraCalibration undistorted = kannala_brandt();
   undistorted.distortion_model = DistortionModel::kNone;
 
   EXPECT_EQ(refused({0.0, 0.0, 0.0, 0.0}), "");
@@ -306,7 +306,7 @@ TEST(CameraModel, RefusesWhatIsNoKannalaBrandt) {
 }
 
 TEST(CameraModel, RefusesDistortionOfADoubleSphere) {
-  CameraConfig config = fisheye();
+  CameraCalibration config = fisheye();
   config.distortion_model = DistortionModel::kEquidistant;
   config.distortion_coeffs = {0.0, 0.0, 0.0, 0.0};
 

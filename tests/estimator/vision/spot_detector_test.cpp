@@ -7,6 +7,8 @@
 #include <opencv2/core.hpp>
 #include <random>
 
+#include "estimator/core/constants.hpp"
+#include "estimator/core/so3.hpp"
 #include "tests/support/ring_scene.hpp"
 
 namespace crepes {
@@ -18,7 +20,6 @@ using test::RingBoard;
 using test::RingScene;
 using test::small_fisheye;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kPixelsPerRadian = 382.0;  // of small_fisheye() at its center
 
 double off(const Spot& spot, const Eigen::Vector2d& uv) {
@@ -28,7 +29,7 @@ double off(const Spot& spot, const Eigen::Vector2d& uv) {
 /// A board facing the camera whose center appears at `uv`.
 Pose facing_board(const CameraModel& camera, const Eigen::Vector2d& uv, double range_m) {
   const Eigen::Vector3d toward = camera.unproject(uv).value();
-  return {range_m * toward, Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), -toward)};
+  return {range_m * toward, shortest_rotation(Eigen::Vector3d::UnitX(), -toward)};
 }
 
 struct Accuracy {
@@ -87,7 +88,7 @@ class FromAngleAndExposure : public testing::TestWithParam<std::tuple<double, do
 TEST_P(FromAngleAndExposure, ARingIsOneSpotWithinATenthOfAPixelToTenMeters) {
   const auto [tilt_deg, exposure] = GetParam();
 
-  const double rms = sweep_rms(kToTenMeters, tilt_deg * kDegree, {.exposure = exposure});
+  const double rms = sweep_rms(kToTenMeters, tilt_deg * kRadPerDeg, {.exposure = exposure});
 
   RecordProperty("rms_px", std::to_string(rms));
   EXPECT_LT(rms, 0.1);
@@ -99,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(SpotDetector, FromAngleAndExposure,
 
 TEST(SpotDetector, FindsABoardAt27MetersWithinAQuarterOfAPixel) {
   for (const double tilt_deg : {0.0, 30.0, 45.0}) {
-    const Accuracy far = accuracy(27.0, tilt_deg * kDegree, {});
+    const Accuracy far = accuracy(27.0, tilt_deg * kRadPerDeg, {});
 
     EXPECT_EQ(far.missed, 0) << tilt_deg;
     EXPECT_LT(far.rms, 0.25) << tilt_deg;
@@ -148,7 +149,7 @@ TEST(SpotDetector, CentersARingOfWhichLedsAreHiddenWhereTheyAreApart) {
 TEST(SpotDetector, CentersHalfARingThatIsTurnedAway) {
   // Three points do not tell perspective, which is worth R^2/d^2 at the lens: 0.5 px at 0.7 m.
   for (const double range : {0.7, 0.9, 1.1}) {
-    const Accuracy at = accuracy(range, 40.0 * kDegree, {}, {.hidden = 0b000111U});
+    const Accuracy at = accuracy(range, 40.0 * kRadPerDeg, {}, {.hidden = 0b000111U});
 
     EXPECT_EQ(at.missed, 0) << range;
     EXPECT_LT(at.rms, 0.6) << range;

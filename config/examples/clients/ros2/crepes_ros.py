@@ -52,7 +52,7 @@ class StampConverter:
     """From the robot's monotonic clock to the system's (ROS) time [ns].
 
     On the robot itself both clocks can be read, so their difference is exact. Elsewhere, or where
-    the daemon's clock is a simulated one, the fastest datagram so far tells: stamps then are late by
+    the daemon's clock is a simulated one, the fastest datagram so far is used: stamps then are late by
     the least delay on the way, some milliseconds.
     """
 

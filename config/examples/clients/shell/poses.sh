@@ -11,8 +11,8 @@ ask() {
   while kill -0 $$ && printf '{"class":"WATCH","enable":true,"rate_hz":%s}' "$rate"; do sleep 1; done 2>/dev/null
 }
 
-# nc writes datagrams one after another without anything between them: an object is told when the next begins.
-# It does not mind when nobody reads what it writes, so the reader's end is told to this shell, and by its end to `ask`.
+# nc writes datagrams one after another without a separator: an object ends where the next begins.
+# nc ignores the end of its reader. So the reader's end stops this shell, and that stops `ask`.
 trap 'exit 0' TERM
 ask | nc -u "$address" "$port" | {
   perl -e '$/ = "}{"; $| = 1; while (<STDIN>) { chomp; print $. > 1 ? "{" : "", $_, "}\n" or exit }'

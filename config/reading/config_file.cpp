@@ -1,0 +1,117 @@
+#include "config/reading/config_file.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <iterator>
+#include <tuple>
+
+#include "config/reading/config_reader.hpp"
+#include "config/reading/config_sources.hpp"
+#include "config/schema/validation.hpp"
+#include "config/writing/config_writer.hpp"
+
+namespace crepes {
+namespace {
+
+bool is_inside(std::string_view path, std::string_view parent) {
+  return path.starts_with(parent) &&
+         (path.size() == parent.size() || path[parent.size()] == '.' || path[parent.size()] == '[');
+}
+
+/// Adds the broken rules, except those for values in which the reader has already found a fault.
+void add_rule_faults(const Config& config, ReadLog& log) {
+  const auto unread = log.unread;
+  for (RuleFault& rule : validate(config)) {
+    const bool is_reported = std::ranges::any_of(unread, [&](const std::string& path) {
+      return is_inside(path, rule.key) || is_inside(rule.key, path);
+    });
+    if (!is_reported) log.fault(rule.key, std::move(rule.reason));
+  }
+}
+
+/// `faults` are those found while `root` was merged from its files.
+CheckedConfig read_config(const ConfigNode& root, std::vector<ConfigFault> faults) {
+  CheckedConfig checked;
+  ReadLog log(root);
+  for (const ConfigFault& fault : faults) log.unread.insert(fault.key);
+  const bool is_document = root.kind != ConfigNode::Kind::kNothing;
+  if (!is_document && faults.empty()) log.fault("", "is empty");
+  if (is_document) {
+    ConfigReader reader(root, "", log);
+    checked.config.visit(reader);
+    reader.finish();
+    if (root.is_mapping()) add_rule_faults(checked.config, log);
+  }
+  std::ranges::move(log.faults, std::back_inserter(faults));
+  std::ranges::stable_sort(
+      faults, {}, [](const ConfigFault& fault) { return std::tie(fault.file, fault.line); });
+  checked.faults = std::move(faults);
+  return checked;
+}
+
+}  // namespace
+
+std::string to_string(const ConfigFault& fault) {
+  const std::string key = fault.key.empty() ? "" : fault.key + ": ";
+  if (fault.line <= 0) return fmt::format("{}: {}{}", fault.file, key, fault.reason);
+  return fmt::format("{}:{}: {}{}", fault.file, fault.line, key, fault.reason);
+}
+
+CheckedConfig check_config_text(const std::string& text, const std::string& file) {
+  std::vector<ConfigFault> faults;
+  const ConfigNode root = parse_config_tree(text, file, faults);
+  return read_config(root, std::move(faults));
+}
+
+CheckedConfig check_config(const std::filesystem::path& path) {
+  std::vector<ConfigFault> faults;
+  const ConfigNode root = load_config_tree(path, faults);
+  return read_config(root, std::move(faults));
+}
+
+Result<Config> load_config(const std::filesystem::path& path) {
+  CheckedConfig checked = check_config(path);
+  if (checked.faults.empty()) return std::move(checked.config);
+  std::string message;
+  for (const ConfigFault& fault : checked.faults)
+    message += (message.empty() ? "" : "\n") + to_string(fault);
+  return fail(ErrorCode::kConfig, std::move(message));
+}
+
+std::string write_config(const Config& config) {
+  Config copy = config;  // visit() serves readers too, so it needs mutable fields
+  ConfigWriter writer;
+  copy.visit(writer);
+  return writer.text();
+}
+
+std::string reference_config() {
+  Config config;
+  config.robot.id = RobotId{1};
+  config.swarm.members.resize(2);
+  config.swarm.members[0].id = RobotId{1};
+  config.swarm.members[0].name = "r1";
+  config.swarm.members[0].pattern = "011111111111111111";
+  config.swarm.members[1].id = RobotId{2};
+  config.swarm.members[1].name = "r2";
+  config.swarm.members[1].pattern = "001001011111111111";
+  // Double Sphere of a 185 degree lens; the camera looks along the body's x axis.
+  Eigen::Matrix3d R_C_B;
+  R_C_B << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  CameraConfig camera;
+  camera.calibration.name = "cam0";
+  camera.calibration.intrinsics = {-0.1723, 0.5931, 316.76, 316.66, 637.63, 512.69};
+  camera.calibration.resolution = {1280, 1024};
+  camera.calibration.T_cam_imu.q = Eigen::Quaterniond(R_C_B);
+  config.cameras = {camera};
+  return "# Every key of crepesd.yaml with its default and bounds. Unknown keys are errors; keys "
+         "without\n"
+         "# \"required\" may be omitted. Changes of a section marked live are applied on SIGHUP, "
+         "those of a\n"
+         "# section marked restart when crepesd starts again. Written by `crepesd "
+         "--write-reference`.\n" +
+         write_config(config);
+}
+
+}  // namespace crepes

@@ -1,0 +1,22 @@
+#include "config/schema/estimator_slice.hpp"
+
+namespace crepes {
+
+EstimatorSettings estimator_settings(const Config& config) {
+  EstimatorSettings settings{.self = config.robot.id,
+                             .swarm = config.swarm,
+                             .cameras = {},
+                             .imu = config.imu.noise,
+                             .range = config.uwb.noise,
+                             .vision = config.vision,
+                             .filters = config.estimator,
+                             .report_rate_hz = config.net.report_rate_hz,
+                             .solves_graph = config.graph.enabled,
+                             .graph_rate_hz = config.graph.rate_hz,
+                             .uses_team_filter = config.graph.method == TeamMethod::kTeamFilter,
+                             .team_size = static_cast<std::size_t>(config.graph.team_size)};
+  for (const CameraConfig& camera : config.cameras) settings.cameras.push_back(camera.calibration);
+  return settings;
+}
+
+}  // namespace crepes

@@ -1,0 +1,233 @@
+#include "config/schema/validation.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <utility>
+
+#include "estimator/vision/camera_model.hpp"
+#include "net/endpoint.hpp"
+
+namespace crepes {
+namespace {
+
+using RuleFaults = std::vector<RuleFault>;
+
+constexpr std::size_t kMinSlots = 8;
+constexpr std::size_t kMaxSlots = 32;
+constexpr double kMinDutyStep = 0.02;
+constexpr std::size_t kMaxCameras = 16;
+constexpr std::size_t kMaxPush = 8;
+
+std::string item(const std::string& list, std::size_t i) { return fmt::format("{}[{}]", list, i); }
+
+/// Names appear in file names and in datagrams.
+bool is_plain_name(const std::string& name) {
+  constexpr std::size_t kMaxLength = 32;
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-';
+  };
+  return !name.empty() && name.size() <= kMaxLength && std::ranges::all_of(name, is_plain);
+}
+
+void check_name(const std::string& key, const std::string& name, RuleFaults& faults) {
+  if (!is_plain_name(name)) {
+    faults.push_back(
+        {key, fmt::format("a name is 1 to 32 letters, digits, - or _, not \"{}\"", name)});
+  }
+}
+
+/// Reports each element whose value an earlier element already has. Empty values are not compared.
+template <class T, class ValueOf>
+void check_unique(const std::string& list, const std::string& key, const std::vector<T>& items,
+                  const ValueOf& value_of, RuleFaults& faults) {
+  std::map<std::string, std::size_t> first;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    const std::string& value = value_of(items[i]);
+    if (value.empty()) continue;
+    const auto [it, inserted] = first.emplace(value, i);
+    if (!inserted) {
+      faults.push_back(
+          {item(list, i) + key, fmt::format("{} is taken by {}", value, item(list, it->second))});
+    }
+  }
+}
+
+/// The shortest word whose repetition is the pattern. A camera cannot distinguish the two.
+std::string primitive_root(const std::string& pattern) {
+  const std::size_t period = (pattern + pattern).find(pattern, 1);
+  return pattern.substr(0, period);
+}
+
+/// Whether two patterns that repeat for ever differ in phase only.
+bool are_cyclic_shifts(const std::string& a, const std::string& b) {
+  const std::string root_a = primitive_root(a);
+  const std::string root_b = primitive_root(b);
+  return root_a.size() == root_b.size() && (root_a + root_a).find(root_b) != std::string::npos;
+}
+
+std::string pattern_fault(const std::string& pattern) {
+  if (pattern.find_first_not_of("01") != std::string::npos)
+    return fmt::format("a pattern is made of 0 and 1 only, not \"{}\"", pattern);
+  if (pattern.size() < kMinSlots || pattern.size() > kMaxSlots)
+    return fmt::format("a pattern has 8 to 32 slots, not {}", pattern.size());
+  if (primitive_root(pattern).size() == 1) return "a pattern has both lit and dark slots";
+  return "";
+}
+
+/// Both members must be free of faults.
+std::string code_conflict(const MemberConfig& a, const MemberConfig& b) {
+  if (a.pattern && b.pattern && are_cyclic_shifts(*a.pattern, *b.pattern))
+    return "the same pattern, shifted, as that of ";
+  if (a.duty && b.duty && std::abs(*a.duty - *b.duty) < kMinDutyStep)
+    return "within 0.02 of the duty of ";
+  return "";
+}
+
+void check_codes(const std::vector<MemberConfig>& members, RuleFaults& faults) {
+  std::vector<bool> sound(members.size(), true);
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const MemberConfig& member = members[i];
+    const std::string key = item("swarm.members", i);
+    const std::size_t before = faults.size();
+    if (member.pattern.has_value() == member.duty.has_value())
+      faults.push_back({key, "give exactly one of pattern and duty"});
+    if (member.pattern) {
+      const std::string reason = pattern_fault(*member.pattern);
+      if (!reason.empty()) faults.push_back({key + ".pattern", reason});
+    }
+    sound[i] = faults.size() == before;
+    for (std::size_t j = 0; sound[i] && j < i; ++j) {
+      const std::string conflict = sound[j] ? code_conflict(members[j], member) : "";
+      if (conflict.empty()) continue;
+      faults.push_back({key + (member.pattern ? ".pattern" : ".duty"),
+                        fmt::format("{}{}: no camera can tell the two apart", conflict,
+                                    item("swarm.members", j))});
+      break;
+    }
+  }
+}
+
+void check_members(const Config& config, RuleFaults& faults) {
+  const std::vector<MemberConfig>& members = config.swarm.members;
+  if (members.empty())
+    faults.push_back({"swarm.members", "is empty: list every robot, this one too"});
+  for (std::size_t i = 0; i < members.size(); ++i)
+    check_name(item("swarm.members", i) + ".name", members[i].name, faults);
+
+  const auto id_text = [](int id) { return id == 0 ? std::string() : std::to_string(id); };
+  check_unique(
+      "swarm.members", ".id", members, [&](const MemberConfig& m) { return id_text(m.id.value); },
+      faults);
+  check_unique("swarm.members", ".name", members, std::mem_fn(&MemberConfig::name), faults);
+  check_unique(
+      "swarm.members", ".uwb_id", members,
+      [&](const MemberConfig& m) {
+        return m.uwb_id ? std::to_string(*m.uwb_id) : id_text(m.id.value);
+      },
+      faults);
+  check_codes(members, faults);
+
+  const auto has_member = [&](RobotId id) {
+    return std::ranges::count(members, id, &MemberConfig::id) > 0;
+  };
+  const bool all_read = config.robot.id != RobotId{} && !members.empty() && !has_member(RobotId{});
+  if (all_read && !has_member(config.robot.id)) {
+    faults.push_back(
+        {"robot.id", fmt::format("{} is not among swarm.members", config.robot.id.value)});
+  }
+}
+
+void check_driver(const std::string& key, const CameraConfig& camera, RuleFaults& faults) {
+  constexpr double kMicroseconds = 1e6;
+  if (camera.device.driver == CameraDriver::kFolder && camera.device.folder.empty())
+    faults.push_back({key + ".folder", "driver folder needs the directory of the pictures"});
+  if (camera.device.driver == CameraDriver::kV4l2 && camera.device.id.empty())
+    faults.push_back({key + ".device", "driver v4l2 needs one, as /dev/video0"});
+  if (camera.device.exposure_us &&
+      *camera.device.exposure_us >= kMicroseconds / camera.calibration.rate_hz)
+    faults.push_back({key + ".exposure_us", "is longer than a frame at rate_hz"});
+  if (camera.device.driver == CameraDriver::kV4l2 &&
+      camera.device.trigger == CameraTrigger::kHardware)
+    faults.push_back({key + ".trigger", "driver v4l2 has no hardware trigger"});
+  if (camera.device.driver != CameraDriver::kMindVision) return;
+  if (camera.device.gain) faults.push_back({key + ".gain", "driver mindvision sets none"});
+  if (camera.device.offset != std::array{0, 0})
+    faults.push_back({key + ".offset", "driver mindvision reads out the whole sensor"});
+}
+
+void check_cameras(const std::vector<CameraConfig>& cameras, RuleFaults& faults) {
+  if (cameras.empty())
+    faults.push_back({"cameras", "is empty: without a camera nobody is recognized"});
+  if (cameras.size() > kMaxCameras) faults.push_back({"cameras", "more than 16"});
+  check_unique(
+      "cameras", ".name", cameras,
+      [](const CameraConfig& camera) { return camera.calibration.name; }, faults);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const std::string key = item("cameras", i);
+    check_name(key + ".name", cameras[i].calibration.name, faults);
+    for (CalibrationFault& fault : calibration_faults(cameras[i].calibration))
+      faults.push_back({fmt::format("{}.{}", key, fault.key), std::move(fault.reason)});
+    check_driver(key, cameras[i], faults);
+  }
+}
+
+void check_imu(const ImuDeviceConfig& imu, RuleFaults& faults) {
+  constexpr double kLeastVolume = 0.1;  // of the box that T makes of a unit cube
+  if (!imu.T_body_imu.p.isZero(0.0))
+    faults.push_back({"imu.T_body_imu", "the body's origin is the IMU: the last column must be 0"});
+  const auto check_triad = [&](const std::string& key, const TriadConfig& triad) {
+    if (triad.misalignment.determinant() >= kLeastVolume) return;
+    faults.push_back({key + ".misalignment", "mirrors or flattens: its determinant is below 0.1"});
+  };
+  check_triad("imu.accelerometer", imu.accelerometer);
+  check_triad("imu.gyroscope", imu.gyroscope);
+}
+
+void check_push(const std::string& key, const PushConfig& push, const Config& config,
+                RuleFaults& faults) {
+  const auto target = Endpoint::parse(push.address, static_cast<std::uint16_t>(push.port));
+  if (!target || !target->is_unicast()) {
+    return faults.push_back(
+        {key + ".address",
+         fmt::format("\"{}\" is not one host's numeric IPv4 or IPv6 address", push.address)});
+  }
+  if (target->is_loopback() &&
+      (push.port == config.subscription.port || push.port == config.net.port))
+    faults.push_back({key + ".port", "is the daemon's own"});
+}
+
+void check_network(const Config& config, RuleFaults& faults) {
+  if (config.net.port == config.subscription.port)
+    faults.push_back({"subscription.port", "is taken by net.port"});
+  for (const std::string& address : config.subscription.listen) {
+    if (!Endpoint::parse(address, 0)) {
+      faults.push_back({"subscription.listen",
+                        fmt::format("\"{}\" is not a numeric IPv4 or IPv6 address", address)});
+    }
+  }
+  const std::vector<PushConfig>& push = config.subscription.push;
+  if (push.size() > kMaxPush) faults.push_back({"subscription.push", "more than 8"});
+  for (std::size_t i = 0; i < push.size(); ++i)
+    check_push(item("subscription.push", i), push[i], config, faults);
+}
+
+}  // namespace
+
+std::vector<RuleFault> validate(const Config& config) {
+  RuleFaults faults;
+  check_members(config, faults);
+  check_cameras(config.cameras, faults);
+  check_imu(config.imu.device, faults);
+  check_network(config, faults);
+  if (config.vision.min_area_px2 >= config.vision.max_area_px2)
+    faults.push_back({"vision.max_area_px2", "must be above min_area_px2"});
+  return faults;
+}
+
+}  // namespace crepes

@@ -1,0 +1,268 @@
+#include "daemon/ctl/dataset/record.hpp"
+
+#include <fmt/core.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "config/reading/config_file.hpp"
+#include "daemon/ctl/dataset/recorded_manifest.hpp"
+#include "daemon/ctl/live/live_screen.hpp"
+#include "daemon/recording/recorder_stage.hpp"
+#include "daemon/recording/unix_socket.hpp"
+#include "drivers/base/monotonic_clock.hpp"
+#include "drivers/base/number_text.hpp"
+#include "drivers/dataset/robot_folder.hpp"
+#include "net/client/daemon_client.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Duration kManifestPeriod = 5s;
+constexpr std::size_t kMaxBlock = std::size_t{1} << 26;
+
+struct Block {
+  std::string kind;
+  std::string content;
+};
+
+/// The daemon's messages on the socket, as blocks.
+class BlockStream {
+ public:
+  explicit BlockStream(UniqueFd socket) : socket_(std::move(socket)) {}
+
+  [[nodiscard]] Result<void> request(std::string_view request) {
+    const std::string line = std::string(request) + '\n';
+    if (::send(socket_.get(), line.data(), line.size(), MSG_NOSIGNAL) < 0) return failure();
+    return {};
+  }
+
+  /// Waits at most 0.1 s for data. Returns false once the daemon has hung up.
+  [[nodiscard]] Result<bool> receive() {
+    pollfd watched{socket_.get(), POLLIN, 0};
+    if (::poll(&watched, 1, 100) <= 0) return true;
+    constexpr std::size_t kChunk = 1 << 16;
+    std::array<char, kChunk> chunk{};
+    const ssize_t count = ::recv(socket_.get(), chunk.data(), chunk.size(), 0);
+    if (count < 0 && errno != EINTR) return failure();
+    if (count > 0) received_.append(chunk.data(), static_cast<std::size_t>(count));
+    return count != 0;
+  }
+
+  /// The next complete block, if it has arrived.
+  [[nodiscard]] Result<std::optional<Block>> next() {
+    constexpr std::size_t kMaxHead = 64;
+    const std::size_t end = received_.find('\n');
+    if (end == std::string::npos && received_.size() <= kMaxHead) return std::nullopt;
+    const std::string head = received_.substr(0, std::min(end, kMaxHead));
+    const std::size_t space = head.find(' ');
+    std::size_t size = 0;
+    const bool is_head =
+        space != std::string::npos && parse_number(head.substr(space + 1), size).empty();
+    if (!is_head || size > kMaxBlock) return fail(ErrorCode::kFormat, "no crepesd speaks there");
+    if (received_.size() - end - 1 < size) return std::nullopt;
+    Block block{head.substr(0, space), received_.substr(end + 1, size)};
+    received_.erase(0, end + 1 + size);
+    return block;
+  }
+
+ private:
+  static tl::unexpected<Error> failure() {
+    return fail(ErrorCode::kIo, "record: " + std::generic_category().message(errno));
+  }
+
+  UniqueFd socket_;
+  std::string received_;
+};
+
+/// The stamp of a row.
+std::optional<Timestamp> stamp_at(std::string_view text) {
+  std::int64_t t_ns = 0;
+  if (!parse_number(text.substr(0, text.find(',')), t_ns).empty()) return std::nullopt;
+  return Timestamp{Duration{t_ns}};
+}
+
+/// Writes the blocks to the data set.
+class Recording {
+ public:
+  explicit Recording(std::filesystem::path dir) : dir_(std::move(dir)) {}
+
+  [[nodiscard]] Result<void> append(const Block& block) {
+    if (block.kind == "refused") return fail(ErrorCode::kIo, "record: " + block.content);
+    if (block.kind == "config") return apply_config(block.content);
+    if (!folder_) return fail(ErrorCode::kFormat, "record: measurements without a configuration");
+    if (block.kind == "picture") return append_picture(block.content);
+    if (block.kind == "gap") {
+      std::uint64_t missing = 0;
+      if (parse_number(block.content, missing).empty()) progress_.missing += missing;
+      return {};
+    }
+    return append_rows(block);
+  }
+
+  /// swarm.yaml for the measurements so far.
+  [[nodiscard]] Result<void> write_manifest(const std::vector<StatusMessage::Clock>& clocks) {
+    if (!folder_ || first_ > last_) return {};
+    return write_text_file(dir_ / "swarm.yaml", recorded_manifest(config_, first_, last_, clocks));
+  }
+
+  [[nodiscard]] const Config& config() const { return config_; }
+  [[nodiscard]] bool has_begun() const { return first_ <= last_; }
+  [[nodiscard]] RecordSummary summary(std::string why) const {
+    return {progress(), folder_ ? folder_->path() : dir_, std::move(why)};
+  }
+  [[nodiscard]] RecordProgress progress() const {
+    RecordProgress progress = progress_;
+    progress.bytes = folder_ ? folder_->bytes() : 0;
+    progress.seconds = has_begun() ? to_seconds(last_ - first_) : 0.0;
+    return progress;
+  }
+
+ private:
+  [[nodiscard]] Result<void> apply_config(const std::string& text) {
+    const CheckedConfig checked = check_config_text(text, "the daemon's configuration");
+    if (!checked.faults.empty()) return fail(ErrorCode::kConfig, to_string(checked.faults.front()));
+    config_ = checked.config;
+    ++progress_.configurations;
+    if (!folder_) folder_.emplace(dir_ / own_robot_name(config_));
+    return folder_->write_config(text);
+  }
+
+  [[nodiscard]] Result<void> append_rows(const Block& block) {
+    const bool is_camera = block.kind.starts_with("cam") && block.kind.size() <= 5;
+    std::size_t index = 0;
+    const bool is_known =
+        block.kind == "imu0" || block.kind == "uwb0" ||
+        (is_camera && parse_number(std::string_view(block.kind).substr(3), index).empty());
+    if (!is_known) return {};  // from a newer daemon
+    const std::string_view rows = block.content;
+    const std::size_t last_row = rows.substr(0, rows.size() - 1).rfind('\n') + 1;
+    for (const auto stamp : {stamp_at(rows), stamp_at(rows.substr(last_row))}) {
+      if (!stamp) return fail(ErrorCode::kFormat, "record: a row without a stamp");
+      first_ = std::min(first_, *stamp);
+      last_ = std::max(last_, *stamp);
+    }
+    progress_.rows += static_cast<std::uint64_t>(std::ranges::count(rows, '\n'));
+    return folder_->append(block.kind, rows);
+  }
+
+  [[nodiscard]] Result<void> append_picture(const std::string& content) {
+    const std::size_t end = content.find('\n');
+    std::istringstream head(content.substr(0, end));
+    int camera = -1;
+    std::int64_t t_ns = 0;
+    int width = 0;
+    int height = 0;
+    head >> camera >> t_ns >> width >> height;
+    const std::size_t pixels = end == std::string::npos ? 0 : content.size() - end - 1;
+    const bool is_whole =
+        width > 0 && height > 0 && camera >= 0 &&
+        pixels == static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    if (!is_whole) return fail(ErrorCode::kFormat, "record: a picture that is none");
+    std::vector<std::uint8_t> grey(content.begin() + static_cast<std::ptrdiff_t>(end) + 1,
+                                   content.end());
+    std::vector<std::uint8_t> png;
+    try {
+      cv::imencode(".png", cv::Mat(height, width, CV_8UC1, grey.data()), png,
+                   {cv::IMWRITE_PNG_COMPRESSION, 1});
+    } catch (const cv::Exception& e) {
+      return fail(ErrorCode::kIo, std::string("record: ") + e.what());
+    }
+    ++progress_.pictures;
+    return folder_->add_picture(fmt::format("cam{}", camera), Timestamp{Duration{t_ns}}, png);
+  }
+
+  std::filesystem::path dir_;
+  std::optional<RobotFolder> folder_;
+  Config config_;
+  Timestamp first_ = Timestamp::max();
+  Timestamp last_ = Timestamp::min();
+  RecordProgress progress_;
+};
+
+/// The peers' clocks as the daemon knows them; empty without an answer.
+std::vector<StatusMessage::Clock> ask_for_clocks(const SubscriptionConfig& subscription) {
+  if (subscription.listen.empty()) return {};
+  auto client = DaemonClient::open(subscription.listen.front(),
+                                   static_cast<std::uint16_t>(subscription.port));
+  if (!client || !client->poll()) return {};
+  for (int i = 0; i < 10; ++i) {
+    const auto answer = client->receive(50ms);
+    if (!answer || !*answer) continue;
+    if (const auto* status = std::get_if<StatusMessage>(&(*answer)->message)) return status->clocks;
+  }
+  return {};
+}
+
+/// Why the recording ends now; empty while it continues.
+std::string end_reason(const RecordOptions& options, const RecordProgress& progress,
+                       StopSignals& signals) {
+  if (signals.requested()) return "stopped";
+  if (options.duration_s && progress.seconds >= *options.duration_s) return "--duration is over";
+  if (progress.bytes >= options.max_bytes) return "--max-size is reached";
+  return "";
+}
+
+/// Records until something ends the recording. Returns the reason.
+Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recording& recording,
+                        StopSignals& signals) {
+  const MonotonicClock clock;
+  Timestamp next_manifest = clock.now();
+  for (;;) {
+    const Result<bool> goes_on = daemon.receive();
+    if (!goes_on) return tl::unexpected(goes_on.error());
+    for (;;) {
+      const auto block = daemon.next();
+      if (!block) return tl::unexpected(block.error());
+      if (!*block) break;
+      if (auto taken = recording.append(**block); !taken) return tl::unexpected(taken.error());
+    }
+    if (options.on_progress) options.on_progress(recording.progress());
+    if (std::string why = end_reason(options, recording.progress(), signals); !why.empty())
+      return why;
+    if (!*goes_on) return "the daemon hung up";
+    if (clock.now() < next_manifest) continue;
+    next_manifest = clock.now() + kManifestPeriod;
+    if (auto written = recording.write_manifest({}); !written)
+      return tl::unexpected(written.error());
+  }
+}
+
+}  // namespace
+
+Result<RecordSummary> record(const RecordOptions& options) {
+  std::error_code status;
+  if (std::filesystem::exists(options.dir / "swarm.yaml", status))
+    return fail(ErrorCode::kIo, options.dir.string() + ": has a data set already");
+  Result<UniqueFd> socket = connect_unix(options.socket);
+  if (!socket) {
+    return fail(ErrorCode::kNotFound, socket.error().message +
+                                          ": is crepesd running, with recording.socket set, and "
+                                          "are you root or of its group?");
+  }
+  StopSignals signals;
+  BlockStream daemon(std::move(*socket));
+  if (auto asked = daemon.request(options.pictures ? kPicturesRequest : kRecordRequest); !asked)
+    return tl::unexpected(asked.error());
+  Recording recording(options.dir);
+  const Result<std::string> why = run(options, daemon, recording, signals);
+  const auto clocks = ask_for_clocks(recording.config().subscription);
+  const Result<void> written = recording.write_manifest(clocks);
+  if (!why) return tl::unexpected(why.error());
+  if (!written) return tl::unexpected(written.error());
+  if (!recording.has_begun()) return fail(ErrorCode::kIo, "record: nothing came; " + *why);
+  return recording.summary(*why);
+}
+
+}  // namespace crepes

@@ -1,0 +1,44 @@
+/// crepesctl record: writes the measurements of a running daemon as a data set for replay.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+struct RecordProgress {
+  double seconds = 0.0;     ///< from the first measurement to the newest
+  std::uint64_t bytes = 0;  ///< on disk
+  std::uint64_t rows = 0;   ///< of all sensors
+  std::uint64_t pictures = 0;
+  std::uint64_t missing = 0;  ///< events that came faster than they could be written
+  int configurations = 0;     ///< more than one: the daemon was reloaded meanwhile
+};
+
+struct RecordOptions {
+  static constexpr std::uint64_t kDefaultMaxBytes = std::uint64_t{1} << 30;
+
+  std::filesystem::path dir;
+  std::filesystem::path socket = "/run/crepes/record";
+  bool pictures = false;
+  std::optional<double> duration_s;
+  std::uint64_t max_bytes = kDefaultMaxBytes;
+  std::function<void(const RecordProgress&)> on_progress{};
+};
+
+struct RecordSummary {
+  RecordProgress progress;
+  std::filesystem::path folder;  ///< the robot's
+  std::string end_reason;        ///< why it ended
+};
+
+/// Records until a signal, `duration_s`, `max_bytes`, or the end of the daemon. `dir` must not
+/// contain a data set. The data set is complete at the end and every few seconds before.
+[[nodiscard]] Result<RecordSummary> record(const RecordOptions& options);
+
+}  // namespace crepes

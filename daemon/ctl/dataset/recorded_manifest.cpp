@@ -1,0 +1,51 @@
+#include "daemon/ctl/dataset/recorded_manifest.hpp"
+
+#include <algorithm>
+
+#include "daemon/ctl/dataset/swarm_manifest.hpp"
+#include "daemon/ctl/text_table.hpp"
+
+namespace crepes {
+namespace {
+
+std::string name_of(const SwarmConfig& swarm, RobotId id) {
+  const auto member = std::ranges::find(swarm.members, id, &MemberConfig::id);
+  return member == swarm.members.end() ? "" : member->name;
+}
+
+SwarmRobot robot_of(const Config& config, RobotId id, const RobotClock& clock) {
+  const std::string name = name_of(config.swarm, id);
+  return {.id = id, .name = name, .dir = name, .clock = clock};
+}
+
+}  // namespace
+
+std::string own_robot_name(const Config& config) { return name_of(config.swarm, config.robot.id); }
+
+std::string recorded_manifest(const Config& config, Timestamp first, Timestamp last,
+                              const std::vector<StatusMessage::Clock>& clocks) {
+  const RobotClock own{to_seconds(first.time_since_epoch()), 0.0};
+  SwarmManifest manifest;
+  manifest.scenario = "recorded";
+  manifest.duration_s = to_seconds(last - first);
+  manifest.network = {.latency_ms = 3.0, .jitter_ms = 3.0, .loss = 0.0, .seed = 1};
+  manifest.robots = {robot_of(config, config.robot.id, own)};
+  std::string text =
+      "# One robot, as crepesctl record wrote it. True time is its own clock, from its first\n"
+      "# measurement on. The network was not recorded: latency, jitter and loss are assumptions.\n"
+      "# To replay it with others, put their folders beside this one's and list them here. "
+      "`clock`\n"
+      "# of another robot: offset_s is its clock minus this one's, plus this one's offset_s.\n" +
+      manifest_text(manifest);
+  if (!clocks.empty())
+    text += "# As this robot knew its peers' clocks; uncomment each robot whose folder is here:\n";
+  for (const StatusMessage::Clock& clock : clocks) {
+    // local = true (1 + skew) + offset, and at `last` local = last + clock.offset_s.
+    const double turned_s = manifest.duration_s * clock.skew_ppm * 1e-6;
+    const RobotClock peer{own.offset_s + clock.offset_s - turned_s, clock.skew_ppm};
+    text += "# " + robot_text(robot_of(config, clock.peer, peer));
+  }
+  return text;
+}
+
+}  // namespace crepes

@@ -1,0 +1,21 @@
+/// swarm.yaml of one robot's recording.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/schema/config.hpp"
+#include "net/client/daemon_client.hpp"
+
+namespace crepes {
+
+/// The name of this robot among its swarm's members.
+[[nodiscard]] std::string own_robot_name(const Config& config);
+
+/// The text for measurements from `first` to `last` on the robot's clock. True time begins at
+/// `first`. Robots with known clocks (as of `last`) are listed in comments, for users who add the
+/// recordings of those robots.
+[[nodiscard]] std::string recorded_manifest(const Config& config, Timestamp first, Timestamp last,
+                                            const std::vector<StatusMessage::Clock>& clocks);
+
+}  // namespace crepes

@@ -1,0 +1,47 @@
+/// A recorded swarm: the measurements of each robot, and how the recording was made.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "config/schema/config.hpp"
+#include "daemon/ctl/dataset/swarm_manifest.hpp"
+#include "drivers/dataset/dataset_faults.hpp"
+#include "estimator/core/measurements.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+struct RecordedImage {
+  Timestamp stamp{};
+  std::filesystem::path file;
+};
+
+/// The recording of one camera: spots, pictures, or both.
+struct CameraRecording {
+  std::vector<SpotFrame> spots;
+  std::vector<RecordedImage> images;
+};
+
+/// The inputs of one robot. The stamps of each sensor never decrease.
+struct RobotRecording {
+  SwarmRobot robot;
+  std::filesystem::path config_file;
+  Config config;
+  std::vector<ImuSample> imu;
+  std::vector<UwbRange> ranges;
+  std::vector<CameraRecording> cameras;  ///< one for each of config.cameras
+};
+
+struct SwarmDataset {
+  SwarmManifest manifest;
+  std::vector<RobotRecording> robots;  ///< in the manifest's order
+  DatasetFaults faults;                ///< the refused rows
+};
+
+/// Reads a whole data set. A missing file, a faulty swarm.yaml or crepesd.yaml is an error; a bad
+/// row is refused and listed in `faults`. If stamps are out of order, the smallest number of rows
+/// is refused that leaves the others in order.
+[[nodiscard]] Result<SwarmDataset> load_swarm(const std::filesystem::path& dir);
+
+}  // namespace crepes

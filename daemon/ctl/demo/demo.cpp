@@ -1,0 +1,307 @@
+#include "daemon/ctl/demo/demo.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "config/reading/config_file.hpp"
+#include "daemon/ctl/demo/child_process.hpp"
+#include "daemon/ctl/demo/demo_swarm.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "daemon/ctl/live/live_screen.hpp"
+#include "daemon/ctl/live/neighbor_view.hpp"
+#include "daemon/ctl/text_table.hpp"
+#include "drivers/base/monotonic_clock.hpp"
+#include "drivers/base/text_file.hpp"
+#include "drivers/sim/world.hpp"
+#include "estimator/core/constants.hpp"
+#include "net/client/daemon_client.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using Row = std::vector<std::string>;
+
+constexpr double kInFlight = 0.1;  // s; the last poses have not arrived when the time is over
+
+/// One robot and the client of its daemon.
+struct RunningRobot {
+  DemoRobot robot;
+  fs::path log;
+  DaemonClient client;
+};
+
+/// One ordered pair: all its poses, and the time of the first one.
+struct Pair {
+  std::size_t observer;
+  RobotId neighbor;
+  NeighborView view;
+  std::vector<NeighborPose> poses;
+  std::optional<Duration> first_pose;  ///< after the daemons' start
+};
+
+/// The last lines of a log.
+std::string tail_of(const fs::path& log) {
+  constexpr std::size_t kMaxBytes = 2000;
+  std::string text = read_text_file(log).value_or("");
+  if (text.size() <= kMaxBytes) return text;
+  text.erase(0, text.size() - kMaxBytes);
+  return text.substr(std::min(text.find('\n') + 1, text.size()));
+}
+
+/// Checks that the subscription ports are free, and finds a free port for the mesh.
+Result<std::uint16_t> free_mesh_port(std::uint16_t first, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto port = static_cast<std::uint16_t>(first + i);
+    if (const auto socket = UdpSocket::bind("127.0.0.1", port); !socket)
+      return tl::unexpected(Error(socket.error()).with_context("choose another --port"));
+  }
+  return UdpSocket::bind("127.0.0.1", 0).map([](const UdpSocket& socket) {
+    return socket.local().port;
+  });
+}
+
+class Demo {
+ public:
+  explicit Demo(const DemoOptions& options)
+      : options_(options), world_(sim_config(options)), start_(clock_.now()) {}
+
+  Result<void> start(const fs::path& dir) {
+    const std::vector<RobotId> ids = world_.robots();
+    const Result<std::uint16_t> mesh_port = free_mesh_port(options_.port, ids.size());
+    if (!mesh_port) return tl::unexpected(mesh_port.error());
+    std::error_code status;
+    const fs::path daemon = fs::read_symlink("/proc/self/exe", status).parent_path() / "crepesd";
+    start_ = clock_.now();
+    for (DemoRobot& robot :
+         demo_swarm(sim_config(options_), ids, epoch_s(), options_.port, *mesh_port)) {
+      if (auto done = start_robot(dir, daemon, std::move(robot)); !done) return done;
+    }
+    return {};
+  }
+
+  /// Runs until the time is over, a daemon ends, or a signal arrives.
+  Result<void> run(StopSignals& stop) {
+    std::optional<LiveScreen> screen;
+    if (options_.show_table) screen.emplace();
+    const Duration redraw_period =
+        screen && !screen->is_terminal() ? Duration{5s} : Duration{200ms};
+    Timestamp redraw = start_;
+    Timestamp renewal = start_;
+    while (world_s() < options_.for_s && !stop.requested()) {
+      if (auto alive = check_daemons(); !alive) return alive;
+      if (clock_.now() >= renewal) {
+        ask_all();
+        // More often at first, while the daemons open their sockets.
+        renewal = clock_.now() + (has_all_poses() ? Duration{1s} : Duration{50ms});
+      }
+      if (auto done = listen(); !done) return done;
+      if (clock_.now() < redraw) continue;
+      redraw = clock_.now() + redraw_period;
+      if (screen) screen->show(table());
+      if (options_.on_progress) options_.on_progress(world_s() / options_.for_s);
+    }
+    return {};
+  }
+
+  void stop() {
+    end_s_ = world_s();
+    for (const ChildProcess& daemon : daemons_) daemon.terminate();
+    daemons_.clear();
+  }
+
+  /// Scores the whole run of each pair.
+  [[nodiscard]] DemoSummary summarize() const {
+    DemoSummary summary{.scenario = options_.scenario,
+                        .seed = options_.seed,
+                        .from_s = scored_from_s(),
+                        .to_s = end_s_,
+                        .pairs = {}};
+    for (const Pair& pair : pairs_) {
+      summary.pairs.push_back({.observer = robots_.at(pair.observer).robot.config.robot.id,
+                               .neighbor = pair.neighbor,
+                               .first_pose = pair.first_pose,
+                               .score = score_of(pair)});
+    }
+    return summary;
+  }
+
+ private:
+  static SimConfig sim_config(const DemoOptions& options) {
+    SimConfig sim;
+    sim.enabled = true;
+    sim.scenario = options.scenario;
+    sim.seed = options.seed;
+    return sim;
+  }
+
+  [[nodiscard]] double epoch_s() const { return to_seconds(start_.time_since_epoch()); }
+  [[nodiscard]] double world_s() const { return to_seconds(clock_.now() - start_); }
+
+  /// The start is reported separately, as the time to the first pose.
+  [[nodiscard]] double scored_from_s() const { return std::min(5.0, end_s_ / 2.0); }
+
+  [[nodiscard]] std::string name_of(const Pair& pair) const {
+    return fmt::format("{}->{}", name_of_robot(robots_.at(pair.observer).robot.config.robot.id),
+                       name_of_robot(pair.neighbor));
+  }
+
+  [[nodiscard]] Pose truth(const Pair& pair, Timestamp local) const {
+    const DemoRobot& observer = robots_.at(pair.observer).robot;
+    return world_.T_B_N(observer.config.robot.id, pair.neighbor, observer.clock.true_s(local));
+  }
+
+  Result<void> start_robot(const fs::path& dir, const fs::path& daemon, DemoRobot robot) {
+    const RobotId id = robot.config.robot.id;
+    const fs::path file = dir / (name_of_robot(id) + ".yaml");
+    const fs::path log = dir / (name_of_robot(id) + ".log");
+    std::ofstream out(file);
+    out << write_config(robot.config);
+    out.close();
+    if (!out) return fail(ErrorCode::kIo, file.string() + ": cannot be written");
+    auto client =
+        DaemonClient::open("127.0.0.1", static_cast<std::uint16_t>(robot.config.subscription.port));
+    if (!client) return tl::unexpected(client.error());
+    auto process = ChildProcess::start(daemon, {"--config", file.string()}, log);
+    if (!process) return tl::unexpected(process.error());
+    for (const RobotId other : world_.robots()) {
+      if (other == id) continue;
+      pair_index_[{id, other}] = pairs_.size();
+      pairs_.push_back({.observer = robots_.size(),
+                        .neighbor = other,
+                        .view = {},
+                        .poses = {},
+                        .first_pose = {}});
+    }
+    robots_.push_back({std::move(robot), log, std::move(*client)});
+    daemons_.push_back(std::move(*process));
+    return {};
+  }
+
+  Result<void> check_daemons() {
+    for (std::size_t i = 0; i < daemons_.size(); ++i) {
+      const std::optional<std::string>& exit_reason = daemons_[i].exit_reason();
+      if (!exit_reason) continue;
+      const RunningRobot& robot = robots_[i];
+      return fail(ErrorCode::kIo, fmt::format("crepesd of {} ended: {}\n{}",
+                                              name_of_robot(robot.robot.config.robot.id),
+                                              *exit_reason, tail_of(robot.log)));
+    }
+    return {};
+  }
+
+  /// Requests to a daemon that does not run yet are lost.
+  void ask_all() {
+    for (RunningRobot& robot : robots_)
+      (void)robot.client.watch().and_then([&] { return robot.client.poll(); });
+  }
+
+  /// Waits briefly, then processes everything that has arrived.
+  Result<void> listen() {
+    std::chrono::milliseconds patience = 5ms;
+    for (RunningRobot& robot : robots_) {
+      for (;;) {
+        auto answer = robot.client.receive(patience);
+        if (!answer) return tl::unexpected(answer.error());
+        patience = 0ms;
+        if (!*answer) break;
+        handle(robot, (*answer)->message);
+      }
+    }
+    return {};
+  }
+
+  void handle(const RunningRobot& robot, const DaemonMessage& message) {
+    const RobotId self = robot.robot.config.robot.id;
+    if (const auto* heard = std::get_if<PoseMessage>(&message)) {
+      const auto index = pair_index_.find({self, heard->pose.neighbor});
+      if (index != pair_index_.end()) add_pose(pairs_[index->second], robot, heard->pose);
+    } else if (const auto* status = std::get_if<StatusMessage>(&message)) {
+      for (const StatusMessage::Neighbor& neighbor : status->neighbors) {
+        const auto index = pair_index_.find({self, neighbor.neighbor});
+        if (index != pair_index_.end()) pairs_[index->second].view.set_reason(neighbor.reason);
+      }
+    }
+  }
+
+  void add_pose(Pair& pair, const RunningRobot& robot, NeighborPose pose) {
+    pose.published = robot.robot.clock.local(world_s());
+    pair.view.update(pose, clock_.now());
+    if (!pair.first_pose) pair.first_pose = clock_.now() - start_;
+    if (pair.poses.empty() || pose.stamp > pair.poses.back().stamp) pair.poses.push_back(pose);
+  }
+
+  [[nodiscard]] bool has_all_poses() const {
+    return std::all_of(pairs_.begin(), pairs_.end(),
+                       [](const Pair& pair) { return pair.first_pose.has_value(); });
+  }
+
+  [[nodiscard]] std::string table() const {
+    std::vector<Row> rows{{"pair", "mode", "range m", "error m", "error deg", "sigma m", "deg",
+                           "age ms", "first pose s", "why not"}};
+    for (const Pair& pair : pairs_) rows.push_back(live_row(pair));
+    return fmt::format("world time {} s of {}\n\n{}", fixed(world_s(), 1), fixed(options_.for_s, 0),
+                       text_table(rows));
+  }
+
+  [[nodiscard]] Row live_row(const Pair& pair) const {
+    const std::string first = pair.first_pose ? fixed(to_seconds(*pair.first_pose), 2) : "";
+    const NeighborPose* pose = pair.view.pose(clock_.now());
+    if (pose == nullptr) {
+      return {name_of(pair), "-", "", "", "", "", "", "", first, pair.view.reason()};
+    }
+    const Pose T_B_N = truth(pair, pose->stamp);
+    const Vector6d d = pose_difference(pose->T_B_N.pose, T_B_N);
+    const PoseSigma sigma = sigma_of(pose->T_B_N.covariance);
+    return {name_of(pair),
+            std::string(crepes::name_of(pose->mode)),
+            fixed(T_B_N.p.norm(), 2),
+            fixed(d.head<3>().norm(), 3),
+            fixed(kDegPerRad * d.tail<3>().norm(), 2),
+            fixed(sigma.position_m, 3),
+            fixed(kDegPerRad * sigma.rotation_rad, 2),
+            fixed(1e3 * to_seconds(pose->published - pose->stamp), 1),
+            first,
+            ""};
+  }
+
+  [[nodiscard]] PairScore score_of(const Pair& pair) const {
+    const RobotClock& clock = robots_.at(pair.observer).robot.clock;
+    return score_pair(
+        pair.poses, [&](Timestamp t) { return truth(pair, t); }, clock.local(0.0),
+        {.begin = clock.local(scored_from_s()), .end = clock.local(end_s_ - kInFlight)});
+  }
+
+  DemoOptions options_;
+  MonotonicClock clock_;
+  SimWorld world_;
+  Timestamp start_;
+  std::vector<RunningRobot> robots_;
+  std::vector<ChildProcess> daemons_;  ///< one for each of robots_, while they run
+  std::vector<Pair> pairs_;
+  std::map<std::pair<RobotId, RobotId>, std::size_t> pair_index_;
+  double end_s_ = 0.0;  ///< world time at the end
+};
+
+}  // namespace
+
+Result<DemoSummary> demo(const DemoOptions& options) {
+  const Result<ScratchDirectory> directory = ScratchDirectory::create(options.keep);
+  if (!directory) return tl::unexpected(directory.error());
+  StopSignals stop;
+  Demo demo(options);
+  const Result<void> ran = demo.start(directory->path()).and_then([&] { return demo.run(stop); });
+  demo.stop();
+  if (!ran) return tl::unexpected(ran.error());
+  return demo.summarize();
+}
+
+}  // namespace crepes

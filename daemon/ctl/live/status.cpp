@@ -1,0 +1,96 @@
+#include "daemon/ctl/live/status.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "daemon/ctl/live/full_status.hpp"
+#include "daemon/ctl/text_table.hpp"
+
+namespace crepes {
+namespace {
+
+using Rows = std::vector<std::vector<std::string>>;
+
+/// For example "gated 3, late 1"; empty without totals.
+std::string text_of(const StatusMessage::Totals& totals) {
+  std::string text;
+  for (const auto& [name, total] : totals)
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, total);
+  return text;
+}
+
+std::string head_of(const StatusMessage& status) {
+  const double share = status.uptime_s > 0 ? 100.0 * status.cpu_s / status.uptime_s : 0.0;
+  return fmt::format("robot {} {}, up {} s, {} % of a core, {} MB\n", status.self.value,
+                     status.name, fixed(status.uptime_s, 0), fixed(share, 1),
+                     fixed(status.rss_mb, 0));
+}
+
+std::string sensors_of(const StatusMessage& status) {
+  Rows rows{{"sensor", "rate Hz", "state", "faults", "counts"}};
+  for (const auto& sensor : status.sensors) {
+    const std::string what = sensor.message.empty() ? "fault" : sensor.message;
+    rows.push_back({sensor.name, sensor.rate_hz > 0 ? fixed(sensor.rate_hz, 1) : "-",
+                    sensor.ok ? "ok" : what, text_of(sensor.faults), text_of(sensor.counts)});
+  }
+  return text_table(rows);
+}
+
+std::string neighbors_of(const StatusMessage& status) {
+  Rows rows{{"neighbor", "state", "heard ms ago", "lost %", "clock s", "+- ms", "ppm", "why not"}};
+  for (const auto& neighbor : status.neighbors) {
+    std::vector<std::string> row{
+        neighbor.name.empty() ? std::to_string(neighbor.neighbor.value) : neighbor.name,
+        neighbor.state};
+    const auto& reports = neighbor.reports;
+    const double sent = reports ? static_cast<double>(reports->received + reports->lost) : 0.0;
+    row.push_back(reports ? fixed(1e3 * reports->age_s, 0) : "-");
+    row.push_back(sent > 0 ? fixed(100.0 * static_cast<double>(reports->lost) / sent, 1) : "-");
+    const auto clock =
+        std::ranges::find(status.clocks, neighbor.neighbor, &StatusMessage::Clock::peer);
+    const bool known = clock != status.clocks.end();
+    row.push_back(known ? fixed(clock->offset_s, 6) : "-");
+    row.push_back(known ? fixed(1e3 * clock->sigma_s, 3) : "-");
+    row.push_back(known ? fixed(clock->skew_ppm, 1) : "-");
+    row.push_back(neighbor.reason);
+    rows.push_back(std::move(row));
+  }
+  return text_table(rows);
+}
+
+/// What the team finds wrong with a robot; on a healthy team this is empty.
+std::string faults_of(const StatusMessage& status) {
+  std::string text;
+  for (const std::string& fault : status.faults) text += fmt::format("this robot: {}\n", fault);
+  for (const auto& neighbor : status.neighbors) {
+    for (const std::string& fault : neighbor.faults)
+      text += fmt::format("{}: {}\n", neighbor.name, fault);
+  }
+  return text;
+}
+
+/// Everything refused, lost or dropped; on a healthy robot this is short.
+std::string totals_of(const StatusMessage& status) {
+  std::string text;
+  if (!status.network.empty()) text += fmt::format("network: {}\n", text_of(status.network));
+  if (!status.queues.empty())
+    text += fmt::format("dropped from queues: {}\n", text_of(status.queues));
+  return text;
+}
+
+}  // namespace
+
+std::string status_text(const StatusMessage& status) {
+  return fmt::format("{}\n{}\n{}\n{}{}", head_of(status), sensors_of(status), neighbors_of(status),
+                     faults_of(status), totals_of(status));
+}
+
+Result<std::string> status(const StatusOptions& options) {
+  return request_full_status(options.daemon).map([&](const FullStatus& full) {
+    return options.json ? full.json + "\n" : status_text(full.message);
+  });
+}
+
+}  // namespace crepes

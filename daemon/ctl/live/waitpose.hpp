@@ -1,0 +1,23 @@
+/// crepesctl waitpose: waits for a neighbor's pose, for scripts.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "net/client/daemon_client.hpp"
+
+namespace crepes {
+
+struct WaitposeOptions {
+  DaemonAddress daemon;
+  RobotId peer{};
+  double timeout_s = 10.0;
+  std::optional<double> max_sigma_m;  ///< the largest acceptable sigma of the position
+  bool json = false;
+};
+
+/// The pose on one line. If there is none in time, the error gives the reason. The daemon may start
+/// during the wait.
+[[nodiscard]] Result<std::string> wait_for_pose(const WaitposeOptions& options);
+
+}  // namespace crepes

@@ -1,0 +1,101 @@
+#include "daemon/ctl/live/watch.hpp"
+
+#include <chrono>
+
+#include "daemon/ctl/live/live_screen.hpp"
+#include "daemon/ctl/live/watch_screen.hpp"
+#include "drivers/base/monotonic_clock.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Duration kRenewal = 1s;     ///< of WATCH and POLL
+constexpr Duration kMaxSilence = 3s;  ///< a daemon silent for longer does not run
+
+Result<void> ask(DaemonClient& client, const WatchScreen& screen) {
+  return client.watch().and_then([&] { return client.poll(); }).and_then([&]() -> Result<void> {
+    if (const auto neighbor = screen.detailed_neighbor()) return client.poll(*neighbor);
+    return {};
+  });
+}
+
+/// Exchanges messages with the daemon. Calls `show` after every message or pause; `show` returns
+/// whether to continue.
+template <class Show>
+Result<void> converse(const WatchOptions& options, WatchScreen& screen, const Show& show) {
+  Result<DaemonClient> client = DaemonClient::open(options.daemon);
+  if (!client) return tl::unexpected(client.error());
+  const MonotonicClock clock;
+  const Timestamp start = clock.now();
+  Timestamp renewal = start;
+  std::optional<RobotId> asked;
+  StopSignals stop;
+  for (;;) {
+    const Timestamp now = clock.now();
+    if (stop.requested() || (options.for_s && now - start >= from_seconds(*options.for_s))) break;
+    if (now >= renewal || screen.detailed_neighbor() != asked) {
+      if (auto sent = ask(*client, screen); !sent) return sent;
+      renewal = now + kRenewal;
+      asked = screen.detailed_neighbor();
+    }
+    const auto answer = client->receive(50ms);
+    if (!answer) return tl::unexpected(answer.error());
+    if (*answer) screen.handle_message((*answer)->message, clock.now());
+    if (!screen.last_message_time() && now - start > kMaxSilence)
+      return tl::unexpected(no_answer_from(options.daemon));
+    if (!show(*answer, clock.now())) break;
+  }
+  if (!screen.last_message_time()) return tl::unexpected(no_answer_from(options.daemon));
+  return client->unwatch();
+}
+
+Result<void> stream_json(const WatchOptions& options) {
+  WatchScreen screen;
+  return converse(options, screen, [](const std::optional<DaemonAnswer>& answer, Timestamp) {
+    return !answer || print(answer->text + "\n");
+  });
+}
+
+/// Poses arrive within a period or two; STATUS names all neighbors.
+Result<void> show_once(const WatchOptions& options) {
+  constexpr Duration kCollect = 300ms;
+  WatchScreen screen;
+  std::optional<Timestamp> first;
+  return converse(options, screen, [&](const auto& /*answer*/, Timestamp now) {
+    if (!screen.has_status()) return true;
+    if (!first) first = now;
+    if (now - *first < kCollect) return true;
+    print(screen.text(now, false));
+    return false;
+  });
+}
+
+Result<void> show_live(const WatchOptions& options) {
+  WatchScreen screen;
+  const LiveScreen terminal;
+  const KeyReader keys;
+  const Duration period = terminal.is_terminal() ? 100ms : 1000ms;
+  const bool is_interactive = terminal.is_terminal() && keys.is_terminal();
+  Timestamp next{};
+  return converse(options, screen, [&](const auto& /*answer*/, Timestamp now) {
+    while (const auto key = keys.next()) {
+      screen.handle_key(*key);
+      next = now;
+    }
+    if (now < next) return !screen.should_quit();
+    next = now + period;
+    terminal.show(screen.text(now, is_interactive));
+    return !screen.should_quit();
+  });
+}
+
+}  // namespace
+
+Result<void> watch(const WatchOptions& options) {
+  if (options.json) return stream_json(options);
+  return options.once ? show_once(options) : show_live(options);
+}
+
+}  // namespace crepes

@@ -1,0 +1,56 @@
+/// The screen of crepesctl watch, and its keys. Pure: keys and messages in, text out.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/ctl/live/neighbor_view.hpp"
+#include "net/client/daemon_client.hpp"
+
+namespace crepes {
+
+class WatchScreen {
+ public:
+  enum class Order : std::uint8_t { kId, kName, kDistance, kSigma, kAge };
+
+  /// `now` is the client's time.
+  void handle_message(const DaemonMessage& message, Timestamp now);
+  /// q quits; s sorts by the next column; j and k (or the arrows, as ESC [ B and ESC [ A) pick a
+  /// neighbor; Enter shows or hides its details. Other keys do nothing.
+  void handle_key(char key);
+
+  [[nodiscard]] bool should_quit() const { return quit_; }
+  /// The neighbor whose details are shown and must be polled.
+  [[nodiscard]] std::optional<RobotId> detailed_neighbor() const;
+  [[nodiscard]] std::optional<Timestamp> last_message_time() const { return last_message_time_; }
+  [[nodiscard]] bool has_status() const { return status_.has_value(); }
+
+  /// The table; with a help line and the picked neighbor's details if `is_interactive`.
+  [[nodiscard]] std::string text(Timestamp now, bool is_interactive) const;
+
+ private:
+  void handle_status(const StatusMessage& status, Timestamp now);
+  [[nodiscard]] std::string head(Timestamp now) const;
+  [[nodiscard]] std::string name_of_robot(RobotId id) const;
+  [[nodiscard]] std::vector<RobotId> ordered(Timestamp now) const;
+  void pick(int step);
+
+  std::map<RobotId, NeighborView> neighbors_;
+  std::map<RobotId, std::string> names_;
+  std::optional<StatusMessage> status_;
+  std::optional<StatusMessage::Neighbor> details_;
+  std::optional<Timestamp> last_message_time_;
+  double cpu_share_ = 0.0;
+  std::string error_;
+  Order order_ = Order::kId;
+  std::optional<RobotId> picked_;
+  Timestamp last_{};  ///< of the last message
+  bool shows_details_ = false;
+  bool quit_ = false;
+  std::string escape_;  ///< the bytes so far of a key that sends several
+};
+
+}  // namespace crepes

@@ -1,0 +1,112 @@
+#include "daemon/ctl/replay/replay_output.hpp"
+
+#include <fmt/core.h>
+
+#include "drivers/dataset/pose_file.hpp"
+#include "drivers/dataset/record_file.hpp"
+#include "estimator/core/contract.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Duration kCalibrationPeriod = std::chrono::milliseconds(100);
+
+}  // namespace
+
+Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names, Detail detail) {
+  ReplayOutput output(dir, std::move(names));
+  std::error_code status;
+  fs::remove(dir / "report.json", status);  // the mark of a complete result is removed first
+  for (const auto& [observer, observer_name] : output.names_) {
+    fs::create_directories(dir / observer_name, status);
+    if (status) {
+      return fail(ErrorCode::kIo,
+                  fmt::format("{}: {}", (dir / observer_name).string(), status.message()));
+    }
+    for (const auto& [neighbor, neighbor_name] : output.names_) {
+      if (neighbor == observer) continue;
+      auto files = create_pair(dir / observer_name / neighbor_name, detail);
+      if (!files) return tl::unexpected(files.error());
+      output.pairs_.emplace(std::pair(observer, neighbor), std::move(*files));
+    }
+  }
+  return output;
+}
+
+Result<ReplayOutput::PairFiles> ReplayOutput::create_pair(const fs::path& stem, Detail detail) {
+  const auto create = [&stem](const char* extension, const std::string& header) {
+    fs::path file = stem;
+    return PartFile::create(file += extension, header);
+  };
+  auto csv = create(".csv", std::string(pose_file_header()) + '\n');
+  if (!csv) return tl::unexpected(csv.error());
+  auto tum = create(".tum", "");
+  if (!tum) return tl::unexpected(tum.error());
+  PairFiles files{.csv = std::move(*csv), .tum = std::move(*tum), .records = {}};
+  if (detail == Detail::kPoses) {
+    std::error_code status;
+    for (const char* extension : {".innovations.csv", ".calibration.csv"})
+      fs::remove(fs::path(stem) += extension, status);
+    return files;
+  }
+  auto innovations = create(".innovations.csv", innovation_file_header() + '\n');
+  if (!innovations) return tl::unexpected(innovations.error());
+  auto calibration = create(".calibration.csv", calibration_file_header() + '\n');
+  if (!calibration) return tl::unexpected(calibration.error());
+  files.records = RecordFiles{.innovations = std::move(*innovations),
+                              .calibration = std::move(*calibration),
+                              .last_calibration = {}};
+  return files;
+}
+
+ReplayOutput::PairFiles& ReplayOutput::files_of(RobotId observer, RobotId neighbor) {
+  const auto pair = pairs_.find({observer, neighbor});
+  CREPES_EXPECT(pair != pairs_.end(), "results of a robot that is not in the data set");
+  return pair->second;
+}
+
+void ReplayOutput::write(RobotId observer, const NeighborPose& pose) {
+  CREPES_EXPECT(pose.T_B_N.pose.p.allFinite() && pose.T_B_N.pose.q.coeffs().allFinite() &&
+                    pose.T_B_N.covariance.allFinite(),
+                "a pose that is not finite");
+  PairFiles& files = files_of(observer, pose.neighbor);
+  append_pose_row(files.csv.text(), pose);
+  files.csv.flush_if_large();
+  append_tum_row(files.tum.text(), pose);
+  files.tum.flush_if_large();
+}
+
+void ReplayOutput::write(RobotId observer, const Records& records) {
+  for (const MeasurementRecord& record : records.measurements) {
+    auto& files = files_of(observer, record.neighbor).records;
+    CREPES_EXPECT(files.has_value(), "records for an output that takes poses only");
+    append_innovation_row(files->innovations.text(), record);
+    files->innovations.flush_if_large();
+  }
+  for (const CalibrationRecord& record : records.calibrations) {
+    auto& files = files_of(observer, record.neighbor).records;
+    CREPES_EXPECT(files.has_value(), "records for an output that takes poses only");
+    if (files->last_calibration && record.stamp - *files->last_calibration < kCalibrationPeriod)
+      continue;
+    files->last_calibration = record.stamp;
+    append_calibration_row(files->calibration.text(), record);
+    files->calibration.flush_if_large();
+  }
+}
+
+Result<void> ReplayOutput::finish(const ReplayReport& report) {
+  for (auto& [pair, files] : pairs_) {
+    if (auto done = files.csv.publish(); !done) return done;
+    if (auto done = files.tum.publish(); !done) return done;
+    if (!files.records) continue;
+    if (auto done = files.records->innovations.publish(); !done) return done;
+    if (auto done = files.records->calibration.publish(); !done) return done;
+  }
+  auto file = PartFile::create(dir_ / "report.json", report_json(report, names_));
+  if (!file) return tl::unexpected(file.error());
+  return file->publish();
+}
+
+}  // namespace crepes

@@ -1,0 +1,361 @@
+#include "daemon/ctl/replay/swarm_replay.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <deque>
+#include <map>
+#include <queue>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "config/schema/estimator_slice.hpp"
+#include "daemon/ctl/dataset/swarm_dataset.hpp"
+#include "daemon/ctl/dataset/truth.hpp"
+#include "daemon/ctl/replay/replay_output.hpp"
+#include "daemon/ctl/replay/simulated_network.hpp"
+#include "drivers/camera/image_folder.hpp"
+#include "estimator/swarm/estimator.hpp"
+#include "estimator/vision/spot_detector.hpp"
+#include "net/mesh/peer_link.hpp"
+
+namespace crepes {
+namespace {
+
+// The time that a graph solution takes on a robot; the paper needs 3 ms.
+constexpr double kGraphLatency = 0.005;  // s
+constexpr double kMaxIdError = 0.05;  // rad; a bearing with a larger error belongs to another robot
+constexpr double kClockSamplePeriod = 1.0;  // s
+
+using Datagram = std::vector<std::uint8_t>;
+// Only the name of an image; it is decoded when it is due.
+struct PendingImage {
+  std::uint8_t camera = 0;
+  RecordedImage image;
+};
+using Input = std::variant<Event, Datagram, PendingImage>;
+
+/// An input that reaches a robot at an instant of true time.
+struct Arrival {
+  double true_s = 0.0;
+  std::uint64_t order = 0;  ///< breaks ties in the order of scheduling
+  std::size_t robot = 0;
+  Input what;
+};
+
+struct Later {
+  bool operator()(const Arrival& a, const Arrival& b) const {
+    return std::pair(a.true_s, a.order) > std::pair(b.true_s, b.order);
+  }
+};
+
+class CpuTimer {
+ public:
+  explicit CpuTimer(double& total_s) : total_s_(total_s), start_s_(now()) {}
+  CpuTimer(const CpuTimer&) = delete;
+  CpuTimer& operator=(const CpuTimer&) = delete;
+  CpuTimer(CpuTimer&&) = delete;
+  CpuTimer& operator=(CpuTimer&&) = delete;
+  ~CpuTimer() { total_s_ += now() - start_s_; }
+
+ private:
+  static double now() {
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  }
+
+  double& total_s_;
+  double start_s_;
+};
+
+struct StageTimes {
+  double vision_s = 0.0;
+  double estimator_s = 0.0;
+  double graph_s = 0.0;
+  double net_s = 0.0;
+};
+
+std::vector<RobotId> member_ids(const Config& config) {
+  std::vector<RobotId> ids;
+  for (const MemberConfig& member : config.swarm.members) ids.push_back(member.id);
+  return ids;
+}
+
+/// The state that the daemon's threads own, for one robot.
+struct Robot {
+  explicit Robot(RobotRecording recorded)
+      : recording(std::move(recorded)),
+        estimator(estimator_settings(recording.config)),
+        link(recording.robot.id, member_ids(recording.config)),
+        detector(recording.config.vision),
+        period(from_seconds(1.0 / recording.config.estimator.output_rate_hz)) {}
+
+  RobotRecording recording;
+  Estimator estimator;
+  TeamSolver team;
+  PeerLink link;
+  SpotDetector detector;
+  Duration period;
+  double next_clock_sample_s = 0.0;
+  std::map<RobotId, std::uint64_t> id_mistakes;
+  std::uint64_t datagrams_sent = 0;
+  std::uint64_t bytes_sent = 0;
+  StageTimes cpu;
+
+  [[nodiscard]] RobotId id() const { return recording.robot.id; }
+  [[nodiscard]] const RobotClock& clock() const { return recording.robot.clock; }
+};
+
+class SwarmReplay {
+ public:
+  SwarmReplay(SwarmDataset dataset, const std::optional<SwarmTruth>& truth,
+              const ReplayOptions& options, const ReplaySinks& sinks)
+      : manifest_(std::move(dataset.manifest)),
+        truth_(truth),
+        sinks_(sinks),
+        faults_(std::move(dataset.faults)),
+        network_(manifest_.network, options.seed.value_or(manifest_.network.seed)) {
+    for (RobotRecording& recording : dataset.robots) {
+      recording.config.graph.enabled &= options.graph;
+      if (options.profile) recording.config.estimator.profile = *options.profile;
+      robots_.emplace_back(std::move(recording));
+      if (sinks.on_records) robots_.back().estimator.keep_records();
+    }
+    for (std::size_t i = 0; i < robots_.size(); ++i) schedule_recording(i);
+  }
+
+  [[nodiscard]] Result<void> run(const std::function<void(double)>& on_progress);
+  [[nodiscard]] ReplayReport report(const ReplayOptions& options) const;
+
+ private:
+  void schedule(double true_s, std::size_t robot, Input what) {
+    queue_.push({true_s, next_order_++, robot, std::move(what)});
+  }
+  void schedule_at(Timestamp local, std::size_t robot, Input what) {
+    schedule(robots_[robot].clock().true_s(local), robot, std::move(what));
+  }
+  void schedule_recording(std::size_t index);
+  [[nodiscard]] Result<void> deliver(const Arrival& arrival);
+  void step(const Arrival& arrival, const Event& event);
+  void handle_outputs(const Arrival& arrival, const Outputs& outputs);
+  void broadcast(const Arrival& arrival, const Report& report);
+  void count_id_mistakes(Robot& robot, const std::vector<Bearing>& bearings);
+  void sample_clocks(Robot& robot, double true_s);
+
+  SwarmManifest manifest_;
+  const std::optional<SwarmTruth>& truth_;
+  const ReplaySinks& sinks_;
+  DatasetFaults faults_;
+  SimulatedNetwork network_;
+  std::deque<Robot> robots_;
+  std::priority_queue<Arrival, std::vector<Arrival>, Later> queue_;
+  std::uint64_t next_order_ = 0;
+  std::vector<ClockSample> clocks_;
+};
+
+void SwarmReplay::schedule_recording(std::size_t index) {
+  RobotRecording& recording = robots_[index].recording;
+  for (const ImuSample& sample : recording.imu) schedule_at(sample.stamp, index, Event(sample));
+  for (const UwbRange& range : recording.ranges) schedule_at(range.stamp, index, Event(range));
+  for (std::size_t k = 0; k < recording.cameras.size(); ++k) {
+    CameraRecording& camera = recording.cameras[k];
+    for (SpotFrame& frame : camera.spots) {
+      const Timestamp stamp = frame.stamp;
+      schedule_at(stamp, index, Event(std::move(frame)));
+    }
+    if (!camera.spots.empty()) continue;  // if a camera has both, the spots are the smaller input
+    for (const RecordedImage& image : camera.images) {
+      schedule_at(image.stamp, index, PendingImage{static_cast<std::uint8_t>(k), image});
+    }
+  }
+  if (recording.imu.empty()) return;
+  const Duration period = robots_[index].period;
+  const Timestamp end = recording.imu.back().stamp;
+  for (Timestamp t = recording.imu.front().stamp; t <= end; t += period) {
+    schedule_at(t, index, Event(Tick{t}));
+  }
+}
+
+Result<void> SwarmReplay::run(const std::function<void(double)>& on_progress) {
+  double reported = 0.0;
+  while (!queue_.empty()) {
+    const Arrival arrival = queue_.top();
+    queue_.pop();
+    if (auto done = deliver(arrival); !done) return done;
+    const double share = arrival.true_s / manifest_.duration_s;
+    if (on_progress && share >= reported + 0.01) on_progress(reported = std::min(share, 1.0));
+  }
+  return {};
+}
+
+Result<void> SwarmReplay::deliver(const Arrival& arrival) {
+  Robot& robot = robots_[arrival.robot];
+  if (const auto* event = std::get_if<Event>(&arrival.what)) {
+    step(arrival, *event);
+  } else if (const auto* datagram = std::get_if<Datagram>(&arrival.what)) {
+    std::optional<ReceivedReport> received;
+    {
+      const CpuTimer timer(robot.cpu.net_s);
+      received = robot.link.receive(*datagram, robot.clock().local(arrival.true_s));
+    }
+    if (received) step(arrival, Event(std::move(*received)));
+  } else {
+    const auto& due = std::get<PendingImage>(arrival.what);
+    const auto image = read_gray_image(due.image.file);
+    if (!image) return tl::unexpected(image.error());
+    SpotFrame frame{.stamp = due.image.stamp, .camera = due.camera, .spots = {}};
+    {
+      const CpuTimer timer(robot.cpu.vision_s);
+      const Detection found = robot.detector.detect({.pixels = image->pixels.data(),
+                                                     .width = image->width,
+                                                     .height = image->height,
+                                                     .stride = image->width});
+      frame.spots.assign(found.spots.begin(), found.spots.end());
+    }
+    step(arrival, Event(std::move(frame)));
+  }
+  return {};
+}
+
+void SwarmReplay::step(const Arrival& arrival, const Event& event) {
+  Robot& robot = robots_[arrival.robot];
+  Outputs outputs;
+  {
+    const bool is_vision = std::holds_alternative<SpotFrame>(event);
+    const CpuTimer timer(is_vision ? robot.cpu.vision_s : robot.cpu.estimator_s);
+    outputs = robot.estimator.step(event);
+  }
+  handle_outputs(arrival, outputs);
+}
+
+void SwarmReplay::handle_outputs(const Arrival& arrival, const Outputs& outputs) {
+  Robot& robot = robots_[arrival.robot];
+  for (const NeighborPose& pose : outputs.poses) sinks_.on_pose(robot.id(), pose);
+  if (sinks_.on_records) sinks_.on_records(robot.id(), outputs.records);
+  if (outputs.report) {
+    Report report = *outputs.report;
+    if (sinks_.on_report) sinks_.on_report(report);
+    broadcast(arrival, report);
+  }
+  if (outputs.team_problem) {
+    const CpuTimer timer(robot.cpu.graph_s);
+    Event solution = robot.team.solve(*outputs.team_problem, robot.recording.config.graph);
+    schedule(arrival.true_s + kGraphLatency, arrival.robot, std::move(solution));
+  }
+  count_id_mistakes(robot, outputs.bearings);
+  sample_clocks(robot, arrival.true_s);
+}
+
+void SwarmReplay::broadcast(const Arrival& arrival, const Report& report) {
+  Robot& robot = robots_[arrival.robot];
+  Datagram datagram;
+  {
+    const CpuTimer timer(robot.cpu.net_s);
+    datagram = robot.link.compose(report, robot.clock().local(arrival.true_s));
+  }
+  ++robot.datagrams_sent;
+  robot.bytes_sent += datagram.size();
+  for (std::size_t i = 0; i < robots_.size(); ++i) {
+    if (i == arrival.robot) continue;
+    if (const auto delay_s = network_.delay_s()) schedule(arrival.true_s + *delay_s, i, datagram);
+  }
+}
+
+void SwarmReplay::count_id_mistakes(Robot& robot, const std::vector<Bearing>& bearings) {
+  if (!truth_) return;
+  const auto& members = robot.recording.config.swarm.members;
+  for (const Bearing& bearing : bearings) {
+    const auto T_B_N = truth_->relative(robot.id(), bearing.neighbor, bearing.stamp);
+    const auto member = std::find_if(members.begin(), members.end(), [&](const MemberConfig& m) {
+      return m.id == bearing.neighbor;
+    });
+    if (!T_B_N || member == members.end()) continue;
+    if (bearing_error_rad(bearing, *T_B_N, member->p_body_led) > kMaxIdError) {
+      ++robot.id_mistakes[bearing.neighbor];
+    }
+  }
+}
+
+void SwarmReplay::sample_clocks(Robot& robot, double true_s) {
+  if (true_s < robot.next_clock_sample_s) return;
+  robot.next_clock_sample_s += kClockSamplePeriod;
+  const Timestamp stamp = robot.clock().local(true_s);
+  for (const ClockStatus& clock : robot.link.clocks()) {
+    clocks_.push_back({robot.id(), stamp, clock});
+  }
+}
+
+ReplayReport SwarmReplay::report(const ReplayOptions& options) const {
+  ReplayReport report;
+  report.scenario = manifest_.scenario;
+  report.graph = options.graph;
+  report.seed = options.seed.value_or(manifest_.network.seed);
+  report.duration_s = manifest_.duration_s;
+  report.clocks = clocks_;
+  report.faults = faults_;
+  for (const Robot& robot : robots_) {
+    const bool paper = robot.recording.config.estimator.profile == Profile::kPaper;
+    report.profile = paper ? "paper" : "tight";
+    RobotReport one;
+    one.robot = robot.id();
+    one.status = robot.estimator.status();
+    if (truth_) one.id_mistakes = robot.id_mistakes;
+    one.datagrams_sent = robot.datagrams_sent;
+    one.bytes_sent = robot.bytes_sent;
+    one.network = robot.link.counters().totals();
+    one.cpu_s = {{"vision", robot.cpu.vision_s},
+                 {"estimator", robot.cpu.estimator_s},
+                 {"graph", robot.cpu.graph_s},
+                 {"net", robot.cpu.net_s}};
+    report.robots.push_back(std::move(one));
+  }
+  return report;
+}
+
+}  // namespace
+
+Result<ReplayReport> replay_dataset(SwarmDataset dataset, const std::optional<SwarmTruth>& truth,
+                                    const ReplayOptions& options, const ReplaySinks& sinks) {
+  SwarmReplay replay(std::move(dataset), truth, options, sinks);
+  if (auto done = replay.run(options.on_progress); !done) return tl::unexpected(done.error());
+  return replay.report(options);
+}
+
+Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
+  auto dataset = load_swarm(options.swarm_dir);
+  if (!dataset) return tl::unexpected(dataset.error());
+  ReplayOutput::Names names;
+  for (const RobotRecording& robot : dataset->robots) names[robot.robot.id] = robot.robot.name;
+  std::optional<SwarmTruth> truth;  // judges IDs for the report; no estimator sees it
+  if (std::filesystem::exists(options.swarm_dir / "truth")) {
+    auto loaded = SwarmTruth::load(options.swarm_dir, dataset->manifest);
+    if (!loaded) return tl::unexpected(loaded.error());
+    truth = std::move(*loaded);
+  }
+  auto output = ReplayOutput::create(
+      options.out_dir, std::move(names),
+      options.records ? ReplayOutput::Detail::kRecords : ReplayOutput::Detail::kPoses);
+  if (!output) return tl::unexpected(output.error());
+
+  ReplaySummary summary{.robots = dataset->robots.size(),
+                        .duration_s = dataset->manifest.duration_s,
+                        .faults = dataset->faults};
+  ReplaySinks sinks;
+  sinks.on_pose = [&](RobotId observer, const NeighborPose& pose) {
+    output->write(observer, pose);
+    ++summary.poses;
+  };
+  if (options.records) {
+    sinks.on_records = [&](RobotId observer, const Records& records) {
+      output->write(observer, records);
+    };
+  }
+  const auto report = replay_dataset(std::move(*dataset), truth, options, sinks);
+  if (!report) return tl::unexpected(report.error());
+  if (auto done = output->finish(*report); !done) return tl::unexpected(done.error());
+  return summary;
+}
+
+}  // namespace crepes

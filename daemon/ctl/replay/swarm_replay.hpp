@@ -1,0 +1,54 @@
+/// Replays a recorded swarm: every robot runs the daemon's estimation on virtual time.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "config/schema/config.hpp"
+#include "daemon/ctl/dataset/swarm_dataset.hpp"
+#include "daemon/ctl/dataset/truth.hpp"
+#include "daemon/ctl/replay/replay_output.hpp"
+#include "drivers/dataset/dataset_faults.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+struct ReplayOptions {
+  std::filesystem::path swarm_dir;
+  std::filesystem::path out_dir;
+  std::optional<Profile> profile;     ///< overrides the configuration files
+  bool graph = true;                  ///< false: no pose graph, even if the files enable it
+  bool records = false;               ///< also writes the residual and verdict of every measurement
+  std::optional<std::uint64_t> seed;  ///< seed of the network; overrides swarm.yaml
+  std::function<void(double)> on_progress;  ///< progress, 0..1, called regularly
+};
+
+struct ReplaySummary {
+  std::size_t robots = 0;
+  std::uint64_t poses = 0;  ///< rows written
+  double duration_s = 0.0;  ///< of the recording
+  DatasetFaults faults;
+};
+
+/// No threads, one queue in the order of true time: the same input and seed give the same poses to
+/// the last bit. The robots see only their own clocks.
+[[nodiscard]] Result<ReplaySummary> replay_swarm(const ReplayOptions& options);
+
+/// The receivers of the robots' outputs.
+struct ReplaySinks {
+  std::function<void(RobotId observer, const NeighborPose&)> on_pose;
+  std::function<void(RobotId observer, const Records&)> on_records;  ///< empty: none are kept
+  /// May change a report before it is sent, for studies of faulty members; may be empty.
+  std::function<void(Report&)> on_report;
+};
+
+/// The same from memory; the directories in `options` are not used. `truth` counts wrong IDs for
+/// the report; no estimator receives it. A picture that cannot be read is an error.
+[[nodiscard]] Result<ReplayReport> replay_dataset(SwarmDataset dataset,
+                                                  const std::optional<SwarmTruth>& truth,
+                                                  const ReplayOptions& options,
+                                                  const ReplaySinks& sinks);
+
+}  // namespace crepes

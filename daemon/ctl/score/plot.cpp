@@ -1,0 +1,191 @@
+#include "daemon/ctl/score/plot.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "daemon/ctl/dataset/swarm_manifest.hpp"
+#include "daemon/ctl/dataset/truth.hpp"
+#include "daemon/ctl/score/plot_pair.hpp"
+#include "daemon/ctl/score/plot_style.hpp"
+#include "daemon/ctl/score/svg_chart.hpp"
+#include "drivers/dataset/part_file.hpp"
+#include "drivers/dataset/pose_file.hpp"
+#include "drivers/dataset/record_file.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The names of a pair, as in its file names.
+struct PairName {
+  std::string observer;
+  std::string neighbor;
+};
+
+/// Every DIR/<observer>/<neighbor>.csv, in order.
+std::vector<PairName> pairs_in(const fs::path& results) {
+  std::vector<PairName> pairs;
+  std::error_code status;
+  for (const auto& dir : fs::directory_iterator(results, status)) {
+    if (!dir.is_directory(status)) continue;
+    for (const auto& file : fs::directory_iterator(dir.path(), status)) {
+      const fs::path stem = file.path().stem();
+      if (file.path().extension() == ".csv" && !stem.has_extension())
+        pairs.push_back({dir.path().filename().string(), stem.string()});
+    }
+  }
+  std::sort(pairs.begin(), pairs.end(), [](const PairName& a, const PairName& b) {
+    return std::tie(a.observer, a.neighbor) < std::tie(b.observer, b.neighbor);
+  });
+  return pairs;
+}
+
+struct PlottedRecording {
+  SwarmManifest manifest;
+  SwarmTruth truth;
+};
+
+Result<PlottedRecording> load_recording(const fs::path& swarm) {
+  auto manifest = load_manifest(swarm);
+  if (!manifest) return tl::unexpected(manifest.error());
+  auto truth = SwarmTruth::load(swarm, *manifest);
+  if (!truth) return tl::unexpected(truth.error());
+  return PlottedRecording{std::move(*manifest), std::move(*truth)};
+}
+
+Result<SwarmRobot> robot_named(const PlottedRecording& recording, const std::string& name,
+                               const PlotOptions& options) {
+  for (const SwarmRobot& robot : recording.manifest.robots)
+    if (robot.name == name) return robot;
+  return fail(ErrorCode::kNotFound,
+              fmt::format("{}: no robot '{}', of which there are results in {}",
+                          options.swarm.string(), name, options.results.string()));
+}
+
+/// Records may be missing, but existing ones must be valid.
+template <class Record>
+Result<std::vector<Record>> optional_records(Result<std::vector<Record>> records) {
+  if (!records && records.error().code == ErrorCode::kNotFound) return std::vector<Record>{};
+  return records;
+}
+
+Result<PairData> load_pair(const PlotOptions& options, const PairName& name) {
+  const fs::path stem = options.results / name.observer / name.neighbor;
+  const auto file = [&stem](const char* extension) { return fs::path(stem) += extension; };
+  auto poses = read_pose_file(file(".csv"), {});
+  if (!poses) return tl::unexpected(poses.error());
+  auto measurements = optional_records(read_innovation_file(file(".innovations.csv")));
+  if (!measurements) return tl::unexpected(measurements.error());
+  auto calibrations = optional_records(read_calibration_file(file(".calibration.csv")));
+  if (!calibrations) return tl::unexpected(calibrations.error());
+  return PairData{.observer = name.observer,
+                  .neighbor = name.neighbor,
+                  .poses = std::move(*poses),
+                  .measurements = std::move(*measurements),
+                  .calibrations = std::move(*calibrations),
+                  .truth = {},
+                  .seconds = {},
+                  .duration_s = 0.0};
+}
+
+/// Seconds of true time if it is known, otherwise since the observer's first row.
+Result<void> set_time_axis(const std::optional<PlottedRecording>& recording,
+                           const PlotOptions& options, PairData& pair) {
+  if (!recording) {
+    const Timestamp start = pair.poses.empty() ? Timestamp{} : pair.poses.front().stamp;
+    pair.seconds = [start](Timestamp t) { return to_seconds(t - start); };
+    pair.duration_s = pair.poses.empty() ? 1.0 : pair.seconds(pair.poses.back().stamp) + 0.02;
+    return {};
+  }
+  const auto observer = robot_named(*recording, pair.observer, options);
+  if (!observer) return tl::unexpected(observer.error());
+  const auto neighbor = robot_named(*recording, pair.neighbor, options);
+  if (!neighbor) return tl::unexpected(neighbor.error());
+  pair.truth = [&recording, B = observer->id, N = neighbor->id](Timestamp local) {
+    return recording->truth.relative(B, N, local);
+  };
+  pair.seconds = [clock = observer->clock](Timestamp local) { return clock.true_s(local); };
+  pair.duration_s = recording->manifest.duration_s;
+  return {};
+}
+
+std::string anchor(const PairData& pair) {
+  return fmt::format("{}-{}", pair.observer, pair.neighbor);
+}
+
+std::string table_row(const std::vector<std::string>& cells, const char* tag,
+                      const std::string& link = {}) {
+  std::string row = "<tr>";
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::string text = xml_escaped(cells[i]);
+    const bool linked = i == 0 && !link.empty();
+    row +=
+        fmt::format("<{0}>{1}</{0}>", tag,
+                    linked ? fmt::format("<a href='#{}'>{}</a>", xml_escaped(link), text) : text);
+  }
+  return row + "</tr>\n";
+}
+
+std::string page_of(const PlotOptions& options, const std::vector<PairData>& pairs) {
+  const std::string title = "CREPES replay " + xml_escaped(options.results.string());
+  std::string html = fmt::format(
+      "<!DOCTYPE html>\n<html lang='en'><head><meta "
+      "charset='utf-8'><title>{0}</title>\n<style>{1}</style></head><body>\n<h1>{0}</h1>\n",
+      title, kPlotStyle);
+  html += options.swarm.empty() ? "<p>Without truth: uncertainties only.</p>\n"
+                                : fmt::format("<p>Against the truth of {}.</p>\n",
+                                              xml_escaped(options.swarm.string()));
+  html +=
+      "<p>B observes N. Position in B's axes, orientation as a rotation vector in N's. All rows "
+      "are scored, the first seconds included.</p>\n<nav>";
+  for (const PairData& pair : pairs) {
+    html += fmt::format("<a href='#{}'>{} → {}</a>", xml_escaped(anchor(pair)),
+                        xml_escaped(pair.observer), xml_escaped(pair.neighbor));
+  }
+  html += "</nav>\n<table>" + table_row(summary_header(), "th");
+  for (const PairData& pair : pairs) html += table_row(summary_row(pair), "td", anchor(pair));
+  html += "</table>\n";
+  for (const PairData& pair : pairs) {
+    html += fmt::format("<h2 id='{}'>{} as seen by {}</h2>\n{}", xml_escaped(anchor(pair)),
+                        xml_escaped(pair.neighbor), xml_escaped(pair.observer), pair_charts(pair));
+  }
+  return html + "</body></html>\n";
+}
+
+}  // namespace
+
+Result<fs::path> plot(const PlotOptions& options) {
+  const std::vector<PairName> names = pairs_in(options.results);
+  if (names.empty()) {
+    return fail(ErrorCode::kNotFound,
+                options.results.string() + ": no <observer>/<neighbor>.csv of a replay");
+  }
+  std::optional<PlottedRecording> recording;
+  if (!options.swarm.empty()) {
+    auto loaded = load_recording(options.swarm);
+    if (!loaded) return tl::unexpected(loaded.error());
+    recording = std::move(*loaded);
+  }
+  std::vector<PairData> pairs;
+  for (const PairName& name : names) {
+    auto pair = load_pair(options, name);
+    if (!pair) return tl::unexpected(pair.error());
+    if (auto done = set_time_axis(recording, options, *pair); !done)
+      return tl::unexpected(done.error());
+    pairs.push_back(std::move(*pair));
+  }
+  fs::path out = options.out.empty() ? options.results / "plot.html" : options.out;
+  auto page = PartFile::create(out, page_of(options, pairs));
+  if (!page) return tl::unexpected(page.error());
+  if (auto done = page->publish(); !done) return tl::unexpected(done.error());
+  return out;
+}
+
+}  // namespace crepes

@@ -1,0 +1,249 @@
+#include "daemon/devices/serial_sensors.hpp"
+
+#include <fmt/core.h>
+
+#include <utility>
+
+#include "drivers/detect_protocol.hpp"
+#include "drivers/imu/bundle_spacing.hpp"
+#include "drivers/imu/hipnuc.hpp"
+#include "drivers/imu/imu_correction.hpp"
+#include "drivers/imu/imu_health.hpp"
+#include "drivers/imu/mavlink.hpp"
+#include "drivers/imu/witmotion.hpp"
+#include "drivers/imu/xsens.hpp"
+#include "drivers/serial/device_name.hpp"
+#include "drivers/serial/serial_reader.hpp"
+#include "drivers/uwb/nlink.hpp"
+
+namespace crepes {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// A module may send other frames beside those with ranges.
+SensorTotals totals_of(const NlinkCounts& counts) {
+  return {.faults = {{"unknown_modules", counts.unknown_modules},
+                     {"implausible", counts.implausible},
+                     {"clock_restarts", counts.clock_restarts}},
+          .counts = {{"ranges", counts.ranges}, {"without_ranges", counts.without_ranges}}};
+}
+
+/// An autopilot may send numbers without a unit beside samples.
+SensorTotals totals_of(const ImuCounts& counts) {
+  return {.faults = {{"partial", counts.partial},
+                     {"saturated", counts.saturated},
+                     {"implausible", counts.implausible},
+                     {"clock_restarts", counts.clock_restarts}},
+          .counts = {{"samples", counts.samples}, {"unscaled", counts.unscaled}}};
+}
+
+/// Ranges are forwarded unchanged.
+struct UwbPreprocessing {
+  void apply(const std::vector<UwbRange>& /*bundle*/) {}
+  [[nodiscard]] static Totals faults() { return {}; }
+  [[nodiscard]] static std::optional<std::string> diagnosis() { return std::nullopt; }
+};
+
+/// Spacing, health check and correction of samples that were read at once.
+class ImuPreprocessing {
+ public:
+  explicit ImuPreprocessing(const ImuSensorSettings& settings)
+      : spacing_(from_seconds(1.0 / settings.rate_hz)),
+        health_(from_seconds(1.0 / settings.rate_hz)),
+        correction_(settings.device) {}
+
+  void apply(std::vector<ImuSample>& bundle) {
+    spacing_.apply(bundle);
+    std::erase_if(bundle, [this](const ImuSample& sample) { return !health_.accept(sample); });
+    for (ImuSample& sample : bundle) sample = correction_.apply(sample);
+  }
+
+  [[nodiscard]] Totals faults() const {
+    return {{"dropped", health_.counts().dropped}, {"stuck", health_.counts().stuck}};
+  }
+  [[nodiscard]] std::optional<std::string> diagnosis() const { return health_.diagnosis(); }
+
+ private:
+  BundleSpacing spacing_;
+  ImuHealth health_;
+  ImuCorrection correction_;
+};
+
+template <class Parser, class Preprocessing>
+class SerialDevice final : public Device {
+ public:
+  SerialDevice(SerialPort port, Parser parser, Preprocessing preprocessing, const Clock& clock,
+               EventSink sink)
+      : preprocessing_(std::move(preprocessing)),
+        sink_(std::move(sink)),
+        reader_(std::move(port), std::move(parser), clock,
+                [this](const auto& measurement) { received_.push_back(measurement); }) {}
+
+  [[nodiscard]] Result<std::size_t> read_once(milliseconds timeout) override {
+    received_.clear();
+    if (const Result<void> read = reader_.read_once(timeout); !read)
+      return tl::unexpected(read.error());
+    preprocessing_.apply(received_);
+    for (const auto& measurement : received_) sink_(Event(measurement));
+    return received_.size();
+  }
+
+  [[nodiscard]] SensorTotals counters() const override {
+    SensorTotals totals = totals_of(reader_.parser().counts());
+    for (auto& fault : preprocessing_.faults()) totals.faults.push_back(std::move(fault));
+    totals.faults.emplace_back("skipped_bytes", reader_.counts().skipped_bytes);
+    totals.faults.emplace_back("checksum_failures", reader_.counts().checksum_failures);
+    return totals;
+  }
+
+  [[nodiscard]] std::optional<std::string> diagnosis() const override {
+    std::optional<std::string> fault = reader_.diagnosis();
+    return fault ? fault : preprocessing_.diagnosis();
+  }
+
+ private:
+  Preprocessing preprocessing_;
+  EventSink sink_;
+  std::vector<typename Parser::Measurement> received_;
+  SerialReader<Parser> reader_;
+};
+
+using OpenDevice = std::function<std::unique_ptr<Device>(SerialPort)>;
+
+template <class Parser, class Preprocessing>
+OpenDevice device_with(const Parser& parser, const Preprocessing& preprocessing, const Clock& clock,
+                       const EventSink& sink) {
+  return [=, &clock](SerialPort port) {
+    return std::make_unique<SerialDevice<Parser, Preprocessing>>(std::move(port), parser,
+                                                                 preprocessing, clock, sink);
+  };
+}
+
+/// Opens an inertial sensor with `protocol`; empty if that is not the protocol of an IMU.
+OpenDevice imu_device(SerialProtocol protocol, const ImuSensorSettings& settings,
+                      const Clock& clock, const EventSink& sink) {
+  const ImuPreprocessing preprocessing(settings);
+  if (protocol == SerialProtocol::kWitMotion)
+    return device_with(WitMotionParser(), preprocessing, clock, sink);
+  if (protocol == SerialProtocol::kHipnuc)
+    return device_with(HipnucParser(), preprocessing, clock, sink);
+  if (protocol == SerialProtocol::kXsens)
+    return device_with(XsensParser(), preprocessing, clock, sink);
+  if (protocol == SerialProtocol::kMavlink)
+    return device_with(MavlinkParser(), preprocessing, clock, sink);
+  return nullptr;
+}
+
+/// Listens until the protocol of the IMU is recognized; from then on it is that device.
+class UnknownImu final : public Device {
+ public:
+  UnknownImu(SerialPort port, const ImuSensorSettings& settings, const Clock& clock,
+             const EventSink& sink)
+      : port_(std::move(port)),
+        since_(clock.now()),
+        clock_(clock),
+        device_of_([=, &clock](SerialProtocol protocol) {
+          return imu_device(protocol, settings, clock, sink);
+        }) {}
+
+  [[nodiscard]] Result<std::size_t> read_once(milliseconds timeout) override {
+    if (known_) return known_->read_once(timeout);
+    const Result<Bytes> chunk = port_.read_some(timeout);
+    if (!chunk) return tl::unexpected(chunk.error());
+    recent_.add(*chunk);
+    if (chunk->empty()) return 0;
+    if (const auto spoken = detect_protocol(recent_.get())) {
+      if (const OpenDevice open = device_of_(*spoken)) known_ = open(std::move(port_));
+    }
+    return 0;
+  }
+
+  [[nodiscard]] SensorTotals counters() const override {
+    return known_ ? known_->counters() : SensorTotals{};
+  }
+
+  [[nodiscard]] std::optional<std::string> diagnosis() const override {
+    constexpr Duration kPatience = std::chrono::seconds(1);
+    constexpr std::size_t kEnoughBytes = 64;
+    if (known_) return known_->diagnosis();
+    if (clock_.now() - since_ < kPatience || recent_.get().size() < kEnoughBytes)
+      return std::nullopt;
+    if (const auto spoken = detect_protocol(recent_.get()))
+      return fmt::format("{}: no inertial sensor: it speaks {}", port_.path(), name_of(*spoken));
+    return port_.path() +
+           ": bytes that are none of witmotion, hipnuc, xsens, mavlink; wrong baud rate or another "
+           "kind of device?";
+  }
+
+ private:
+  SerialPort port_;
+  RecentBytes recent_;
+  Timestamp since_;
+  const Clock& clock_;
+  std::function<OpenDevice(SerialProtocol)> device_of_;
+  std::unique_ptr<Device> known_;
+};
+
+OpenDevice configured_imu(const ImuSensorSettings& settings, const Clock& clock,
+                          const EventSink& sink) {
+  switch (settings.device.protocol) {
+    case ImuProtocol::kWitMotion:
+      return imu_device(SerialProtocol::kWitMotion, settings, clock, sink);
+    case ImuProtocol::kHipnuc:
+      return imu_device(SerialProtocol::kHipnuc, settings, clock, sink);
+    case ImuProtocol::kXsens:
+      return imu_device(SerialProtocol::kXsens, settings, clock, sink);
+    case ImuProtocol::kMavlink:
+      return imu_device(SerialProtocol::kMavlink, settings, clock, sink);
+    case ImuProtocol::kAuto:
+      break;
+  }
+  return [=, &clock](SerialPort port) {
+    return std::make_unique<UnknownImu>(std::move(port), settings, clock, sink);
+  };
+}
+
+/// A device that was unplugged is found again, also under another port name.
+Sensor serial_sensor(const std::string& name, const std::string& port, int baud,
+                     const OpenDevice& device, const std::string& by_id) {
+  Sensor sensor;
+  sensor.name = name;
+  sensor.silence_hint =
+      fmt::format("{}: silent: is it powered and wired, and is {}.baud right?", port, name);
+  sensor.open = [=, found = DeviceName(port, by_id)]() mutable -> Result<std::unique_ptr<Device>> {
+    if (port.empty()) return fail(ErrorCode::kConfig, fmt::format("no device: set {}.port", name));
+    return SerialPort::open(found.path_to_open(), baud).map([&](SerialPort&& opened) {
+      found.remember_link();
+      return device(std::move(opened));
+    });
+  };
+  return sensor;
+}
+
+}  // namespace
+
+UwbSensorSettings uwb_sensor_settings(const Config& config) {
+  return {.device = config.uwb.device,
+          .modules = uwb_modules_of(config.swarm),
+          .max_range_m = config.uwb.noise.max_range_m};
+}
+
+ImuSensorSettings imu_sensor_settings(const Config& config) {
+  return {.device = config.imu.device, .rate_hz = config.imu.noise.update_rate};
+}
+
+Sensor uwb_sensor(const UwbSensorSettings& settings, const Clock& clock, const EventSink& sink,
+                  const std::string& by_id) {
+  const NlinkParser parser(settings.modules, settings.max_range_m);
+  return serial_sensor("uwb", settings.device.port, settings.device.baud,
+                       device_with(parser, UwbPreprocessing{}, clock, sink), by_id);
+}
+
+Sensor imu_sensor(const ImuSensorSettings& settings, const Clock& clock, const EventSink& sink,
+                  const std::string& by_id) {
+  return serial_sensor("imu", settings.device.port, settings.device.baud,
+                       configured_imu(settings, clock, sink), by_id);
+}
+
+}  // namespace crepes

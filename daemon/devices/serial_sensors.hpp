@@ -1,0 +1,42 @@
+/// The ranging module and the inertial sensor on their serial ports.
+#pragma once
+
+#include <string>
+
+#include "config/schema/config.hpp"
+#include "daemon/devices/sensor.hpp"
+#include "daemon/stages/stage_context.hpp"
+#include "drivers/imu/imu_config.hpp"
+#include "drivers/serial/device_name.hpp"
+#include "drivers/uwb/nlink.hpp"
+#include "drivers/uwb/uwb_config.hpp"
+#include "estimator/core/clock.hpp"
+
+namespace crepes {
+
+struct UwbSensorSettings {
+  UwbDeviceConfig device;
+  UwbModules modules;
+  double max_range_m = 0.0;  ///< ranges above are refused
+
+  [[nodiscard]] bool operator==(const UwbSensorSettings&) const = default;
+};
+
+struct ImuSensorSettings {
+  ImuDeviceConfig device;
+  double rate_hz = 0.0;  ///< expected sample rate
+
+  [[nodiscard]] bool operator==(const ImuSensorSettings&) const = default;
+};
+
+[[nodiscard]] UwbSensorSettings uwb_sensor_settings(const Config& config);
+[[nodiscard]] ImuSensorSettings imu_sensor_settings(const Config& config);
+
+/// `clock` must outlive the sensor. The links in `by_id` identify a device that was unplugged and
+/// has returned under another name.
+[[nodiscard]] Sensor uwb_sensor(const UwbSensorSettings& settings, const Clock& clock,
+                                const EventSink& sink, const std::string& by_id = kSerialById);
+[[nodiscard]] Sensor imu_sensor(const ImuSensorSettings& settings, const Clock& clock,
+                                const EventSink& sink, const std::string& by_id = kSerialById);
+
+}  // namespace crepes

@@ -1,0 +1,16 @@
+/// Stream sockets with a name in the file system.
+#pragma once
+
+#include <string>
+
+#include "drivers/base/unique_fd.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+/// Listens, without blocking, for the owner and the group of this process. Replaces a socket file
+/// on which nobody listens any more.
+[[nodiscard]] Result<UniqueFd> listen_unix(const std::string& path);
+[[nodiscard]] Result<UniqueFd> connect_unix(const std::string& path);
+
+}  // namespace crepes

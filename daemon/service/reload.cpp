@@ -1,0 +1,44 @@
+#include "daemon/service/reload.hpp"
+
+#include <sstream>
+
+#include "config/reading/config_file.hpp"
+#include "daemon/service/logging.hpp"
+#include "daemon/service/watchdog.hpp"
+
+namespace crepes {
+namespace {
+
+std::string joined(const std::vector<std::string>& keys) {
+  std::string text;
+  for (const std::string& key : keys) text += (text.empty() ? "" : ", ") + key;
+  return text;
+}
+
+void refuse(const Error& error, Runtime& runtime) {
+  std::istringstream faults(error.message);
+  for (std::string fault; std::getline(faults, fault);) log_message(LogLevel::kError, fault);
+  log_message(LogLevel::kError, "reload refused: the settings stay as they were");
+  runtime.report_refused_reload(error.message);
+}
+
+}  // namespace
+
+void reload(const std::string& file, Runtime& runtime, const Clock& machine) {
+  Watchdog::notify_reloading(machine.now());
+  const auto change =
+      load_config(file).and_then([&](const Config& wanted) { return runtime.reconfigure(wanted); });
+  if (!change) {
+    refuse(change.error(), runtime);
+  } else {
+    set_log_level(change->config.log.level);
+    log_message(LogLevel::kInfo, change->live.empty()
+                                     ? "reloaded: nothing has changed that can change live"
+                                     : "reloaded: " + joined(change->live));
+    if (!change->restart.empty())
+      log_message(LogLevel::kWarning, "restart to apply: " + joined(change->restart));
+  }
+  Watchdog::notify_ready();
+}
+
+}  // namespace crepes

@@ -1,0 +1,16 @@
+/// What SIGHUP does: read the configuration again.
+#pragma once
+
+#include <string>
+
+#include "daemon/runtime.hpp"
+#include "estimator/core/clock.hpp"
+
+namespace crepes {
+
+/// Applies the live changes in `file`. Reports the changes that need a restart in the log and in
+/// STATUS. A faulty file changes nothing, and all its faults are logged. `machine` is the clock
+/// whose time systemd expects.
+void reload(const std::string& file, Runtime& runtime, const Clock& machine);
+
+}  // namespace crepes

@@ -1,0 +1,62 @@
+/// The socket to the mesh, and its faults.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "estimator/core/result.hpp"
+#include "estimator/core/time.hpp"
+#include "net/mesh/mesh_config.hpp"
+#include "net/mesh/packet_seal.hpp"
+#include "net/mesh/peer_link.hpp"
+#include "net/udp_socket.hpp"
+
+namespace crepes {
+
+/// A socket and its seal, reopened when the interface disappears and returns. While the key cannot
+/// be read there is no socket, so nothing leaves unsealed by mistake. Changes are logged.
+class MeshSocket {
+ public:
+  explicit MeshSocket(NetConfig config) : config_(std::move(config)) {}
+
+  /// Null while it cannot be opened. It is opened again after 0.1 s; the delay grows to 5 s.
+  [[nodiscard]] UdpSocket* get(Timestamp now);
+  /// Closes the socket after an error and schedules the next attempt.
+  void close_for_retry(const Error& error, Timestamp now);
+
+  [[nodiscard]] const std::optional<PacketSeal>& seal() const { return seal_; }
+  /// The current fault; empty without one.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+  [[nodiscard]] int descriptor() const { return socket_ ? socket_->descriptor() : -1; }
+
+ private:
+  static constexpr Duration kFirstRetry = std::chrono::milliseconds{100};
+
+  [[nodiscard]] Result<UdpSocket> open();
+
+  NetConfig config_;
+  std::optional<PacketSeal> seal_;
+  std::optional<UdpSocket> socket_;
+  std::string fault_;
+  Timestamp retry_at_{};
+  Duration retry_ = kFirstRetry;
+};
+
+/// Detects that datagrams arrive but none of them can be opened.
+class KeyMismatchMonitor {
+ public:
+  /// Checks the datagrams since the last update; once a second is enough.
+  void update(const PeerLink& link);
+  /// The current fault; empty without one.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+
+ private:
+  std::uint64_t received_ = 0;
+  std::uint64_t unopened_ = 0;
+  std::string fault_;
+};
+
+}  // namespace crepes

@@ -1,0 +1,123 @@
+#include "daemon/stages/subscription_server.hpp"
+
+#include <sodium.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "daemon/version.hpp"
+#include "net/subscription/subscription_json.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr int kMaxRequestsAtOnce = 64;  ///< per socket, so that a flood does not delay poses
+
+std::string_view text_of(const Datagram& datagram) {
+  const auto* const begin = static_cast<const void*>(datagram.bytes.data());
+  return {static_cast<const char*>(begin), datagram.bytes.size()};
+}
+
+std::vector<std::uint8_t> bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
+
+HashKey random_key() {
+  HashKey key{};
+  randombytes_buf(key.data(), key.size());
+  return key;
+}
+
+}  // namespace
+
+SubscriptionServer::SubscriptionServer(RobotId self, const std::map<RobotId, std::string>& names,
+                                       const SubscriptionConfig& config,
+                                       SubscriptionService::StatusSource status)
+    : self_(self), service_(config, std::string(kVersion), std::move(status), random_key()) {
+  for (const std::string& address : config.listen) {
+    Result<UdpSocket> socket = UdpSocket::bind(address, static_cast<std::uint16_t>(config.port));
+    if (socket) {
+      sockets_.push_back(std::move(*socket));
+    } else {
+      faults_.push_back("subscription: " + socket.error().message);
+    }
+  }
+  reconfigure(names, config);
+}
+
+void SubscriptionServer::open_push(const std::vector<PushConfig>& pushes) {
+  pushes_.clear();
+  for (const PushConfig& push : pushes) pushes_.emplace_back(push, self_, names_);
+  const auto open = [&](bool ipv4, std::optional<UdpSocket>& socket) {
+    const bool is_needed = std::ranges::any_of(
+        pushes_, [&](const PosePush& push) { return push.target().is_ipv4() == ipv4; });
+    if (!is_needed || socket) return;
+    Result<UdpSocket> opened = UdpSocket::bind(ipv4 ? "0.0.0.0" : "::", 0);
+    if (opened) {
+      socket = std::move(*opened);
+    } else {
+      faults_.push_back("subscription.push: " + opened.error().message);
+    }
+  };
+  open(true, push_ipv4_);
+  open(false, push_ipv6_);
+}
+
+void SubscriptionServer::reconfigure(const std::map<RobotId, std::string>& names,
+                                     const SubscriptionConfig& config) {
+  names_ = names;
+  service_.reconfigure(config);
+  open_push(config.push);
+}
+
+void SubscriptionServer::serve(Timestamp now) {
+  for (std::size_t socket = 0; socket < sockets_.size(); ++socket) {
+    for (int i = 0; i < kMaxRequestsAtOnce; ++i) {
+      const Result<std::optional<Datagram>> request =
+          sockets_[socket].receive(std::chrono::milliseconds{0});
+      // An error here means that a client has gone (ICMP). The next datagram is from another
+      // client.
+      if (!request || !*request) break;
+      const Datagram& datagram = **request;
+      if (const auto answer = service_.answer(datagram.from, text_of(datagram), now, socket))
+        send(sockets_[socket], *answer, datagram.from);
+    }
+  }
+}
+
+void SubscriptionServer::publish(const std::vector<NeighborPose>& poses, Timestamp now) {
+  for (const NeighborPose& pose : poses) {
+    for (const PoseDelivery& delivery : service_.deliveries(pose.neighbor, pose.stamp, now)) {
+      send(sockets_[delivery.socket],
+           pose_json(delivery.sequence, self_, names_[pose.neighbor], pose), delivery.client);
+      ++poses_;
+    }
+  }
+  for (PosePush& push : pushes_) {
+    auto& socket = push.target().is_ipv4() ? push_ipv4_ : push_ipv6_;
+    if (!socket) continue;
+    for (const std::string& json : push.datagrams(poses)) {
+      send(*socket, json, push.target());
+      ++pushed_;
+    }
+  }
+}
+
+std::vector<int> SubscriptionServer::descriptors() const {
+  std::vector<int> found;
+  for (const UdpSocket& socket : sockets_) found.push_back(socket.descriptor());
+  return found;
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> SubscriptionServer::counters() const {
+  auto totals = service_.counters();
+  totals.insert(
+      totals.end(),
+      {{"poses_sent", poses_}, {"datagrams_pushed", pushed_}, {"answers_unsent", unsent_}});
+  return totals;
+}
+
+void SubscriptionServer::send(UdpSocket& socket, const std::string& json, const Endpoint& to) {
+  if (!socket.send_to(bytes_of(json), to)) ++unsent_;
+}
+
+}  // namespace crepes

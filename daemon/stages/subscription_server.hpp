@@ -1,0 +1,56 @@
+/// Serves poses to clients: the sockets around SubscriptionService.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/core/outputs.hpp"
+#include "net/subscription/pose_push.hpp"
+#include "net/subscription/subscription_config.hpp"
+#include "net/subscription/subscription_service.hpp"
+#include "net/udp_socket.hpp"
+
+namespace crepes {
+
+class SubscriptionServer {
+ public:
+  /// Addresses that cannot be served are skipped and reported by `faults`.
+  SubscriptionServer(RobotId self, const std::map<RobotId, std::string>& names,
+                     const SubscriptionConfig& config, SubscriptionService::StatusSource status);
+
+  /// Changes names, limits and push targets; subscribers stay. `listen` and `port` must be the
+  /// same.
+  void reconfigure(const std::map<RobotId, std::string>& names, const SubscriptionConfig& config);
+
+  /// Answers a bounded number of the requests that wait on all sockets.
+  void serve(Timestamp now);
+  /// Sends the poses of one instant to the subscribers whose next pose is due.
+  void publish(const std::vector<NeighborPose>& poses, Timestamp now);
+
+  /// For poll(2).
+  [[nodiscard]] std::vector<int> descriptors() const;
+  [[nodiscard]] const std::vector<std::string>& faults() const { return faults_; }
+  /// Totals by name.
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
+
+ private:
+  void open_push(const std::vector<PushConfig>& pushes);
+  void send(UdpSocket& socket, const std::string& json, const Endpoint& to);
+
+  RobotId self_;
+  std::map<RobotId, std::string> names_;
+  SubscriptionService service_;
+  std::vector<UdpSocket> sockets_;
+  std::vector<PosePush> pushes_;
+  std::optional<UdpSocket> push_ipv4_;
+  std::optional<UdpSocket> push_ipv6_;
+  std::vector<std::string> faults_;
+  std::uint64_t poses_ = 0;
+  std::uint64_t pushed_ = 0;
+  std::uint64_t unsent_ = 0;
+};
+
+}  // namespace crepes

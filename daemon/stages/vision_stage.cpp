@@ -1,0 +1,107 @@
+#include "daemon/stages/vision_stage.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "daemon/stages/health_report.hpp"
+#include "estimator/vision/spot_detector.hpp"
+
+namespace crepes {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// In memory of its own.
+Frame copy_of(const Frame& frame) {
+  Frame copy{.stamp = frame.stamp,
+             .arrival = frame.arrival,
+             .camera = frame.camera,
+             .width = frame.width,
+             .height = frame.height,
+             .pixels = std::vector<std::uint8_t>()};
+  copy.pixels.reserve(static_cast<std::size_t>(frame.width) *
+                      static_cast<std::size_t>(frame.height));
+  for (int row = 0; row < frame.height; ++row) {
+    const std::uint8_t* const begin = frame.data() + row * frame.stride();
+    copy.pixels.insert(copy.pixels.end(), begin, begin + frame.width);
+  }
+  return copy;
+}
+
+std::string_view diagnosis_of(const Detection& found) {
+  if (!found.failure.empty()) return found.failure;
+  return found.exposure == Exposure::kBright
+             ? "the picture is bright all over: shorten the exposure or mend the infrared filter"
+             : "";
+}
+
+/// Delays from a frame's arrival to its spots.
+class Delays {
+ public:
+  void add(Duration delay) { delays_.push_back(delay); }
+
+  /// Median and 99th percentile [us].
+  [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> percentiles_since_last_call() {
+    std::vector<Duration> sorted = std::exchange(delays_, {});
+    if (sorted.empty()) return {};
+    std::ranges::sort(sorted);
+    const auto at = [&](std::size_t percent) {
+      const Duration delay = sorted[(sorted.size() - 1) * percent / 100];
+      return static_cast<std::uint64_t>(delay / std::chrono::microseconds{1});
+    };
+    return {at(50), at(99)};
+  }
+
+ private:
+  std::vector<Duration> delays_;
+};
+
+SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::uint64_t failures,
+                       Delays& delays) {
+  const auto [median_us, p99_us] = delays.percentiles_since_last_call();
+  return {.faults = {{"failures", failures}},
+          .counts = {{"delay_p50_us", median_us},
+                     {"delay_p99_us", p99_us},
+                     {"threshold", static_cast<std::uint64_t>(found.threshold)},
+                     {"hot", rejected.hot},
+                     {"huge", rejected.huge},
+                     {"faint", rejected.faint},
+                     {"surplus", rejected.surplus}}};
+}
+
+}  // namespace
+
+void run_vision(const VisionStage& stage, const StageContext& context,
+                const std::stop_token& stop) {
+  std::optional<SpotDetector> detector;
+  HealthReport health(stage.camera_name + " spots", context);
+  Rejected rejected;
+  Delays delays;
+  std::uint64_t failures = 0;
+  while (!stop.stop_requested()) {
+    context.iterations.add();
+    if (const auto settings = stage.settings.receive()) detector.emplace(*settings);
+    std::optional<Frame> frame = stage.frames.pop_for(milliseconds{100}, stop);
+    if (!frame) continue;
+    const Detection found =
+        detector->detect({frame->data(), frame->width, frame->height, frame->stride()});
+    stage.sink(SpotFrame{frame->stamp, frame->camera, {found.spots.begin(), found.spots.end()}});
+    delays.add(context.clock.now() - frame->arrival);
+    health.count(1);
+    rejected += found.rejected;
+    failures += found.failure.empty() ? 0 : 1;
+    if (health.is_due()) {
+      health.publish(std::string(diagnosis_of(found)),
+                     totals_of(found, rejected, failures, delays));
+    }
+    if (stage.tap.requests.try_pop()) stage.tap.pictures.push(copy_of(*frame));
+    stage.recycled.push(std::move(*frame));
+  }
+}
+
+}  // namespace crepes

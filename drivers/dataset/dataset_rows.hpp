@@ -1,0 +1,22 @@
+/// Measurements as rows of the data set's CSV files.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "estimator/core/measurements.hpp"
+
+namespace crepes {
+
+inline constexpr std::string_view kImuHeader = "#timestamp [ns],wx,wy,wz,ax,ay,az\n";
+inline constexpr std::string_view kRangeHeader =
+    "#timestamp [ns],peer,distance [m],first path [dBm],received [dBm]\n";
+inline constexpr std::string_view kSpotHeader = "#timestamp [ns],u,v,area,peak\n";
+inline constexpr std::string_view kPictureHeader = "#timestamp [ns],filename\n";
+
+void append_rows(std::string& text, const ImuSample& sample);
+void append_rows(std::string& text, const UwbRange& range);
+/// One row per spot. A frame without spots is one row.
+void append_rows(std::string& text, const SpotFrame& frame);
+
+}  // namespace crepes

@@ -1,0 +1,55 @@
+#include "drivers/dataset/part_file.hpp"
+
+#include <fmt/core.h>
+
+#include <cerrno>
+#include <fstream>
+#include <utility>
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path part_of(fs::path file) { return file += ".part"; }
+
+Result<void> write_text(const fs::path& file, std::string_view text, std::ios::openmode mode) {
+  std::ofstream out(file, std::ios::binary | mode);
+  out.write(text.data(), static_cast<std::streamsize>(text.size()));
+  out.close();
+  if (out) return {};
+  return fail(ErrorCode::kIo,
+              fmt::format("{}: {}", file.string(), std::generic_category().message(errno)));
+}
+
+}  // namespace
+
+Result<PartFile> PartFile::create(fs::path file, std::string_view header) {
+  std::error_code status;
+  fs::remove(file, status);
+  if (auto done = write_text(part_of(file), header, std::ios::trunc); !done)
+    return tl::unexpected(done.error());
+  return PartFile(std::move(file));
+}
+
+void PartFile::flush_if_large() {
+  constexpr std::size_t kFlushAt = 1 << 16;
+  if (text_.size() >= kFlushAt) flush();
+}
+
+void PartFile::flush() {
+  const auto done = write_text(part_of(file_), text_, std::ios::app);
+  if (!done && !failure_) failure_ = done.error();
+  text_.clear();
+}
+
+Result<void> PartFile::publish() {
+  flush();
+  if (failure_) return tl::unexpected(*failure_);
+  std::error_code status;
+  fs::rename(part_of(file_), file_, status);
+  if (!status) return {};
+  return fail(ErrorCode::kIo, fmt::format("{}: {}", file_.string(), status.message()));
+}
+
+}  // namespace crepes

@@ -1,0 +1,57 @@
+#include "drivers/detect_protocol.hpp"
+
+#include <array>
+
+#include "drivers/imu/hipnuc.hpp"
+#include "drivers/imu/mavlink.hpp"
+#include "drivers/imu/witmotion.hpp"
+#include "drivers/imu/xsens.hpp"
+#include "drivers/uwb/nlink_frame.hpp"
+
+namespace crepes {
+namespace {
+
+struct Candidate {
+  SerialProtocol protocol;
+  std::string_view name;
+  FrameCheck (*examine)(Bytes);
+};
+
+constexpr std::array kCandidates{
+    Candidate{SerialProtocol::kNlink, "LinkTrack", &examine_nlink},
+    Candidate{SerialProtocol::kWitMotion, "witmotion", &WitMotion::examine},
+    Candidate{SerialProtocol::kHipnuc, "hipnuc", &Hipnuc::examine},
+    Candidate{SerialProtocol::kXsens, "xsens", &Xsens::examine},
+    Candidate{SerialProtocol::kMavlink, "mavlink", &Mavlink::examine}};
+
+bool speaks(const Candidate& candidate, Bytes recent) {
+  constexpr std::size_t kEnoughFrames = 3;
+  std::size_t frames = 0;
+  std::size_t filled = 0;
+  for (std::size_t at = 0; at < recent.size();) {
+    const FrameCheck check = candidate.examine(recent.subspan(at));
+    const bool is_frame = check.kind == FrameKind::kComplete;
+    frames += is_frame ? 1 : 0;
+    filled += check.length;
+    at += is_frame ? check.length : 1;
+  }
+  return frames >= kEnoughFrames && 4 * filled >= recent.size();
+}
+
+}  // namespace
+
+std::string_view name_of(SerialProtocol protocol) {
+  for (const Candidate& candidate : kCandidates) {
+    if (candidate.protocol == protocol) return candidate.name;
+  }
+  return "";
+}
+
+std::optional<SerialProtocol> detect_protocol(Bytes recent) {
+  for (const Candidate& candidate : kCandidates) {
+    if (speaks(candidate, recent)) return candidate.protocol;
+  }
+  return std::nullopt;
+}
+
+}  // namespace crepes

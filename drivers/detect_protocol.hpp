@@ -1,0 +1,22 @@
+/// Detects the protocol of a serial device from its bytes.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "drivers/serial/frame_decoder.hpp"
+
+namespace crepes {
+
+enum class SerialProtocol : std::uint8_t { kNlink, kWitMotion, kHipnuc, kXsens, kMavlink };
+
+/// The name in the configuration; for NLink, the name of the product.
+[[nodiscard]] std::string_view name_of(SerialProtocol protocol);
+
+/// The protocol of which at least three frames fill at least a quarter of `recent`; autopilots send
+/// many messages that are unknown here. Empty if there is none. `recent` may begin and end within a
+/// frame.
+[[nodiscard]] std::optional<SerialProtocol> detect_protocol(Bytes recent);
+
+}  // namespace crepes

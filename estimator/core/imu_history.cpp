@@ -1,0 +1,151 @@
+#include "estimator/core/imu_history.hpp"
+
+#include <algorithm>
+
+#include "estimator/core/contract.hpp"
+#include "estimator/core/so3.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr Duration kRotationStep = std::chrono::milliseconds{5};
+constexpr std::int64_t kMaxRotationSteps = 400;  // longer intervals are cut into longer steps
+
+void add(const ImuSample& sample, double dt, ImuMean& sum) {
+  sum.gyro_radps += dt * sample.gyro_radps;
+  sum.accel_mps2 += dt * sample.accel_mps2;
+}
+
+// Integral of the square of the time since the last sample, from `since` on and for `dt`.
+double extrapolation_time_squared(double since, double dt) {
+  const double most = to_seconds(ImuHistory::kMaxHold);
+  const double end = std::min(since + dt, most);
+  const double begin = std::min(since, most);
+  return (end * end * end - begin * begin * begin) / 3.0 + most * most * (dt - (end - begin));
+}
+
+}  // namespace
+
+bool is_plausible(const ImuSample& sample) {
+  // Written so that NaN is not.
+  return (sample.gyro_radps.array().abs() <= 100.0).all() &&
+         (sample.accel_mps2.array().abs() <= 1000.0).all();
+}
+
+std::size_t ImuHistory::first_after(Timestamp t) const {
+  std::size_t low = 0;
+  std::size_t high = size_;
+  while (low < high) {
+    const std::size_t middle = (low + high) / 2;
+    if ((*this)[middle].stamp <= t) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
+}
+
+bool ImuHistory::push(const ImuSample& sample) {
+  if (!is_plausible(sample)) return false;
+  std::size_t place = first_after(sample.stamp);
+  if (place > 0 && (*this)[place - 1].stamp == sample.stamp) return false;
+  if (size_ == kCapacity) {
+    if (place == 0) return false;
+    first_ = (first_ + 1) % kCapacity;
+    --size_;
+    --place;
+  }
+  ++size_;
+  for (std::size_t i = size_ - 1; i > place; --i) slot(i) = (*this)[i - 1];
+  slot(place) = sample;
+  if (place + 1 == size_) observe_motion();
+  return true;
+}
+
+std::optional<ImuHistory::Recent> ImuHistory::recent() const {
+  constexpr int kSamples = SignalModel::Window::ColsAtCompileTime;
+  if (size_ < kSamples) return std::nullopt;
+  const Duration span = newest().stamp - (*this)[size_ - kSamples].stamp;
+  const Duration pace = span / (kSamples - 1);
+  if (pace > kMaxGap) return std::nullopt;
+  Recent recent{.gyro = {}, .accel = {}, .period_s = to_seconds(pace)};
+  for (int back = 0; back < kSamples; ++back) {
+    const std::size_t i = size_ - 1 - static_cast<std::size_t>(back);
+    if (back > 0 && (*this)[i + 1].stamp - (*this)[i].stamp > 2 * pace) return std::nullopt;
+    recent.gyro.col(back) = (*this)[i].gyro_radps;
+    recent.accel.col(back) = (*this)[i].accel_mps2;
+  }
+  return recent;
+}
+
+void ImuHistory::observe_motion() {
+  if (const auto samples = recent()) {
+    gyro_.observe(samples->gyro, samples->period_s);
+    accel_.observe(samples->accel, samples->period_s);
+  }
+}
+
+// The newest sample is the mean since the one before, so it is the value in the middle of that
+// time. The prediction is limited to the horizon for which its weights were estimated.
+void ImuHistory::add_predicted(Timestamp from, Timestamp to, ImuMean& sum) const {
+  const double dt = to_seconds(to - from);
+  add(newest(), dt, sum);
+  if (const auto samples = recent()) {
+    const double since =
+        0.5 * (to_seconds(from - newest().stamp) + to_seconds(to - newest().stamp));
+    const double strides =
+        std::clamp(since / samples->period_s + 0.5, 0.0, double{SignalModel::kStride}) /
+        SignalModel::kStride;
+    sum.gyro_radps += dt * strides * gyro_.next_change(samples->gyro);
+    sum.accel_mps2 += dt * strides * accel_.next_change(samples->accel);
+  }
+}
+
+ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
+  CREPES_EXPECT(size_ > 0 && from < to, "mean over an interval with samples");
+  ImuMean sum;
+  const auto extrapolate = [&](double since, double dt) {
+    sum.extrapolated += dt;
+    sum.extrapolation_time2_s2 += extrapolation_time_squared(since, dt);
+  };
+  Timestamp t = from;
+  for (std::size_t i = first_after(from); i < size_ && t < to; ++i) {
+    const ImuSample& sample = (*this)[i];
+    const bool covered = i > 0 && sample.stamp - (*this)[i - 1].stamp <= kMaxGap;
+    const Timestamp end = std::min(to, sample.stamp);
+    const double dt = to_seconds(end - t);
+    add(sample, dt, sum);
+    if (!covered) extrapolate(to_seconds(kMaxHold), dt);
+    t = end;
+  }
+  if (t < to) {
+    const double dt = to_seconds(to - t);
+    add_predicted(t, to, sum);
+    extrapolate(to_seconds(t - newest().stamp), dt);
+  }
+
+  const double width = to_seconds(to - from);
+  return {.gyro_radps = sum.gyro_radps / width,
+          .accel_mps2 = sum.accel_mps2 / width,
+          .extrapolated = sum.extrapolated / width,
+          .extrapolation_time2_s2 = sum.extrapolation_time2_s2 / width,
+          .gyro_noise_density = gyro_.noise_density(),
+          .accel_noise_density = accel_.noise_density(),
+          .gyro_innovation_density = gyro_.innovation_density(),
+          .accel_innovation_density = accel_.innovation_density()};
+}
+
+Eigen::Quaterniond ImuHistory::rotation(Timestamp from, Timestamp to) const {
+  if (to < from) return rotation(to, from).conjugate();
+  Eigen::Quaterniond q_from_to = Eigen::Quaterniond::Identity();
+  const Duration step = std::max(kRotationStep, (to - from) / kMaxRotationSteps);
+  for (Timestamp t = from; t < to;) {
+    const Timestamp next = std::min(to, t + step);
+    q_from_to = q_from_to * so3_exp(mean(t, next).gyro_radps * to_seconds(next - t));
+    t = next;
+  }
+  return q_from_to.normalized();
+}
+
+}  // namespace crepes

@@ -1,0 +1,81 @@
+/// The recent IMU samples of one robot, as signals in continuous time.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include "estimator/core/measurements.hpp"
+#include "estimator/core/signal_model.hpp"
+
+namespace crepes {
+
+/// Mean rate and specific force over an interval, body axes.
+struct ImuMean {
+  Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
+  double extrapolated = 0.0;  ///< share of the interval, 0..1, that no sample covers
+  /// Mean square of the time since the last sample where none covers, at most kMaxHold^2 [s^2].
+  double extrapolation_time2_s2 = 0.0;
+  /// White noise measured in the samples, with vibration.
+  double gyro_noise_density = 0.0;   ///< [rad/s/sqrt(Hz)]
+  double accel_noise_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
+  /// Errors of the extrapolation, as the density of a random walk.
+  double gyro_innovation_density = 0.0;   ///< [rad/s/sqrt(s)]
+  double accel_innovation_density = 0.0;  ///< [m/s^2/sqrt(s)]
+};
+
+/// Finite, and within 100 rad/s and 1000 m/s^2 an axis.
+[[nodiscard]] bool is_plausible(const ImuSample& sample);
+
+/// Bounded: keeps the newest `kCapacity` samples in order of their stamps. A sample is the mean
+/// since the one before, stamped at its end, as from an IMU that integrates internally. So sums
+/// over samples are exact. Beyond the newest sample a SignalModel predicts the signals. Before the
+/// oldest, and in gaps longer than `kMaxGap`, the next sample is held. Both are extrapolation.
+class ImuHistory {
+ public:
+  static constexpr std::size_t kCapacity = 256;
+  static constexpr Duration kMaxGap = std::chrono::milliseconds{50};
+  static constexpr Duration kMaxHold = std::chrono::milliseconds{100};
+
+  /// False, and nothing changes, if the sample is implausible, a duplicate, or older than all kept.
+  bool push(const ImuSample& sample);
+
+  [[nodiscard]] bool empty() const { return size_ == 0; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  /// Counted from the oldest.
+  [[nodiscard]] const ImuSample& operator[](std::size_t i) const {
+    return samples_[(first_ + i) % kCapacity];
+  }
+  [[nodiscard]] const ImuSample& newest() const { return (*this)[size_ - 1]; }
+
+  /// Mean over [from, to], from < to; there must be a sample.
+  [[nodiscard]] ImuMean mean(Timestamp from, Timestamp to) const;
+
+  /// The body's rotation R_from_to between two instants, in either order, by the gyroscope alone.
+  /// There must be a sample.
+  [[nodiscard]] Eigen::Quaterniond rotation(Timestamp from, Timestamp to) const;
+
+ private:
+  ImuSample& slot(std::size_t i) { return samples_[(first_ + i) % kCapacity]; }
+  [[nodiscard]] std::size_t first_after(Timestamp t) const;
+  /// The newest samples, if they are equally spaced.
+  struct Recent {
+    SignalModel::Window gyro;
+    SignalModel::Window accel;
+    double period_s = 0.0;
+  };
+  [[nodiscard]] std::optional<Recent> recent() const;
+  void observe_motion();
+  void add_predicted(Timestamp from, Timestamp to, ImuMean& sum) const;
+
+  std::array<ImuSample, kCapacity> samples_{};
+  std::size_t first_ = 0;
+  std::size_t size_ = 0;
+  SignalModel gyro_;
+  SignalModel accel_;
+};
+
+}  // namespace crepes

@@ -1,0 +1,116 @@
+/// Refuses inertial samples that contradict their neighbors in time.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include "estimator/core/imu_history.hpp"
+#include "estimator/core/measurements.hpp"
+#include "estimator/core/outputs.hpp"
+#include "estimator/relative/imu_watch.hpp"
+
+namespace crepes {
+
+/// The median of the latest innovations of a sensor: a scale that outliers do not move (Huber and
+/// Ronchetti 2009, "Robust Statistics", 5.1).
+class InnovationScale {
+ public:
+  void add(double size);
+  [[nodiscard]] double median() const { return median_; }
+  /// False before there are enough.
+  [[nodiscard]] bool is_known() const { return is_known_; }
+
+ private:
+  static constexpr std::size_t kKept = 64;
+  static constexpr std::size_t kLeast = 16;
+  std::array<double, kKept> sizes_{};
+  std::size_t count_ = 0;
+  double median_ = 0.0;
+  bool is_known_ = false;
+};
+
+/// One number each for gyroscope and accelerometer.
+struct PerSensor {
+  double gyro = 0.0;
+  double accel = 0.0;
+
+  [[nodiscard]] double most() const { return gyro > accel ? gyro : accel; }
+};
+
+/// Compares each sample with its prediction from the two before. A sample with an unlikely
+/// innovation waits for its successors, and nothing is believed meanwhile: ImuHistory extrapolates
+/// with the noise that belongs to it. If the successors return to the prediction, the sample was a
+/// spike. If they agree with the sample, the motion has changed, and all are believed, one sample
+/// late. A false alarm costs no more than that.
+///
+/// A change that no robot makes within a sample (unit, swapped axes) is not believed when it stays.
+/// Samples are believed again when they return, or when a fifth of a second of them is plausible.
+class ImuGuard {
+ public:
+  /// The samples that predict the next one.
+  struct Reference {
+    ImuSample last;
+    std::optional<ImuSample> before;
+  };
+
+  /// The samples that are believed from now on, in order of their stamps; valid until the next
+  /// call. A sample older than the newest is passed on, see `agrees`.
+  [[nodiscard]] std::span<const ImuSample> accept(const ImuSample& sample);
+
+  /// True if the sample does not contradict the mean rates about its stamp.
+  [[nodiscard]] bool agrees(const ImuSample& sample, const ImuMean& mean) const;
+
+  /// True if the last sample was saturated. The ones before it were as wrong, and believed.
+  [[nodiscard]] bool is_saturated() const { return watch_.is_saturated(); }
+  /// By reason.
+  [[nodiscard]] const ImuFaultCounts& refused() const { return refused_; }
+
+ private:
+  static constexpr std::size_t kMostHeld = 20;  ///< the samples that are judged after a jump
+
+  void count(ImuFault fault, std::size_t samples = 1) {
+    refused_.at(static_cast<std::size_t>(fault)) += samples;
+  }
+  [[nodiscard]] bool is_late(const ImuSample& sample) const;
+  [[nodiscard]] PerSensor limit() const;
+  [[nodiscard]] PerSensor largest_change() const;
+  [[nodiscard]] PerSensor excess(const ImuSample& sample, const Reference& reference) const;
+  [[nodiscard]] Reference reference_of_held(std::size_t i) const;
+
+  void compare(const ImuSample& sample);
+  void judge(const ImuSample& sample);
+  void learn(const PerSensor& innovation);
+  void believe(const ImuSample& sample);
+  void believe_held(std::size_t from);
+  void drop_held(ImuFault fault);
+  void clear_held();
+  void hold(const ImuSample& sample);
+  void turn_force(const ImuSample& sample, Timestamp since);
+  void correct_force(const ImuSample& sample);
+  void follow_force(const ImuSample& sample, const ImuSample& last);
+  void restart_from_held();
+  [[nodiscard]] bool is_shock(const PerSensor& back, const PerSensor& on) const;
+  [[nodiscard]] std::size_t first_of_level() const;
+  [[nodiscard]] bool is_reachable(const ImuSample& sample) const;
+  [[nodiscard]] bool held_are_plausible() const;
+
+  ImuWatch watch_;
+  std::optional<Reference> reference_;
+  InnovationScale gyro_;
+  InnovationScale accel_;
+  Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  ///< smoothed specific force, body axes
+  bool has_refused_ = false;                         ///< since the last sample that was believed
+  bool has_jumped_ = false;  ///< the held samples must be plausible to be believed
+  bool gyro_has_jumped_ = false;
+  bool accel_has_jumped_ = false;
+
+  std::array<ImuSample, kMostHeld> held_{};
+  std::size_t held_count_ = 0;
+  std::array<ImuSample, kMostHeld + 1> believed_{};
+  std::size_t believed_count_ = 0;
+  ImuFaultCounts refused_{};
+};
+
+}  // namespace crepes

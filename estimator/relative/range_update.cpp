@@ -1,0 +1,88 @@
+#include "estimator/relative/range_update.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace crepes {
+namespace {
+
+using E = ErrorState;
+
+// Density of ranges without line of sight that were not recognized, for each true range.
+constexpr double kFalseRanges = 0.05;  // 1/m
+
+// Where the curvature's variance exceeds this share of the range's, ranges correct along the line.
+constexpr double kMaxCurvature = 0.1;
+
+struct Moments {
+  double mean_m;
+  double variance_m2;
+};
+
+// The second-order term of a range, |error across the line|^2 / (2 distance), for a Gaussian error
+// (Jazwinski 1970).
+Moments curvature_of(const Eigen::RowVector3d& line, double distance_m,
+                     const Eigen::Matrix3d& cov_p) {
+  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - line.transpose() * line;
+  const Eigen::Matrix3d cov_across = across * cov_p * across;
+  return {.mean_m = 0.5 * cov_across.trace() / distance_m,
+          .variance_m2 = 0.5 * cov_across.squaredNorm() / (distance_m * distance_m)};
+}
+
+// The part of a gain that acts on distance and range bias.
+E::Vector along_line(const E::Vector& gain, const Eigen::RowVector3d& line) {
+  E::Vector along = E::Vector::Zero();
+  for (const int index : {E::kP, E::kV})
+    along.segment<3>(index) = line.transpose() * (line * gain.segment<3>(index));
+  along(E::kRangeBias) = gain(E::kRangeBias);
+  return along;
+}
+
+}  // namespace
+
+RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double gate_nis,
+                            E::Covariance& P) {
+  const Eigen::RowVector3d line = z.H.middleCols<3>(E::kP);
+  const Moments curvature = curvature_of(line, distance_m, P.block<E::kP, E::kP, 3, 3>());
+  const double curved = curvature.variance_m2;
+  const E::Vector PHt = P.seen_columns().lazyProduct(z.H.transpose());
+  const double predicted = z.H * PHt.head<E::kSeen>();
+  const double residual = z.residual(0) - curvature.mean_m;
+  const double expected = predicted + z.cov_z(0, 0) + curved;
+
+  RangeUpdate update;
+  Fusion& fusion = update.fusion;
+  fusion.dimension = 1;
+  fusion.nis = residual * residual / expected;
+  fusion.log_likelihood = -0.5 * (fusion.nis + std::log(2.0 * std::numbers::pi * expected));
+  fusion.residual[0] = residual;
+  fusion.sigma[0] = std::sqrt(expected);
+  // The probability that the range is true. One that is more likely false is refused.
+  const double density = std::exp(fusion.log_likelihood);
+  const double is_true = density / (density + kFalseRanges);
+  const bool fits = fusion.nis <= gate_nis && is_true >= 0.5;
+  fusion.verdict = fits ? Verdict::kFused : Verdict::kGated;
+  if (fusion.verdict == Verdict::kGated || predicted <= curved) return update;
+
+  // The error across hardly changes between ranges, so that their curvature does not average out.
+  // The variance after the update is at least that of the curvature (compare a consider state,
+  // Schmidt 1966). Otherwise ranges make a direction known that they do not depend on.
+  const double variance =
+      std::max(z.cov_z(0, 0) + curved, predicted * curved / (predicted - curved));
+  const E::Vector G = PHt / std::sqrt(predicted + variance);
+  const double white = residual / std::sqrt(predicted + variance);
+
+  // Mean and covariance of the mixture (probabilistic data association, Bar-Shalom and Tse 1975).
+  const double weight = is_true * (1.0 - (1.0 - is_true) * white * white);
+
+  const bool is_curved = curved > kMaxCurvature * z.cov_z(0, 0);
+  const E::Vector used = is_curved ? along_line(G, line) : G;
+  const E::Vector unused = G - used;
+  P.subtract_outer(weight * G, G);  // any gain: P - G G^T + (G - used) (G - used)^T
+  if (is_curved) P.subtract_outer(-weight * unused, unused);
+  update.correction = is_true * white * used;
+  return update;
+}
+
+}  // namespace crepes

@@ -1,0 +1,36 @@
+/// A queue that keeps the newest values and never allocates after construction.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "estimator/core/time.hpp"
+
+namespace crepes {
+
+/// In order of arrival. When full, `add` drops the oldest value.
+template <class Reading, std::size_t kCapacity>
+class BoundedFifo {
+ public:
+  BoundedFifo() { readings_.reserve(kCapacity); }
+
+  void add(const Reading& reading) {
+    if (readings_.size() == kCapacity) readings_.erase(readings_.begin());
+    readings_.push_back(reading);
+  }
+
+  /// Drops values from the front until one is not older than `t`.
+  void drop_before(Timestamp t) {
+    readings_.erase(readings_.begin(),
+                    std::find_if(readings_.begin(), readings_.end(),
+                                 [t](const Reading& reading) { return reading.stamp >= t; }));
+  }
+
+  [[nodiscard]] const std::vector<Reading>& all() const { return readings_; }
+
+ private:
+  std::vector<Reading> readings_;
+};
+
+}  // namespace crepes

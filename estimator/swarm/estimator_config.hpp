@@ -1,0 +1,45 @@
+/// Settings: the filters of the neighbors.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "estimator/core/settings_schema.hpp"
+
+namespace crepes {
+
+enum class Profile : std::uint8_t { kTight, kPaper };
+inline constexpr std::array kProfiles{Choice{"tight", Profile::kTight},
+                                      Choice{"paper", Profile::kPaper}};
+
+/// The filters.
+struct EstimatorConfig {
+  Profile profile = Profile::kTight;
+  double lag_ms = 100.0;
+  double output_rate_hz = 50.0;
+  double camera_misalignment_deg = 0.17;
+  double gate_probability = 0.999;
+  double predicted_after_s = 0.5;
+  double forget_after_s = 30.0;
+
+  [[nodiscard]] bool operator==(const EstimatorConfig&) const = default;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.choice("profile", profile, kProfiles,
+             "tight: fuses every measurement by itself; paper: fuses raw poses");
+    v.field("lag_ms", lag_ms, Bounds{5, 1000},
+            "how long to wait for late measurements; poses do not wait");
+    v.field("output_rate_hz", output_rate_hz, Bounds{1, 200}, "poses per second");
+    v.field("camera_misalignment_deg", camera_misalignment_deg, Bounds{0, 10},
+            "error of T_cam_imu's rotation, one sigma");
+    v.field("gate_probability", gate_probability, Bounds{0.9, 0.9999999},
+            "measurements less likely than this are refused");
+    v.field("predicted_after_s", predicted_after_s, Bounds{0.05, 60},
+            "a pose without a measurement for this long is called predicted");
+    v.field("forget_after_s", forget_after_s, Bounds{1, 3600},
+            "a neighbor that is silent for this long is forgotten");
+  }
+};
+
+}  // namespace crepes

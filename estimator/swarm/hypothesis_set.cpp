@@ -1,0 +1,195 @@
+#include "estimator/swarm/hypothesis_set.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+namespace crepes {
+namespace {
+
+constexpr double kScoreMemory = 0.5;  // s
+// Score of each direction that confirms: that of a few bearings. Clutter may agree once or twice.
+constexpr double kConfirmed = 25.0;
+constexpr double kMargin = 10.0;  // between rivals
+// A new leader accepts rivals for so long, and a rival has as long to win.
+constexpr Duration kProbation = std::chrono::seconds{1};
+constexpr std::size_t kMaxHypotheses = 8;
+constexpr double kLeadersShare = 1000.0;  // of a budget, which rivals do not spend
+
+std::array<Measurement, 2> bearings_of(Timestamp stamp, const MutualInitialization& first) {
+  return {Measurement{stamp, MeasurementKind::kBearing, first.bearing},
+          Measurement{stamp, MeasurementKind::kPeerBearing, first.peer_bearing}};
+}
+
+// A filter that became uncertain out of sight knows less than one mutual sighting says. Its error
+// is too large for one linearization, so the first bearing could make it certain of a wrong pose.
+bool is_lost(const NeighborTrack& track) {
+  return !track.is_certain() && track.stamp() - track.last_sighting() > kDivergenceTime;
+}
+
+constexpr auto kIsWorse = [](const auto& a, const auto& b) {
+  return std::tuple(a.confirmed, !a.one_way, a.score()) <
+         std::tuple(b.confirmed, !b.one_way, b.score());
+};
+
+}  // namespace
+
+void HypothesisSet::reconfigure(const FilterSettings& settings) {
+  if (settings.profile != settings_.profile) clear();
+  settings_ = settings;
+  for (Hypothesis& hypothesis : hypotheses_) hypothesis.sum.set_noise(settings.noise);
+}
+
+bool HypothesisSet::accepts_raw_pose(Timestamp now) const {
+  if (empty()) return true;
+  const Hypothesis& leader = hypotheses_.front();
+  const NeighborTrack& track = leader.sum.heaviest();
+  const bool on_probation = !leader.confirmed || now - leader.born < kProbation + settings_.lag;
+  return (on_probation && settings_.traits.hypotheses_compete) || leader.one_way ||
+         !track.is_certain() || track.is_diverged() ||
+         now - track.last_sighting() > kDivergenceTime + settings_.lag;
+}
+
+bool HypothesisSet::is_explained(Timestamp stamp, const MutualInitialization& first) const {
+  const auto readings = bearings_of(stamp, first);
+  return std::any_of(hypotheses_.begin(), hypotheses_.end(), [&](const Hypothesis& hypothesis) {
+    NeighborTrack trial = hypothesis.sum.heaviest();
+    const auto fits = [&](const Measurement& reading) {
+      return trial.fuse(reading, mounting_, settings_.gates).verdict == Verdict::kFused;
+    };
+    return !hypothesis.one_way && fits(readings[0]) && fits(readings[1]);
+  });
+}
+
+HypothesisSet::Hypothesis HypothesisSet::make(GaussianSum sum) {
+  const Timestamp born = sum.heaviest().stamp();
+  return {.sum = std::move(sum), .born = born, .generation = ++generations_};
+}
+
+bool HypothesisSet::initialize(Timestamp stamp, const MutualInitialization& first) {
+  NeighborTrack track(stamp, first.raw, settings_);
+  if (!settings_.traits.hypotheses_compete) {
+    clear();
+    hypotheses_.push_back(make(GaussianSum(track)));
+    hypotheses_.back().confirmed = true;
+    return true;
+  }
+  if (is_explained(stamp, first)) return false;
+  std::array<double, 2> scores{};
+  const auto readings = bearings_of(stamp, first);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Fusion fusion = track.fuse(readings[i], mounting_, settings_.gates);
+    if (fusion.verdict != Verdict::kFused) return false;
+    scores[i] = log_likelihood_ratio(fusion, readings[i].kind);
+  }
+  if (hypotheses_.size() >= kMaxHypotheses) {
+    const auto worst = std::min_element(hypotheses_.begin() + 1, hypotheses_.end(), kIsWorse);
+    if (worst->confirmed || worst->score() >= scores[0] + scores[1]) return false;
+    hypotheses_.erase(worst);
+  }
+  hypotheses_.push_back(make(GaussianSum(track)));
+  for (std::size_t i = 0; i < 2; ++i) hypotheses_.back().add_score(readings[i].kind, scores[i]);
+  return true;
+}
+
+bool HypothesisSet::initialize(Timestamp stamp, const OneWayInitialization& first) {
+  if (!empty()) return false;
+  std::vector<NeighborTrack> parts;
+  for (const GaussianPose& T_B_N : first.T_B_N) parts.emplace_back(stamp, T_B_N, settings_);
+  hypotheses_.push_back(make(GaussianSum(std::move(parts))));
+  hypotheses_.back().one_way = true;
+  return true;
+}
+
+bool HypothesisSet::initialize(Timestamp stamp, const GraphPose& first) {
+  clear();
+  hypotheses_.push_back(make(GaussianSum(NeighborTrack(stamp, first, settings_))));
+  hypotheses_.back().confirmed = true;
+  return true;
+}
+
+void HypothesisSet::Hypothesis::add_score(MeasurementKind kind, double log_likelihood_ratio) {
+  if (kind == MeasurementKind::kBearing) bearing_score += log_likelihood_ratio;
+  if (kind == MeasurementKind::kPeerBearing) peer_bearing_score += log_likelihood_ratio;
+  const double support = one_way ? std::max(bearing_score, peer_bearing_score)
+                                 : std::min(bearing_score, peer_bearing_score);
+  confirmed = confirmed || support >= kConfirmed;
+}
+
+bool HypothesisSet::has_budget_for(std::size_t raw_poses, Timestamp now) {
+  CorrectionBudget& corrections = budget(MeasurementKind::kRawPose);
+  if (!corrections.allows(now)) return false;
+  corrections.spend(raw_poses * hypotheses_.size());
+  return true;
+}
+
+void HypothesisSet::Hypothesis::advance_to(Timestamp to, const ImuHistory& imu_B,
+                                           const ImuHistory& imu_N) {
+  const Timestamp from = sum.heaviest().stamp();
+  if (to <= from) return;
+  sum.advance_to(to, imu_B, imu_N);
+  const double kept = std::exp(-to_seconds(to - from) / kScoreMemory);
+  bearing_score *= kept;
+  peer_bearing_score *= kept;
+}
+
+void HypothesisSet::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
+  for (Hypothesis& hypothesis : hypotheses_) hypothesis.advance_to(to, imu_B, imu_N);
+}
+
+Association HypothesisSet::fuse(std::span<const Measurement> candidates, const ImuHistory& imu_B,
+                                const ImuHistory& imu_N) {
+  const Timestamp stamp = candidates.front().stamp;
+  const MeasurementKind kind = candidates.front().kind;
+  CorrectionBudget& corrections = budget(kind);
+  Association of_leader{.fusion{.verdict = Verdict::kSkipped}};
+  for (Hypothesis& hypothesis : hypotheses_) {
+    const bool leads = &hypothesis == &hypotheses_.front();
+    if (!corrections.allows(stamp, leads ? 0.0 : kLeadersShare)) break;
+    corrections.spend(hypothesis.sum.size());
+    hypothesis.advance_to(stamp, imu_B, imu_N);
+    const Association association = hypothesis.sum.fuse(candidates, mounting_, settings_.gates);
+    hypothesis.add_score(kind, association.score);
+    if (leads) of_leader = association;
+  }
+  return of_leader;
+}
+
+void HypothesisSet::prune() {
+  if (empty()) return;
+  for (Hypothesis& hypothesis : hypotheses_) hypothesis.sum.prune();
+
+  const auto best = std::max_element(hypotheses_.begin(), hypotheses_.end(), kIsWorse);
+  const auto must_give_way = [&best](const Hypothesis& current) {
+    const bool is_mutual_for_one_way = current.one_way && !best->one_way;
+    const bool is_better = best->score() > current.score() + kMargin || is_mutual_for_one_way;
+    return !current.confirmed || (best->confirmed && is_better);
+  };
+  if (must_give_way(hypotheses_.front())) std::swap(hypotheses_.front(), *best);
+
+  const Hypothesis& leader = hypotheses_.front();
+  const Timestamp now = stamp();
+  const auto is_past_probation = [now](const Hypothesis& hypothesis) {
+    return now - hypothesis.born > kProbation;
+  };
+  const auto has_lost = [&](const Hypothesis& rival) {
+    return (!leader.one_way && leader.sum.is_compatible_with(rival.sum)) ||
+           (is_past_probation(rival) &&
+            (!rival.confirmed || rival.score() < leader.score() - kMargin));
+  };
+  hypotheses_.erase(std::remove_if(hypotheses_.begin() + 1, hypotheses_.end(), has_lost),
+                    hypotheses_.end());
+  const bool starts_anew = settings_.traits.fuses_single_readings && is_lost(leader.sum.heaviest());
+  if ((!leader.confirmed && is_past_probation(leader)) || starts_anew) clear();
+}
+
+bool HypothesisSet::is_unambiguous() const {
+  if (empty() || !hypotheses_.front().confirmed) return false;
+  const double margin = hypotheses_.front().score() - kMargin;
+  return std::none_of(hypotheses_.begin() + 1, hypotheses_.end(),
+                      [margin](const Hypothesis& h) { return h.confirmed && h.score() > margin; });
+}
+
+}  // namespace crepes

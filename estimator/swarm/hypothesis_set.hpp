@@ -1,0 +1,101 @@
+/// Competing hypotheses about a neighbor's pose, with their scores.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "estimator/core/token_bucket.hpp"
+#include "estimator/swarm/gaussian_sum.hpp"
+
+namespace crepes {
+
+/// A token bucket for corrections by one kind of reading. It allows a burst while hypotheses
+/// compete, but bounds the average: a slow computer must not fall behind and lose readings.
+class CorrectionBudget {
+ public:
+  /// True if more than `reserve` corrections are left at `now`.
+  [[nodiscard]] bool allows(Timestamp now, double reserve = 0.0) {
+    return left_.refill(now) > reserve;
+  }
+  void spend(std::size_t corrections) { left_.consume(static_cast<double>(corrections)); }
+
+ private:
+  TokenBucket left_{{.per_s = 1000.0, .burst = 8000.0}};
+};
+
+/// Multiple hypotheses of one neighbor. A robot and its mirror image lead to different first poses,
+/// and one sighting cannot decide between them. Each hypothesis fuses the readings that pass its
+/// gates. Its score is their log likelihood ratio against clutter, with a memory of half a second.
+/// A hypothesis is confirmed when bearings of both directions support it. The first hypothesis is
+/// the leader; a confirmed one with a clearly higher score replaces it.
+class HypothesisSet {
+ public:
+  HypothesisSet(FilterSettings settings, PairMounting mounting)
+      : settings_(settings), mounting_(std::move(mounting)) {}
+
+  [[nodiscard]] bool empty() const { return hypotheses_.empty(); }
+  void clear() { hypotheses_.clear(); }
+
+  /// Applies noise and gates at once, priors to new hypotheses. A change of the profile drops all
+  /// hypotheses.
+  void reconfigure(const FilterSettings& settings);
+
+  /// True if a raw pose could start a hypothesis that is needed.
+  [[nodiscard]] bool accepts_raw_pose(Timestamp now) const;
+  /// True if the budget allows a comparison of so many raw poses with every hypothesis.
+  [[nodiscard]] bool has_budget_for(std::size_t raw_poses, Timestamp now);
+  /// Adds a rival at `stamp()`. False, and nothing changes, if an existing hypothesis explains the
+  /// sighting, or if the set is full of better ones.
+  bool initialize(Timestamp stamp, const MutualInitialization& first);
+  /// Starts the first hypothesis. False if there is one already.
+  bool initialize(Timestamp stamp, const OneWayInitialization& first);
+  /// Replaces all hypotheses by the graph's pose. Always true.
+  bool initialize(Timestamp stamp, const GraphPose& first);
+
+  void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
+  /// Corrects each hypothesis with the most likely reading of a group of alternatives, the leader
+  /// first, as far as the budget allows. Returns the leader's association.
+  Association fuse(std::span<const Measurement> candidates, const ImuHistory& imu_B,
+                   const ImuHistory& imu_N);
+  /// Selects the leader and deletes hypotheses that lost or became equal to the leader.
+  void prune();
+
+  [[nodiscard]] const GaussianSum& leader() const { return hypotheses_.front().sum; }
+  [[nodiscard]] Timestamp stamp() const { return leader().heaviest().stamp(); }
+  /// True if the leader is confirmed and no confirmed rival has a similar score.
+  [[nodiscard]] bool is_unambiguous() const;
+  /// Number of the leader, counted over all hypotheses ever started.
+  [[nodiscard]] std::uint32_t generation() const { return hypotheses_.front().generation; }
+  [[nodiscard]] std::size_t size() const { return hypotheses_.size(); }
+
+ private:
+  struct Hypothesis {
+    GaussianSum sum;
+    Timestamp born;
+    std::uint32_t generation = 0;
+    double bearing_score = 0.0;
+    double peer_bearing_score = 0.0;
+    bool one_way = false;  ///< bearings of one direction confirm it
+    bool confirmed = false;
+
+    void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
+    void add_score(MeasurementKind kind, double log_likelihood_ratio);
+    [[nodiscard]] double score() const { return bearing_score + peer_bearing_score; }
+  };
+  [[nodiscard]] bool is_explained(Timestamp stamp, const MutualInitialization& first) const;
+  [[nodiscard]] Hypothesis make(GaussianSum sum);
+  [[nodiscard]] CorrectionBudget& budget(MeasurementKind kind) {
+    return budgets_[static_cast<std::size_t>(kind)];
+  }
+
+  FilterSettings settings_;
+  PairMounting mounting_;
+  std::vector<Hypothesis> hypotheses_;  ///< the leader first
+  std::uint32_t generations_ = 0;
+  std::array<CorrectionBudget, kMeasurementKindCount> budgets_;
+};
+
+}  // namespace crepes

@@ -1,0 +1,40 @@
+/// One measurement of a neighbor, as its filter receives it.
+#pragma once
+
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "estimator/core/outputs.hpp"
+#include "estimator/relative/neighbor_filter.hpp"
+#include "estimator/relative/raw_pose.hpp"
+
+namespace crepes {
+
+/// A raw pose and the two bearings it was computed from.
+struct MutualInitialization {
+  RawPose raw;
+  DirectionReading bearing;
+  DirectionReading peer_bearing;
+};
+
+/// Poses for a track of which only one robot sees the other: a pose for every heading that a single
+/// bearing allows, or the inverse of the neighbor's estimate.
+struct OneWayInitialization {
+  std::vector<GaussianPose> T_B_N;
+};
+
+/// A measurement that corrects or initializes a neighbor's filter.
+struct Measurement {
+  Timestamp stamp{};
+  MeasurementKind kind = MeasurementKind::kBearing;
+  std::variant<DirectionReading, RangeReading, MutualInitialization, OneWayInitialization,
+               GraphPose>
+      reading;
+};
+
+/// The measurements at the front of `ordered` with the same kind, stamp and camera. They are
+/// alternatives: at most one of them is true. `ordered` must not be empty.
+[[nodiscard]] std::span<const Measurement> leading_group(std::span<const Measurement> ordered);
+
+}  // namespace crepes

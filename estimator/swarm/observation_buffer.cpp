@@ -1,0 +1,166 @@
+#include "estimator/swarm/observation_buffer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+namespace crepes {
+namespace {
+
+constexpr Duration kKept = std::chrono::milliseconds{500};
+constexpr Duration kBearingReach = std::chrono::milliseconds{20};  // two dark slots of a code
+constexpr Duration kRangeReach = std::chrono::milliseconds{60};
+constexpr Duration kOutOfSight = std::chrono::milliseconds{250};
+// Sigma of what one error in twenty adds. Of LinkTrack's ranges 5 % are off by more than 0.39 m and
+// 1 % by more than 0.73 m; an exponential tail through both.
+constexpr double kOutlierSigma = 0.14;  // m
+// How fast the line of sight may turn because robots pass each other. The gyroscope does not
+// measure this.
+constexpr double kLineRate = 0.3;  // rad/s
+// Errors of the mounting, which do not average out. They also keep the covariance of z regular:
+// p_B_N and p_N_B contain the same distance.
+constexpr double kMountingSigma = 0.01;   // m
+constexpr double kAttitudeSigma = 0.002;  // rad
+
+// Two bearings confirm each other within this time and angle, after compensation of own rotation.
+constexpr Duration kConfirmationTime = std::chrono::milliseconds{100};
+constexpr double kConfirmationAngle = 0.02;  // rad; kLineRate adds to it
+
+bool is_confirmed(const Bearing& bearing, const BoundedFifo<Bearing, 256>& log,
+                  const ImuHistory& imu) {
+  Timestamp from = bearing.stamp;  // start of `turn`; all bearings of a frame share it
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  return std::any_of(log.all().begin(), log.all().end(), [&](const Bearing& other) {
+    const Duration apart = std::chrono::abs(other.stamp - bearing.stamp);
+    if (apart == Duration{0} || apart > kConfirmationTime) return false;
+    if (other.stamp != std::exchange(from, other.stamp))
+      turn = imu.rotation(other.stamp, bearing.stamp).conjugate();
+    return (turn * other.u_B - bearing.u_B).norm() <
+           kConfirmationAngle + kLineRate * to_seconds(apart);
+  });
+}
+
+}  // namespace
+
+ObservationBuffer::ObservationBuffer(MemberConfig self, MemberConfig neighbor,
+                                     double calibration_sigma_rad, double range_sigma_m)
+    : self_(std::move(self)),
+      neighbor_(std::move(neighbor)),
+      calibration_sigma_rad_(calibration_sigma_rad),
+      range_sigma_m_(range_sigma_m) {}
+
+// Ranges from before the robots saw each other may have gone around an obstacle.
+void ObservationBuffer::add_sighting(Timestamp stamp) {
+  if (!sighted_ || stamp - *sighted_ > kOutOfSight) ranges_.drop_before(stamp);
+  sighted_ = std::max(sighted_.value_or(stamp), stamp);
+}
+
+void ObservationBuffer::add_own_bearing(const Bearing& bearing) {
+  add_sighting(bearing.stamp);
+  own_.add(bearing);
+  own_.drop_before(bearing.stamp - kKept);
+}
+
+void ObservationBuffer::add_peer_bearing(const Bearing& bearing) {
+  add_sighting(bearing.stamp);
+  peer_.add(bearing);
+  peer_.drop_before(bearing.stamp - kKept);
+}
+
+void ObservationBuffer::add_range(Timestamp stamp, double range_m) {
+  ranges_.add({stamp, range_m});
+  ranges_.drop_before(stamp - kKept);
+}
+
+// The confirmed bearings of the frame nearest to `t`, turned to `t`.
+std::vector<Bearing> ObservationBuffer::own_at(Timestamp t, const ImuHistory& imu) const {
+  const auto distance = [t](const Bearing& bearing) { return std::chrono::abs(bearing.stamp - t); };
+  std::vector<Bearing> nearest;
+  for (const Bearing& bearing : own_.all()) {
+    if (distance(bearing) > kBearingReach || !is_confirmed(bearing, own_, imu)) continue;
+    if (!nearest.empty() && distance(bearing) < distance(nearest.front())) nearest.clear();
+    if (nearest.empty() || bearing.stamp == nearest.front().stamp) nearest.push_back(bearing);
+  }
+  for (Bearing& bearing : nearest) {
+    bearing.u_B = imu.rotation(bearing.stamp, t).conjugate() * bearing.u_B;
+    bearing.sigma_rad = std::hypot(bearing.sigma_rad, kLineRate * to_seconds(distance(bearing)));
+    bearing.stamp = t;
+  }
+  return nearest;
+}
+
+// The median of both modules' ranges around `t`: robust against an outlier, unless it is alone.
+std::optional<RangeReading> ObservationBuffer::range_at(Timestamp t) const {
+  std::vector<double> near;
+  for (const StampedRange& range : ranges_.all()) {
+    if (std::chrono::abs(range.stamp - t) <= kRangeReach) near.push_back(range.range_m);
+  }
+  if (near.empty()) return std::nullopt;
+  const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
+  std::nth_element(near.begin(), middle, near.end());
+  const double sigma_m =
+      near.size() > 1 ? range_sigma_m_ : std::hypot(range_sigma_m_, kOutlierSigma);
+  return RangeReading{*middle, sigma_m};
+}
+
+Sighting ObservationBuffer::sighting(const Bearing& bearing, const Tilt& tilt,
+                                     const MemberConfig& member) const {
+  return {.u = bearing.u_B,
+          .up = tilt.up_B,
+          .mounting = {bearing.p_B_C, member.p_body_led, member.p_body_uwb},
+          .bearing_sigma_rad = std::hypot(bearing.sigma_rad, calibration_sigma_rad_),
+          .tilt_sigma_rad = tilt.sigma_rad};
+}
+
+std::variant<std::vector<MutualInitialization>, NoPoseReason>
+ObservationBuffer::mutual_initializations(const Bearing& peer_bearing, const RobotState& self,
+                                          const RobotState& neighbor) const {
+  const Timestamp t = peer_bearing.stamp;
+  const auto tilt_B = self.tilt_at(t);
+  const auto tilt_N = neighbor.tilt_at(t);
+  if (!tilt_B || !tilt_N) return NoPoseReason::kTiltUnknown;
+  if (!is_confirmed(peer_bearing, peer_, neighbor.imu)) return NoPoseReason::kDoesNotSeeUs;
+  const std::vector<Bearing> own = own_at(t, self.imu);
+  if (own.empty()) return NoPoseReason::kNotSeen;
+  const auto range = range_at(t);
+  if (!range) return NoPoseReason::kNoRange;
+
+  std::vector<MutualInitialization> found;
+  NoPoseReason reason = NoPoseReason::kNone;
+  for (const Bearing& bearing : own) {
+    auto result = compute_raw_pose({.B = sighting(bearing, *tilt_B, self_),
+                                    .N = sighting(peer_bearing, *tilt_N, neighbor_),
+                                    .range_m = range->range_m,
+                                    .range_sigma_m = range->sigma_m});
+    if (auto* raw = std::get_if<RawPose>(&result)) {
+      raw->covariance.diagonal().head<6>().array() += kMountingSigma * kMountingSigma;
+      raw->covariance.diagonal().tail<3>().array() += kAttitudeSigma * kAttitudeSigma;
+      found.push_back({*raw,
+                       {bearing.u_B, bearing.p_B_C, bearing.sigma_rad},
+                       {peer_bearing.u_B, peer_bearing.p_B_C, peer_bearing.sigma_rad}});
+    } else {
+      reason = std::get<NoPoseReason>(result);
+    }
+  }
+  if (found.empty()) return reason;
+  return found;
+}
+
+std::optional<Measurement> ObservationBuffer::one_way_initialization(
+    const RobotState& self, const RobotState& neighbor) const {
+  constexpr int kHeadings = 24;
+  if (own_.all().empty() || !is_confirmed(own_.all().back(), own_, self.imu)) return std::nullopt;
+  const Bearing& bearing = own_.all().back();
+  const auto tilt_B = self.tilt_at(bearing.stamp);
+  const auto tilt_N = neighbor.tilt_at(bearing.stamp);
+  const auto range = range_at(bearing.stamp);
+  if (!tilt_B || !tilt_N || !range) return std::nullopt;
+  auto poses = poses_by_heading(sighting(bearing, *tilt_B, self_), sighting({}, *tilt_N, neighbor_),
+                                range->range_m, range->sigma_m, kHeadings);
+  if (poses.empty()) return std::nullopt;
+  return Measurement{bearing.stamp, MeasurementKind::kRawPose,
+                     OneWayInitialization{std::move(poses)}};
+}
+
+}  // namespace crepes

@@ -1,0 +1,65 @@
+/// Recent bearings and ranges of one pair of robots, joined into mutual sightings (paper III-C).
+#pragma once
+
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "estimator/core/measurements.hpp"
+#include "estimator/core/swarm_config.hpp"
+#include "estimator/swarm/bounded_fifo.hpp"
+#include "estimator/swarm/measurement.hpp"
+#include "estimator/swarm/robot_state.hpp"
+
+namespace crepes {
+
+/// Keeps the last half second, in order of arrival.
+class ObservationBuffer {
+ public:
+  /// `self` and `neighbor` contain the mountings. `calibration_sigma_rad` is added to the noise of
+  /// each bearing. `range_sigma_m` is one sigma of a single range, with its bias.
+  ObservationBuffer(MemberConfig self, MemberConfig neighbor, double calibration_sigma_rad,
+                    double range_sigma_m);
+
+  void set_sigmas(double calibration_sigma_rad, double range_sigma_m) {
+    calibration_sigma_rad_ = calibration_sigma_rad;
+    range_sigma_m_ = range_sigma_m;
+  }
+
+  void add_own_bearing(const Bearing& bearing);
+  void add_peer_bearing(const Bearing& bearing);
+  void add_range(Timestamp stamp, double range_m);
+
+  /// Raw poses at the stamp of `peer_bearing`, one for each own bearing near that instant; or why
+  /// there is none. A bearing counts only if another one within 0.1 s has about its direction: a
+  /// single flicker is not a robot.
+  [[nodiscard]] std::variant<std::vector<MutualInitialization>, NoPoseReason>
+  mutual_initializations(const Bearing& peer_bearing, const RobotState& self,
+                         const RobotState& neighbor) const;
+
+  /// Poses at the stamp of the newest own bearing, for a neighbor that does not see us.
+  [[nodiscard]] std::optional<Measurement> one_way_initialization(const RobotState& self,
+                                                                  const RobotState& neighbor) const;
+
+ private:
+  void add_sighting(Timestamp stamp);
+  [[nodiscard]] Sighting sighting(const Bearing& bearing, const Tilt& tilt,
+                                  const MemberConfig& member) const;
+  [[nodiscard]] std::vector<Bearing> own_at(Timestamp t, const ImuHistory& imu) const;
+  [[nodiscard]] std::optional<RangeReading> range_at(Timestamp t) const;
+
+  struct StampedRange {
+    Timestamp stamp{};
+    double range_m = 0.0;
+  };
+  MemberConfig self_;
+  MemberConfig neighbor_;
+  double calibration_sigma_rad_;
+  double range_sigma_m_;
+  BoundedFifo<Bearing, 256> own_;
+  BoundedFifo<Bearing, 256> peer_;
+  BoundedFifo<StampedRange, 256> ranges_;
+  std::optional<Timestamp> sighted_;  ///< when either robot last saw the other
+};
+
+}  // namespace crepes

@@ -1,0 +1,25 @@
+#include "estimator/swarm/outcome_log.hpp"
+
+#include <algorithm>
+
+namespace crepes {
+
+void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion) {
+  ++counts_[static_cast<std::size_t>(kind)][static_cast<std::size_t>(fusion.verdict)];
+  std::optional<Timestamp>& newest = newest_[static_cast<std::size_t>(kind)];
+  newest = std::max(newest.value_or(stamp), stamp);
+  if (keeps_records_) records_.measurements.push_back({neighbor_, stamp, kind, fusion});
+}
+
+void OutcomeLog::add(std::optional<CalibrationRecord> calibration) {
+  if (!keeps_records_ || !calibration) return;
+  calibration->neighbor = neighbor_;
+  records_.calibrations.push_back(*calibration);
+}
+
+void OutcomeLog::write_to(NeighborStatus& status) const {
+  status.measurements = counts_;
+  status.newest = newest_;
+}
+
+}  // namespace crepes

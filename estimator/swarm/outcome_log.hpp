@@ -1,0 +1,33 @@
+/// The outcomes of one neighbor's measurements: counts, and records on request.
+#pragma once
+
+#include <utility>
+
+#include "estimator/core/outputs.hpp"
+
+namespace crepes {
+
+class OutcomeLog {
+ public:
+  explicit OutcomeLog(RobotId neighbor) : neighbor_(neighbor) {}
+
+  /// Keeps a record of each measurement, and of the calibration, until `drain_records`.
+  void keep_records() { keeps_records_ = true; }
+  [[nodiscard]] Records drain_records() { return std::exchange(records_, {}); }
+
+  void add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion);
+  void add(std::optional<CalibrationRecord> calibration);
+  [[nodiscard]] bool keeps_records() const { return keeps_records_; }
+
+  /// Fills in `measurements` and `newest`.
+  void write_to(NeighborStatus& status) const;
+
+ private:
+  RobotId neighbor_;
+  std::array<VerdictCounts, kMeasurementKindCount> counts_{};
+  std::array<std::optional<Timestamp>, kMeasurementKindCount> newest_{};
+  bool keeps_records_ = false;
+  Records records_;
+};
+
+}  // namespace crepes

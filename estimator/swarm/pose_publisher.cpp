@@ -1,0 +1,136 @@
+#include "estimator/swarm/pose_publisher.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "estimator/team/team_prediction.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr Duration kMaxAge = std::chrono::milliseconds{20};  // of a published state
+constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
+constexpr Duration kTeamLife = std::chrono::milliseconds{500};
+
+}  // namespace
+
+PosePublisher::PosePublisher(RobotId neighbor, PairMounting mounting,
+                             const FilterSettings& settings)
+    : neighbor_(neighbor),
+      mounting_(std::move(mounting)),
+      recent_(settings.recent),
+      predictor_(mounting_, settings.gates),
+      noise_(settings.noise),
+      pose_gate_(settings.gates.pose) {}
+
+void PosePublisher::reconfigure(const FilterSettings& settings) {
+  recent_ = settings.recent;
+  noise_ = settings.noise;
+  pose_gate_ = settings.gates.pose;
+  predictor_ = OutputPredictor(mounting_, settings.gates);
+}
+
+void PosePublisher::update(Timestamp now, const RobotState& self, const RobotState& neighbor,
+                           const HypothesisSet& hypotheses, ReadingIntake& intake) {
+  const Timestamp stamp = std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
+  if (hypotheses.stamp() > stamp) return;
+  const NeighborTrack track =
+      predictor_.predict(stamp, hypotheses, {intake.buffer().pending(), self.imu, neighbor.imu});
+  const GaussianPose T_B_N = hypotheses.leader().mean(track.pose());
+  if (!is_certain(T_B_N.covariance) || track.is_contradicted()) return;
+  if (hypotheses.generation() != std::exchange(generation_, hypotheses.generation())) {
+    ++starts_;
+    correction_.reset();
+  }
+
+  const auto is_recent = [&](Timestamp t) { return stamp - t <= recent_; };
+  const Timestamp graph = track.last(MeasurementKind::kGraphPose);
+  const Timestamp range =
+      std::max(track.last(MeasurementKind::kRange), track.last(MeasurementKind::kPeerRange));
+  const LastContact& last = intake.last_contact();
+  NeighborPose pose;
+  pose.neighbor = neighbor_;
+  pose.stamp = stamp;
+  pose.published = now;
+  pose.mode = is_recent(track.last_sighting()) ? PoseMode::kDirect
+              : is_recent(graph)               ? PoseMode::kGraph
+                                               : PoseMode::kPredicted;
+  pose.T_B_N = T_B_N;
+  pose.v_B_N = track.motion().v_B_N;
+  pose.age_s = to_seconds(stamp - std::max({track.last_sighting(), graph, range}));
+  pose.reset_counter = starts_;
+  pose.sources = {.bearing = is_recent(last.seen),
+                  .peer_bearing = is_recent(last.seen_by),
+                  .range = is_recent(last.ranged),
+                  .imu = is_recent(neighbor.imu.newest().stamp),
+                  .graph = is_recent(graph)};
+  pose_ = pose;
+}
+
+void PosePublisher::add_graph_correction(Timestamp stamp, const GraphPose& pose) {
+  if (!pose_ || pose_->stamp < stamp) return;
+  correction_ =
+      Correction{stamp, pose_difference(pose_->T_B_N.pose, pose.T_B_N.pose), pose.T_B_N.covariance};
+}
+
+std::optional<NeighborEstimate> PosePublisher::estimate() const {
+  if (!pose_ || pose_->mode != PoseMode::kDirect) return std::nullopt;
+  return NeighborEstimate{pose_->stamp, neighbor_, pose_->T_B_N, pose_->v_B_N};
+}
+
+std::optional<NeighborPose> PosePublisher::graph_corrected_pose() const {
+  if (!pose_ || !correction_ || pose_->mode != PoseMode::kDirect ||
+      pose_->stamp - correction_->stamp > kCorrectionLife) {
+    return pose_;
+  }
+  NeighborPose corrected = *pose_;
+  corrected.T_B_N = {perturbed(pose_->T_B_N.pose, correction_->step), correction_->covariance};
+  corrected.sources.graph = true;
+  return corrected;
+}
+
+void PosePublisher::update_team(Timestamp now, const RobotState& self, const RobotState& neighbor,
+                                const LastContact& last) {
+  if (!team_) return;
+  const Timestamp stamp = std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
+  if (stamp < team_->stamp || stamp - team_->stamp > kTeamLife) return;
+  const TeamPose team =
+      predicted(team_->pose, {self.imu, neighbor.imu, team_->bias_B, team_->bias_N}, team_->stamp,
+                stamp, noise_);
+  const auto is_recent = [&](Timestamp t) { return stamp - t <= recent_; };
+  const Timestamp sighted = std::max(last.seen, last.seen_by);
+  NeighborPose pose;
+  pose.neighbor = neighbor_;
+  pose.stamp = stamp;
+  pose.published = now;
+  pose.mode = is_recent(sighted)              ? PoseMode::kDirect
+              : is_recent(team.last_sighting) ? PoseMode::kGraph
+                                              : PoseMode::kPredicted;
+  pose.T_B_N.pose = team.T_B_N;
+  const auto& P = team.covariance;
+  pose.T_B_N.covariance << P.topLeftCorner<3, 3>(), P.topRightCorner<3, 3>(),
+      P.bottomLeftCorner<3, 3>(), P.bottomRightCorner<3, 3>();
+  pose.v_B_N = team.v_B_N;
+  pose.age_s = std::max(0.0, to_seconds(stamp - std::max(sighted, team.last_sighting)));
+  pose.reset_counter = starts_;
+  pose.sources = {.bearing = is_recent(last.seen),
+                  .peer_bearing = is_recent(last.seen_by),
+                  .range = is_recent(last.ranged),
+                  .imu = is_recent(neighbor.imu.newest().stamp),
+                  .graph = true};
+  if (is_certain(pose.T_B_N.covariance)) team_pose_ = pose;
+}
+
+std::optional<NeighborPose> PosePublisher::published() const {
+  if (!team_pose_) return graph_corrected_pose();
+  if (!pose_ || pose_->mode == PoseMode::kPredicted) return team_pose_;
+  const Vector6d d = pose_difference(pose_->T_B_N.pose, team_pose_->T_B_N.pose);
+  const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
+  if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return team_pose_;
+  // One of the two is wrong, and nothing shows which.
+  NeighborPose doubtful = *pose_;
+  doubtful.T_B_N.covariance += d * d.transpose();
+  return doubtful;
+}
+
+}  // namespace crepes

@@ -1,0 +1,77 @@
+/// The published pose of one neighbor.
+#pragma once
+
+#include <optional>
+
+#include "estimator/swarm/output_predictor.hpp"
+#include "estimator/swarm/reading_intake.hpp"
+#include "estimator/swarm/robot_state.hpp"
+
+namespace crepes {
+
+/// Predicts the leading filter to the newest own IMU sample at each tick. The graph's solution
+/// corrects the published pose only: it contains this filter's own estimate, and fusing it would
+/// count the same readings twice.
+class PosePublisher {
+ public:
+  PosePublisher(RobotId neighbor, PairMounting mounting, const FilterSettings& settings);
+
+  void reconfigure(const FilterSettings& settings);
+
+  /// A reading or sample has arrived for `stamp`.
+  void invalidate_from(Timestamp stamp) { predictor_.invalidate_from(stamp); }
+  void clear() {
+    pose_.reset();
+    team_pose_.reset();
+  }
+  /// Requires samples of both IMUs and an unambiguous leader.
+  void update(Timestamp now, const RobotState& self, const RobotState& neighbor,
+              const HypothesisSet& hypotheses, ReadingIntake& intake);
+  /// Ignored without a pose at or after `stamp`.
+  void add_graph_correction(Timestamp stamp, const GraphPose& pose);
+
+  struct TeamEstimate {
+    Timestamp stamp;
+    TeamPose pose;
+    ImuBiasEstimate bias_B;
+    ImuBiasEstimate bias_N;
+  };
+  /// Replaces the former one.
+  void add_team_pose(TeamEstimate estimate) { team_ = std::move(estimate); }
+  /// Carries the newest team pose to now.
+  void update_team(Timestamp now, const RobotState& self, const RobotState& neighbor,
+                   const LastContact& last);
+
+  /// The filter's pose at the last tick. Empty while unknown or too uncertain.
+  [[nodiscard]] const std::optional<NeighborPose>& pose() const { return pose_; }
+  /// The graph's edge: a certain pose with a recent sighting.
+  [[nodiscard]] std::optional<NeighborEstimate> estimate() const;
+  /// The team's pose if there is one and it agrees with the filter's. Otherwise the filter's, with
+  /// the paper's graph's correction, if a recent one exists.
+  [[nodiscard]] std::optional<NeighborPose> published() const;
+
+ private:
+  [[nodiscard]] std::optional<NeighborPose> graph_corrected_pose() const;
+
+  /// Difference of the graph's pose to the published one at the same instant.
+  struct Correction {
+    Timestamp stamp;
+    Vector6d step;
+    Matrix6d covariance;
+  };
+
+  RobotId neighbor_;
+  PairMounting mounting_;
+  Duration recent_;
+  OutputPredictor predictor_;
+  std::uint32_t generation_ = 0;  ///< of the hypothesis published last
+  std::uint32_t starts_ = 0;
+  std::optional<NeighborPose> pose_;
+  std::optional<Correction> correction_;
+  ProcessNoise noise_;
+  double pose_gate_ = 0.0;
+  std::optional<TeamEstimate> team_;
+  std::optional<NeighborPose> team_pose_;  ///< at the last tick
+};
+
+}  // namespace crepes

@@ -1,0 +1,55 @@
+#include "estimator/swarm/reading_intake.hpp"
+
+#include <algorithm>
+
+namespace crepes {
+
+ReadingIntake::ReadingIntake(RobotId neighbor, const FilterSettings& settings)
+    : settings_(settings), buffer_(settings.lag), outcomes_(neighbor) {}
+
+void ReadingIntake::reconfigure(const FilterSettings& settings) {
+  // The waiting readings are meant for the filter of the former profile.
+  if (settings.profile != settings_.profile) buffer_.clear();
+  settings_ = settings;
+  buffer_.set_lag(settings.lag);
+}
+
+void ReadingIntake::add_report_stamp(Timestamp stamp) {
+  last_.heard = std::max(last_.heard, stamp);
+}
+
+void ReadingIntake::add_bearing(const Bearing& bearing) {
+  last_.seen = std::max(last_.seen, bearing.stamp);
+  enqueue({bearing.stamp, MeasurementKind::kBearing,
+           DirectionReading{bearing.u_B, bearing.p_B_C, bearing.sigma_rad}});
+}
+
+void ReadingIntake::add_peer_bearing(const Bearing& bearing, double sigma_rad) {
+  last_.seen_by = std::max(last_.seen_by, bearing.stamp);
+  enqueue({bearing.stamp, MeasurementKind::kPeerBearing,
+           DirectionReading{bearing.u_B, bearing.p_B_C, sigma_rad}});
+}
+
+bool ReadingIntake::add_range(const UwbRange& range, MeasurementKind kind) {
+  if (!screen_.accepts(range, settings_)) {
+    outcomes_.add(range.stamp, kind, {.verdict = Verdict::kGated});
+    return false;
+  }
+  last_.ranged = std::max(last_.ranged, range.stamp);
+  enqueue({range.stamp, kind, RangeReading{range.range_m, settings_.range_sigma_m}});
+  return true;
+}
+
+void ReadingIntake::enqueue(Measurement measurement) {
+  const MeasurementKind kind = measurement.kind;
+  const Timestamp stamp = measurement.stamp;
+  const bool is_pose = kind == MeasurementKind::kRawPose || kind == MeasurementKind::kGraphPose;
+  if (!is_pose && !settings_.traits.fuses_single_readings) return;
+  if (!buffer_.push(std::move(measurement))) {
+    outcomes_.add(stamp, kind, {.verdict = Verdict::kLate});
+  } else {
+    earliest_new_ = std::min(earliest_new_.value_or(stamp), stamp);
+  }
+}
+
+}  // namespace crepes

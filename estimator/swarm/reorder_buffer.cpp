@@ -1,0 +1,30 @@
+#include "estimator/swarm/reorder_buffer.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace crepes {
+
+bool ReorderBuffer::push(Measurement measurement) {
+  if (measurement.stamp < released_) return false;
+  const auto place = std::upper_bound(
+      pending_.begin(), pending_.end(), measurement.stamp,
+      [](Timestamp stamp, const Measurement& other) { return stamp < other.stamp; });
+  pending_.insert(place, std::move(measurement));
+  if (pending_.size() > kCapacity) {
+    pending_.erase(pending_.begin());
+    ++dropped_;
+  }
+  return true;
+}
+
+std::span<const Measurement> ReorderBuffer::pop_ready(Timestamp now) {
+  if (pending_.empty() || pending_.front().stamp > now - lag_) return {};
+  released_ = pending_.front().stamp;
+  const auto count = static_cast<std::ptrdiff_t>(leading_group(pending_).size());
+  ready_.assign(pending_.begin(), pending_.begin() + count);
+  pending_.erase(pending_.begin(), pending_.begin() + count);
+  return ready_;
+}
+
+}  // namespace crepes

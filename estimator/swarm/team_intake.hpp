@@ -1,0 +1,50 @@
+/// Collects what everybody measured for the team's filter.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "estimator/core/swarm_config.hpp"
+#include "estimator/swarm/filter_settings.hpp"
+#include "estimator/swarm/neighbor_track.hpp"
+#include "estimator/swarm/range_screen.hpp"
+#include "estimator/team/team_interval.hpp"
+
+namespace crepes {
+
+/// All bearings and ranges of this robot's reports and its peers', by the time at which they were
+/// measured. Refuses ranges without line of sight.
+class TeamIntake {
+ public:
+  /// The IMU of a robot, own or as it reports it; null where there is none.
+  using ImuOf = std::function<const ImuHistory*(RobotId)>;
+
+  /// A peer's report, whose measurements are new; `turn_sigma_rad` is added to its bearings' noise.
+  /// Measurements of robots that are no members are ignored.
+  void add_report(const Report& report, double turn_sigma_rad, const SwarmConfig& swarm,
+                  const FilterSettings& settings);
+  /// This robot's report, which repeats measurements.
+  void add_own_report(const Report& report, const SwarmConfig& swarm,
+                      const FilterSettings& settings);
+
+  /// The interval since the last one until `to`. Measurements of it that arrive later are lost.
+  /// Empty if `to` is not after the last one: a reload may have made the lag longer.
+  [[nodiscard]] std::optional<TeamInterval> drain(RobotId self, Timestamp to,
+                                                  const SwarmConfig& swarm,
+                                                  const FilterSettings& settings,
+                                                  const ImuOf& imu_of);
+
+ private:
+  void add_range(RobotId observer, const UwbRange& range, const FilterSettings& settings);
+
+  std::vector<TeamBearing> bearings_;
+  std::vector<TeamRange> ranges_;
+  std::map<std::pair<RobotId, RobotId>, RangeScreen> screens_;
+  Timestamp own_newest_ = kNever;
+  Timestamp last_ = kNever;
+};
+
+}  // namespace crepes

@@ -1,0 +1,91 @@
+#include "estimator/swarm/track_initiator.hpp"
+
+#include <utility>
+#include <variant>
+
+namespace crepes {
+
+TrackInitiator::TrackInitiator(const MemberConfig& self, const MemberConfig& neighbor,
+                               const FilterSettings& settings)
+    : traits_(settings.traits),
+      observations_(self, neighbor, settings.raw_pose_calibration_sigma_rad,
+                    settings.raw_pose_range_sigma_m) {}
+
+void TrackInitiator::reconfigure(const FilterSettings& settings) {
+  traits_ = settings.traits;
+  observations_.set_sigmas(settings.raw_pose_calibration_sigma_rad,
+                           settings.raw_pose_range_sigma_m);
+}
+
+void TrackInitiator::add_peer_bearing(const Bearing& bearing, const RobotState& self,
+                                      const RobotState& neighbor, const HypothesisSet& hypotheses,
+                                      ReadingIntake& intake) {
+  observations_.add_peer_bearing(bearing);
+  const bool wanted = !traits_.fuses_single_readings || hypotheses.accepts_raw_pose(bearing.stamp);
+  if (!wanted || self.lacks_imu(bearing.stamp) || neighbor.lacks_imu(bearing.stamp)) return;
+  const auto result = observations_.mutual_initializations(bearing, self, neighbor);
+  if (const auto* found = std::get_if<std::vector<MutualInitialization>>(&result)) {
+    raw_pose_reason_ = NoPoseReason::kNone;
+    for (const MutualInitialization& first : *found)
+      intake.enqueue({bearing.stamp, MeasurementKind::kRawPose, first});
+  } else {
+    raw_pose_reason_ = std::get<NoPoseReason>(result);
+    intake.outcomes().add(bearing.stamp, MeasurementKind::kRawPose,
+                          {.verdict = Verdict::kDegenerate});
+  }
+}
+
+void TrackInitiator::add_peer_estimate(const NeighborEstimate& estimate,
+                                       const HypothesisSet& hypotheses,
+                                       ReadingIntake& intake) const {
+  if (!traits_.starts_one_way || !hypotheses.empty() || !one_way_lasts_) return;
+  intake.enqueue(
+      {estimate.stamp, MeasurementKind::kRawPose, OneWayInitialization{{inverse(estimate.T_B_N)}}});
+}
+
+void TrackInitiator::tick(Timestamp now, const RobotState& self, const RobotState& neighbor,
+                          const HypothesisSet& hypotheses, ReadingIntake& intake) {
+  constexpr Duration kSeenRecently = std::chrono::milliseconds{500};
+  constexpr Duration kLasting = std::chrono::seconds{2};
+  const bool we_see = now - intake.last_contact().seen < kSeenRecently;
+  const bool it_sees = now - intake.last_contact().seen_by < kSeenRecently;
+  if (one_way_since_ == kNever || we_see == it_sees) one_way_since_ = now;
+  one_way_lasts_ = now - one_way_since_ > kLasting;
+  if (!one_way_lasts_ || !we_see || !hypotheses.empty() || !traits_.starts_one_way) return;
+  if (auto first = observations_.one_way_initialization(self, neighbor))
+    intake.enqueue(std::move(*first));
+}
+
+bool TrackInitiator::is_initialization(const Measurement& measurement,
+                                       const HypothesisSet& hypotheses) const {
+  if (measurement.kind == MeasurementKind::kRawPose)
+    return traits_.fuses_single_readings || hypotheses.accepts_raw_pose(measurement.stamp);
+  return measurement.kind == MeasurementKind::kGraphPose &&
+         (hypotheses.empty() || !hypotheses.leader().heaviest().is_certain());
+}
+
+void TrackInitiator::initialize(std::span<const Measurement> group, const ImuHistory& imu_B,
+                                const ImuHistory& imu_N, HypothesisSet& hypotheses,
+                                OutcomeLog& outcomes) {
+  const Timestamp stamp = group.front().stamp;
+  if (!hypotheses.has_budget_for(group.size(), stamp)) {
+    for (const Measurement& measurement : group)
+      outcomes.add(stamp, measurement.kind, {.verdict = Verdict::kSkipped});
+    return;
+  }
+  hypotheses.advance_to(stamp, imu_B, imu_N);
+  for (const Measurement& measurement : group) {
+    const bool started = std::visit(
+        [&](const auto& first) {
+          if constexpr (requires { hypotheses.initialize(stamp, first); }) {
+            return hypotheses.initialize(stamp, first);
+          } else {
+            return false;
+          }
+        },
+        measurement.reading);
+    if (started) outcomes.add(stamp, measurement.kind, {.verdict = Verdict::kFused});
+  }
+}
+
+}  // namespace crepes

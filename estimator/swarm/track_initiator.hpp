@@ -1,0 +1,53 @@
+/// Starts the tracks of one neighbor.
+#pragma once
+
+#include <span>
+
+#include "estimator/swarm/filter_settings.hpp"
+#include "estimator/swarm/hypothesis_set.hpp"
+#include "estimator/swarm/observation_buffer.hpp"
+#include "estimator/swarm/reading_intake.hpp"
+
+namespace crepes {
+
+/// Computes first poses: from mutual sightings, or after two seconds in which only one of the two
+/// robots has seen the other, from bearings of that one. They pass through the reorder buffer as
+/// measurements and then start hypotheses.
+class TrackInitiator {
+ public:
+  TrackInitiator(const MemberConfig& self, const MemberConfig& neighbor,
+                 const FilterSettings& settings);
+
+  void reconfigure(const FilterSettings& settings);
+
+  void add_bearing(const Bearing& bearing) { observations_.add_own_bearing(bearing); }
+  void add_range(Timestamp stamp, double range_m) { observations_.add_range(stamp, range_m); }
+  /// Queues the raw poses that the bearing completes, if `hypotheses` need one.
+  void add_peer_bearing(const Bearing& bearing, const RobotState& self, const RobotState& neighbor,
+                        const HypothesisSet& hypotheses, ReadingIntake& intake);
+  /// Queues the inverse of the neighbor's estimate of us, if only the neighbor sees us.
+  void add_peer_estimate(const NeighborEstimate& estimate, const HypothesisSet& hypotheses,
+                         ReadingIntake& intake) const;
+  /// Queues a one-way initialization, if only we see the neighbor. Call once a tick.
+  void tick(Timestamp now, const RobotState& self, const RobotState& neighbor,
+            const HypothesisSet& hypotheses, ReadingIntake& intake);
+
+  /// True if the measurement starts a hypothesis instead of correcting one.
+  [[nodiscard]] bool is_initialization(const Measurement& measurement,
+                                       const HypothesisSet& hypotheses) const;
+  /// Starts hypotheses from a group of such measurements.
+  static void initialize(std::span<const Measurement> group, const ImuHistory& imu_B,
+                         const ImuHistory& imu_N, HypothesisSet& hypotheses, OutcomeLog& outcomes);
+
+  /// Why the latest mutual sighting gave no raw pose; kNone if it did.
+  [[nodiscard]] NoPoseReason raw_pose_reason() const { return raw_pose_reason_; }
+
+ private:
+  ProfileTraits traits_;
+  ObservationBuffer observations_;
+  Timestamp one_way_since_ = kNever;
+  bool one_way_lasts_ = false;
+  NoPoseReason raw_pose_reason_ = NoPoseReason::kNotSeen;
+};
+
+}  // namespace crepes

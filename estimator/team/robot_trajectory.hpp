@@ -1,0 +1,61 @@
+/// One robot's motion over an interval in a free-falling frame, by its IMU.
+#pragma once
+
+#include <vector>
+
+#include "estimator/core/imu_history.hpp"
+#include "estimator/relative/error_state.hpp"
+#include "estimator/relative/propagation.hpp"
+
+namespace crepes {
+
+/// Position, velocity and attitude of a body in an inertial frame F that falls freely: there the
+/// acceleration is the specific force, and gravity has no part in it.
+struct FreeMotion {
+  Eigen::Vector3d p_F = Eigen::Vector3d::Zero();
+  Eigen::Vector3d v_F = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond q_F_B = Eigen::Quaterniond::Identity();
+
+  [[nodiscard]] Eigen::Matrix3d R() const { return q_F_B.toRotationMatrix(); }
+};
+
+/// A motion with its derivative by where it began. Errors are [p, v, theta] in F, theta a right
+/// perturbation.
+struct FreeMotionAt {
+  static constexpr int kMotion = 9;
+  /// Gyro bias, accel bias, and by columns the gyroscope's scale and axis errors.
+  static constexpr int kBias = 15;
+  static constexpr int kStart = kMotion + kBias;  ///< [p, v, theta] at the beginning, bias
+
+  FreeMotion motion;
+  Eigen::Matrix<double, kMotion, kStart> by_start;
+  Eigen::Matrix<double, kMotion, kMotion> noise;  ///< covariance that the IMU's noise has added
+};
+
+/// Steps of `TeamInterval::kStep`, the last one shorter.
+class RobotTrajectory {
+ public:
+  RobotTrajectory(const FreeMotion& start, ImuBias bias, const std::vector<ImuMean>& imu,
+                  double duration_s, const ProcessNoise& noise);
+
+  /// At `t_s` after the beginning, within the interval.
+  [[nodiscard]] FreeMotionAt at(double t_s) const;
+  /// The motion alone, which costs a tenth.
+  [[nodiscard]] FreeMotion motion_at(double t_s) const;
+  /// At the step nearest to `t_s`.
+  [[nodiscard]] const FreeMotionAt& nearest(double t_s) const;
+  [[nodiscard]] const FreeMotionAt& end() const { return grid_.back(); }
+
+ private:
+  struct Step;
+  [[nodiscard]] Step step_at(double t_s) const;
+  [[nodiscard]] Step rates(std::size_t index, double dt) const;
+  [[nodiscard]] FreeMotionAt advanced(const FreeMotionAt& from, const Step& step) const;
+
+  const std::vector<ImuMean>* imu_;
+  ImuBias bias_;
+  ProcessNoise noise_;
+  std::vector<FreeMotionAt> grid_;
+};
+
+}  // namespace crepes

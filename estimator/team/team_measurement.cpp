@@ -1,0 +1,140 @@
+#include "estimator/team/team_measurement.hpp"
+
+#include <cmath>
+
+#include "estimator/core/so3.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr double kMinDistance = 0.10;  // m; nearer, the rings' extent sets the direction
+
+template <class Derived>
+void add_columns(int index, const Eigen::MatrixBase<Derived>& by_state, TeamRow& row) {
+  for (int i = 0; i < by_state.cols(); ++i) {
+    row.columns.at(static_cast<std::size_t>(row.size)) = index + i;
+    row.H.col(row.size++) = by_state.col(i);
+  }
+}
+
+/// Adds the derivatives by a robot's motion, carried back to the interval's beginning, and what its
+/// IMU's noise has added since, in the mean of the axes.
+void add_motion(const Eigen::Matrix<double, 2, 3>& by_p,
+                const Eigen::Matrix<double, 2, 3>& by_theta, const FreeMotionAt& at,
+                const TeamRobot& robot, TeamRow& row) {
+  Eigen::Matrix<double, 2, FreeMotionAt::kStart> by_start =
+      by_p.lazyProduct(at.by_start.topRows<3>());
+  by_start += by_theta.lazyProduct(at.by_start.middleRows<3>(6));
+  if (robot.motion_index >= 0)
+    add_columns(robot.motion_index, by_start.leftCols<FreeMotionAt::kMotion>(), row);
+  add_columns(robot.bias_index, by_start.rightCols<FreeMotionAt::kBias>(), row);
+  row.variance += (at.noise.topLeftCorner<3, 3>().trace() * by_p.squaredNorm() +
+                   at.noise.bottomRightCorner<3, 3>().trace() * by_theta.squaredNorm()) /
+                  (3.0 * row.dimension);
+}
+
+/// From the camera to the neighbor's LEDs, in the observer's body frame.
+struct LineOfSight {
+  Eigen::Matrix3d R_F_N;
+  Eigen::Matrix3d R_B_F;
+  Eigen::Vector3d p_B_M;
+  Eigen::Vector3d d;
+};
+
+LineOfSight line_of_sight(const TeamPair& pair, const TeamCamera& camera, const FreeMotion& i,
+                          const FreeMotion& j) {
+  LineOfSight line{.R_F_N = j.R(), .R_B_F = i.R().transpose(), .p_B_M = {}, .d = {}};
+  line.p_B_M = line.R_B_F * (j.p_F + line.R_F_N * pair.neighbor_arms.p_body_led - i.p_F);
+  line.d = line.p_B_M - camera.p_B_C;
+  return line;
+}
+
+}  // namespace
+
+Eigen::Matrix2d TeamRow::covariance(const Eigen::MatrixXd& P) const {
+  Eigen::Matrix2d S = variance * Eigen::Matrix2d::Identity();
+  for (int a = 0; a < size; ++a) {
+    Eigen::Vector2d column = Eigen::Vector2d::Zero();
+    for (int b = 0; b < size; ++b)
+      column += P(columns.at(std::size_t(b)), columns.at(std::size_t(a))) * H.col(b);
+    S += column * H.col(a).transpose();
+  }
+  return S;
+}
+
+std::optional<SightModel> SightModel::at(const TeamPair& pair, const TeamCamera& camera, double t_s,
+                                         double sigma_rad) {
+  const FreeMotionAt& i = pair.observer_path.nearest(t_s);
+  const FreeMotionAt& j = pair.neighbor_path.nearest(t_s);
+  const LineOfSight line = line_of_sight(pair, camera, i.motion, j.motion);
+  const double distance = line.d.norm();
+  if (distance < kMinDistance) return std::nullopt;
+  const Eigen::Vector3d direction = line.d / distance;
+  const Eigen::Matrix3d M = so3_exp(camera.misalignment).toRotationMatrix();
+
+  SightModel model;
+  model.predicted_ = M * direction;
+  model.across_ = tangent_basis(model.predicted_);
+  TeamRow& row = model.row_;
+  row.dimension = 2;
+  row.variance = sigma_rad * sigma_rad;
+  const Eigen::Matrix<double, 2, 3> across = model.across_.transpose() * M;
+  const Eigen::Matrix<double, 2, 3> by_d =
+      across * (Eigen::Matrix3d::Identity() - direction * direction.transpose()) / distance;
+  add_motion(-by_d * line.R_B_F, by_d * hat(line.p_B_M), i, pair.observer, row);
+  add_motion(by_d * line.R_B_F,
+             -by_d * line.R_B_F * line.R_F_N * hat(pair.neighbor_arms.p_body_led), j, pair.neighbor,
+             row);
+  add_columns(camera.index, -across * hat(direction) * so3_right_jacobian(camera.misalignment),
+              row);
+  return model;
+}
+
+std::optional<Eigen::Vector2d> SightModel::residual(const TeamPair& pair, const TeamCamera& camera,
+                                                    const Eigen::Vector3d& u_B, double t_s) const {
+  const LineOfSight line = line_of_sight(pair, camera, pair.observer_path.motion_at(t_s),
+                                         pair.neighbor_path.motion_at(t_s));
+  const Eigen::Vector3d then = so3_exp(camera.misalignment) * line.d.normalized();
+  const Eigen::Vector3d u = shortest_rotation(then, predicted_) * u_B;
+  const double cosine = predicted_.dot(u);
+  if (!(cosine > 0.0)) return std::nullopt;
+  const double sine = predicted_.cross(u).norm();
+  const double stretch = sine < 1e-9 ? 1.0 : std::atan2(sine, cosine) / sine;
+  return stretch * (across_.transpose() * u);
+}
+
+std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias,
+                                 const RangeReading& reading, double t_s,
+                                 const Eigen::Matrix3d& covariance) {
+  const FreeMotionAt& i = pair.observer_path.nearest(t_s);
+  const FreeMotionAt& j = pair.neighbor_path.nearest(t_s);
+  const FreeMotion now_i = pair.observer_path.motion_at(t_s);
+  const FreeMotion now_j = pair.neighbor_path.motion_at(t_s);
+  const Eigen::Vector3d& q_i = pair.observer_arms.p_body_uwb;
+  const Eigen::Vector3d& q_j = pair.neighbor_arms.p_body_uwb;
+  const Eigen::Vector3d d = now_j.p_F + now_j.q_F_B * q_j - now_i.p_F - now_i.q_F_B * q_i;
+  const double distance = d.norm();
+  if (distance < kMinDistance) return std::nullopt;
+
+  TeamRow row;
+  row.dimension = 1;
+  row.residual.x() = reading.range_m - distance - bias.bias_m;
+  row.variance = reading.sigma_m * reading.sigma_m;
+  const Eigen::RowVector3d u = d.transpose() / distance;
+  const auto in_first_row = [](const Eigen::RowVector3d& v) {
+    Eigen::Matrix<double, 2, 3> both = Eigen::Matrix<double, 2, 3>::Zero();
+    both.row(0) = v;
+    return both;
+  };
+  add_motion(in_first_row(-u), in_first_row(u * now_i.R() * hat(q_i)), i, pair.observer, row);
+  add_motion(in_first_row(u), in_first_row(-u * now_j.R() * hat(q_j)), j, pair.neighbor, row);
+  add_columns(bias.index, Eigen::Vector2d(1.0, 0.0), row);
+
+  const Eigen::Matrix<double, 3, 2> across = tangent_basis(d / distance);
+  const Eigen::Matrix2d P = across.transpose() * covariance * across;
+  row.residual.x() -= 0.5 * P.trace() / distance;
+  row.variance += 0.5 * P.squaredNorm() / (distance * distance);
+  return row;
+}
+
+}  // namespace crepes

@@ -1,0 +1,66 @@
+/// What the team's filter knows of each robot, and where that is in its covariance.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <vector>
+
+#include "estimator/core/measurements.hpp"
+#include "estimator/core/time.hpp"
+#include "estimator/relative/error_state.hpp"
+#include "estimator/team/robot_trajectory.hpp"
+
+namespace crepes {
+
+/// How many readings agreed with the filter of late, and how many its gate refused.
+struct Agreement {
+  double fused = 0.0;
+  double gated = 0.0;
+
+  void fade(double kept) {
+    fused *= kept;
+    gated *= kept;
+  }
+  void add(bool fits) { (fits ? fused : gated) += 1.0; }
+  /// Most are refused, and not only a few outliers.
+  [[nodiscard]] bool is_contradiction() const { return gated > 4.0 && gated > fused; }
+};
+
+struct TeamCamera {
+  Eigen::Vector3d p_B_C = Eigen::Vector3d::Zero();
+  Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< u_measured = Exp(m) u
+  int index = 0;
+  std::map<RobotId, Agreement> agreement{};  ///< of its bearings, by the robot that it sees
+  std::optional<Timestamp> reopened{};       ///< when its misalignment was declared unknown
+  bool is_refused = false;                   ///< it contradicted the others after that, too
+};
+
+struct TeamRobot {
+  FreeMotion motion{};
+  ImuBias bias{};
+  int motion_index = -1;  ///< none for this robot
+  int bias_index = 0;
+  std::vector<TeamCamera> cameras{};
+  Timestamp last_sighting{};
+  Timestamp since{};
+  /// A robot on probation is corrected by what is measured between it and trusted robots, which are
+  /// not.
+  bool is_trusted = false;
+};
+
+/// The constant error of all ranges between two robots.
+struct TeamRangeBias {
+  double bias_m = 0.0;
+  int index = 0;
+  std::map<RobotId, Agreement> agreement{};  ///< of the ranges that this robot measured
+  std::map<RobotId, double> refused_m{};     ///< mean of the latest residuals that were refused
+
+  void add(RobotId observer, bool fits, double residual_m) {
+    constexpr double kWeight = 0.1;
+    agreement[observer].add(fits);
+    const auto [mean_m, is_first] = refused_m.try_emplace(observer, residual_m);
+    if (!fits) mean_m->second += kWeight * (residual_m - mean_m->second);
+  }
+};
+
+}  // namespace crepes

@@ -1,0 +1,83 @@
+#include "net/mesh/mesh_counters.hpp"
+
+#include <algorithm>
+
+namespace crepes {
+namespace {
+
+using enum MeshCounter;
+
+constexpr auto kNames = std::to_array<std::string_view>({"held_clock_unknown",
+                                                         "left_out_of_datagrams",
+                                                         "received",
+                                                         "received_bytes",
+                                                         "refused_bad_covariance",
+                                                         "refused_bad_id",
+                                                         "refused_bad_index",
+                                                         "refused_bad_stamp",
+                                                         "refused_clock_jump",
+                                                         "refused_damaged",
+                                                         "refused_duplicate",
+                                                         "refused_echo",
+                                                         "refused_foreign",
+                                                         "refused_not_finite",
+                                                         "refused_not_unit",
+                                                         "refused_old_session",
+                                                         "refused_other_version",
+                                                         "refused_out_of_range",
+                                                         "refused_own_id",
+                                                         "refused_seal_broken",
+                                                         "refused_seal_missing",
+                                                         "refused_seal_unexpected",
+                                                         "refused_seal_version",
+                                                         "refused_to_send",
+                                                         "refused_too_long",
+                                                         "refused_too_old",
+                                                         "refused_too_short",
+                                                         "refused_trailing",
+                                                         "refused_truncated",
+                                                         "refused_unknown_sender",
+                                                         "sent",
+                                                         "sent_bytes"});
+// STATUS and report.json list the counters in this order.
+static_assert(std::ranges::is_sorted(kNames));
+static_assert(kNames.size() == kMeshCounterCount &&
+              static_cast<std::size_t>(kSentBytes) + 1 == kMeshCounterCount);
+
+// In the order of PeerMessageError and of UnsealError.
+constexpr std::array<MeshCounter, kPeerMessageErrorCount> kOfMessageErrors{
+    kRefusedTooShort, kRefusedTooLong,      kRefusedForeign,  kRefusedOtherVersion,
+    kRefusedDamaged,  kRefusedTruncated,    kRefusedTrailing, kRefusedNotFinite,
+    kRefusedBadId,    kRefusedBadStamp,     kRefusedBadIndex, kRefusedOutOfRange,
+    kRefusedNotUnit,  kRefusedBadCovariance};
+constexpr std::array<MeshCounter, 3> kOfUnsealErrors{kRefusedSealMissing, kRefusedSealVersion,
+                                                     kRefusedSealBroken};
+
+}  // namespace
+
+std::string_view name_of(MeshCounter counter) {
+  return kNames.at(static_cast<std::size_t>(counter));
+}
+
+MeshCounter counter_of(PeerMessageError error) {
+  return kOfMessageErrors.at(static_cast<std::size_t>(error));
+}
+
+MeshCounter counter_of(UnsealError error) {
+  return kOfUnsealErrors.at(static_cast<std::size_t>(error));
+}
+
+std::uint64_t MeshCounters::seal_refusals() const {
+  const MeshCounters& totals = *this;
+  return totals[kRefusedSealBroken] + totals[kRefusedSealMissing] + totals[kRefusedSealUnexpected] +
+         totals[kRefusedSealVersion];
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> MeshCounters::totals() const {
+  std::vector<std::pair<std::string, std::uint64_t>> named;
+  for (std::size_t i = 0; i < kMeshCounterCount; ++i)
+    if (totals_.at(i) > 0) named.emplace_back(kNames.at(i), totals_.at(i));
+  return named;
+}
+
+}  // namespace crepes

@@ -1,0 +1,79 @@
+/// Totals of the traffic on the mesh: datagrams and bytes, refusals by reason.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "net/mesh/packet_seal.hpp"
+#include "net/mesh/peer_message.hpp"
+
+namespace crepes {
+
+/// What is counted, in the order of the names.
+enum class MeshCounter : std::uint8_t {
+  kHeldClockUnknown,      ///< reports of a peer whose clock is not known yet
+  kLeftOutOfDatagrams,    ///< measurements for which a datagram had no room
+  kReceived,              ///< datagrams of other robots
+  kReceivedBytes,         ///< of those
+  kRefusedBadCovariance,  ///< this and the following: datagrams, by the reason for the refusal
+  kRefusedBadId,
+  kRefusedBadIndex,
+  kRefusedBadStamp,
+  kRefusedClockJump,  ///< its stamps contradict the peer's clock
+  kRefusedDamaged,
+  kRefusedDuplicate,
+  kRefusedEcho,  ///< echoes, not datagrams: of a datagram that we never sent
+  kRefusedForeign,
+  kRefusedNotFinite,
+  kRefusedNotUnit,
+  kRefusedOldSession,  ///< of a session that a newer one has replaced
+  kRefusedOtherVersion,
+  kRefusedOutOfRange,
+  kRefusedOwnId,  ///< another robot uses our id
+  kRefusedSealBroken,
+  kRefusedSealMissing,
+  kRefusedSealUnexpected,  ///< sealed, and we have no key
+  kRefusedSealVersion,
+  kRefusedToSend,  ///< measurements of ours that cannot be encoded
+  kRefusedTooLong,
+  kRefusedTooOld,
+  kRefusedTooShort,
+  kRefusedTrailing,
+  kRefusedTruncated,
+  kRefusedUnknownSender,
+  kSent,       ///< datagrams
+  kSentBytes,  ///< of those
+};
+inline constexpr std::size_t kMeshCounterCount = 32;
+
+/// As STATUS and report.json call it.
+[[nodiscard]] std::string_view name_of(MeshCounter counter);
+/// The counter of datagrams that are refused for this reason.
+[[nodiscard]] MeshCounter counter_of(PeerMessageError error);
+[[nodiscard]] MeshCounter counter_of(UnsealError error);
+
+class MeshCounters {
+ public:
+  void add(MeshCounter counter, std::uint64_t count = 1) { totals_[index_of(counter)] += count; }
+
+  [[nodiscard]] std::uint64_t operator[](MeshCounter counter) const {
+    return totals_[index_of(counter)];
+  }
+  /// Datagrams that were refused because of their seal or for want of one.
+  [[nodiscard]] std::uint64_t seal_refusals() const;
+  /// By name; counters at zero are left out.
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> totals() const;
+
+ private:
+  static constexpr std::size_t index_of(MeshCounter counter) {
+    return static_cast<std::size_t>(counter);
+  }
+
+  std::array<std::uint64_t, kMeshCounterCount> totals_{};
+};
+
+}  // namespace crepes

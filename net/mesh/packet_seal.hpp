@@ -1,0 +1,46 @@
+/// Authenticated encryption of datagrams with the swarm's key. A seal is the encrypted form.
+///
+///   "CRS", version u8 | nonce 24 bytes | XChaCha20-Poly1305 of the datagram, its tag 16 bytes
+///
+/// The first four bytes are authenticated with the rest. All robots share one key: a valid seal
+/// proves that the sender belongs to the swarm, but not which robot it is. Replays are detected by
+/// `PeerLink`.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <vector>
+
+namespace crepes {
+
+using MeshKey = std::array<std::uint8_t, 32>;
+
+/// Why a datagram cannot be opened.
+enum class UnsealError : std::uint8_t {
+  kNotSealed,
+  kOtherVersion,
+  kNotAuthentic,  ///< sealed with another key, or modified on the way
+};
+
+class PacketSeal {
+ public:
+  static constexpr std::size_t kOverhead = 4 + 24 + 16;  ///< bytes that sealing adds
+
+  explicit PacketSeal(const MeshKey& key);
+
+  /// Encrypts with a random nonce: equal datagrams differ when sealed.
+  [[nodiscard]] std::vector<std::uint8_t> seal(std::span<const std::uint8_t> plain) const;
+  [[nodiscard]] tl::expected<std::vector<std::uint8_t>, UnsealError> open(
+      std::span<const std::uint8_t> sealed) const;
+
+  /// Whether the datagram has the header of a sealed one.
+  [[nodiscard]] static bool is_sealed(std::span<const std::uint8_t> datagram);
+
+ private:
+  MeshKey key_;
+};
+
+}  // namespace crepes

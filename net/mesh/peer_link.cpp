@@ -1,0 +1,235 @@
+#include "net/mesh/peer_link.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "estimator/core/contract.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr Duration kEchoAge = std::chrono::seconds{1};      // older packets are not echoed
+constexpr Duration kMaxEchoAge = std::chrono::seconds{10};  // older echoes are refused
+
+Report to_local(const PeerReport& theirs, const ClockOffset& clock) {
+  Report ours;
+  ours.sender = theirs.sender;
+  ours.stamp = clock.to_local(theirs.stamp);
+  ours.tilt = {clock.to_local(theirs.tilt.stamp), theirs.tilt.up_B, theirs.tilt.sigma_rad};
+  for (const auto& [stamp, gyro, accel] : theirs.imu)
+    ours.imu.push_back({clock.to_local(stamp), gyro, accel});
+  for (const auto& [stamp, neighbor, u_B, p_B_C, sigma] : theirs.bearings)
+    ours.bearings.push_back({clock.to_local(stamp), neighbor, u_B, p_B_C, sigma});
+  for (const auto& [stamp, neighbor, range, first_path, received] : theirs.ranges)
+    ours.ranges.push_back({clock.to_local(stamp), neighbor, range, first_path, received});
+  for (const auto& [stamp, neighbor, T_B_N, v_B_N] : theirs.estimates)
+    ours.estimates.push_back({clock.to_local(stamp), neighbor, T_B_N, v_B_N});
+  return ours;
+}
+
+/// The message, or the counter of the reason why there is none.
+tl::expected<PeerMessage, MeshCounter> decode(std::span<const std::uint8_t> datagram,
+                                              const std::optional<PacketSeal>& seal) {
+  constexpr auto kCounter = [](auto error) { return counter_of(error); };
+  if (!seal && PacketSeal::is_sealed(datagram))
+    return tl::unexpected(MeshCounter::kRefusedSealUnexpected);
+  if (!seal) return decode_peer_message(datagram).map_error(kCounter);
+  return seal->open(datagram).map_error(kCounter).and_then(
+      [&](const auto& plain) { return decode_peer_message(plain).map_error(kCounter); });
+}
+
+}  // namespace
+
+PeerLink::PeerLink(RobotId self, const std::vector<RobotId>& members) : self_(self) {
+  set_members(members);
+}
+
+void PeerLink::set_members(const std::vector<RobotId>& members) {
+  std::erase_if(peers_, [&](const auto& peer) {
+    return std::find(members.begin(), members.end(), peer.first) == members.end();
+  });
+  for (const RobotId member : members)
+    if (member != self_) peers_.try_emplace(member);
+}
+
+std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> datagram,
+                                                Timestamp arrival,
+                                                const std::optional<PacketSeal>& seal) {
+  auto message = open(datagram, seal);
+  if (!message) return std::nullopt;
+  const auto found = peers_.find(message->report.sender);
+  if (found == peers_.end()) {
+    counters_.add(MeshCounter::kRefusedUnknownSender);
+    return std::nullopt;
+  }
+  Peer& peer = found->second;
+  Session* session = admit(peer, *message);
+  if (session == nullptr) return std::nullopt;
+  session->last_arrival = arrival;
+  if (!update_clock(*session, *message, arrival)) return std::nullopt;
+  if (peer.candidate && peer.candidate->has_echoed_us) {
+    replace_session(peer);
+    session = &*peer.live;
+  }
+  if (!session->clock.is_usable()) {
+    counters_.add(MeshCounter::kHeldClockUnknown);
+    return std::nullopt;
+  }
+  session->redundancy.remove_repeated(message->report);
+  return ReceivedReport{to_local(message->report, session->clock),
+                        session->clock.estimate()->sigma_s};
+}
+
+/// Decodes and counts a datagram; empty if it is our own or refused.
+std::optional<PeerMessage> PeerLink::open(std::span<const std::uint8_t> datagram,
+                                          const std::optional<PacketSeal>& seal) {
+  auto message = decode(datagram, seal);
+  if (message && message->report.sender == self_) {
+    const bool is_ours = first_sent_ && message->session == own_session();
+    if (!is_ours) counters_.add(MeshCounter::kRefusedOwnId);  // another robot uses our id
+    return std::nullopt;
+  }
+  counters_.add(MeshCounter::kReceived);
+  counters_.add(MeshCounter::kReceivedBytes, datagram.size());
+  if (message) return std::move(*message);
+  counters_.add(message.error());
+  return std::nullopt;
+}
+
+/// The session of the message, if the message is new in it.
+PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message) {
+  if (peer.ended.contains(message.session)) {
+    counters_.add(MeshCounter::kRefusedOldSession);  // delayed or replayed
+    return nullptr;
+  }
+  const auto is_it = [&](const std::optional<Session>& session) {
+    return session && session->id == message.session;
+  };
+  if (!is_it(peer.live) && !is_it(peer.candidate)) {
+    Session fresh;
+    fresh.id = message.session;
+    fresh.traffic.peer = message.report.sender;
+    peer.candidate = std::move(fresh);
+  }
+  Session& session = is_it(peer.live) ? *peer.live : *peer.candidate;
+  switch (session.sequence.accept(message.sequence)) {
+    case SequenceWindow::Verdict::kNew:
+      return &session;
+    case SequenceWindow::Verdict::kDuplicate:
+      counters_.add(MeshCounter::kRefusedDuplicate);
+      return nullptr;
+    case SequenceWindow::Verdict::kTooOld:
+      counters_.add(MeshCounter::kRefusedTooOld);
+      return nullptr;
+  }
+  return nullptr;
+}
+
+/// False when the stamps of the message contradict the estimate of the peer's clock.
+bool PeerLink::update_clock(Session& session, const PeerMessage& message, Timestamp arrival) {
+  const auto verdict = session.clock.add_packet({message.sent, arrival});
+  if (verdict == ClockOffset::Verdict::kRestarted) ++session.traffic.restarts;
+  if (verdict != ClockOffset::Verdict::kUsed) {
+    counters_.add(MeshCounter::kRefusedClockJump);
+    return false;
+  }
+  for (const ClockEcho& echo : message.echoes) {
+    if (echo.peer != self_) continue;
+    const Timestamp sent{Duration{echo.sent_ns}};
+    if (!was_sent_by_us(sent, arrival)) {
+      counters_.add(MeshCounter::kRefusedEcho);
+      continue;
+    }
+    session.has_echoed_us = true;
+    const PeerTimestamp reached{Duration{echo.received_ns}};
+    switch (session.clock.add_echo(sent, reached, arrival)) {
+      case ClockOffset::Verdict::kUsed:
+        break;
+      case ClockOffset::Verdict::kRestarted:
+        ++session.traffic.restarts;
+        [[fallthrough]];
+      case ClockOffset::Verdict::kImplausible:
+        counters_.add(MeshCounter::kRefusedClockJump);
+        return false;
+    }
+  }
+  return true;
+}
+
+/// The candidate replaces the live session.
+void PeerLink::replace_session(Peer& peer) {
+  Session next = std::move(*peer.candidate);
+  peer.candidate.reset();
+  if (peer.live) {
+    const PeerTraffic& before = peer.live->traffic;
+    next.traffic.received += before.received + peer.live->sequence.received();
+    next.traffic.lost += before.lost + peer.live->sequence.lost();
+    next.traffic.restarts += before.restarts + 1;
+    peer.ended.insert(peer.live->id);
+  }
+  peer.live = std::move(next);
+}
+
+bool PeerLink::was_sent_by_us(Timestamp sent, Timestamp now) const {
+  return sent > now - kMaxEchoAge && std::ranges::binary_search(sent_, sent);
+}
+
+/// Differs from start to start, because the clock has advanced or the machine has restarted.
+std::uint32_t PeerLink::own_session() const {
+  const auto ns = static_cast<std::uint64_t>(to_ns(*first_sent_));
+  return static_cast<std::uint32_t>(ns ^ (ns >> 32U));
+}
+
+std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,
+                                            const std::optional<PacketSeal>& seal) {
+  CREPES_EXPECT(report.sender == self_, "a robot reports for itself");
+  if (!first_sent_) first_sent_ = now;
+  sent_.push_back(now);
+  while (sent_.front() <= now - kMaxEchoAge) sent_.pop_front();
+  OutgoingPeerMessage message{.report = report,
+                              .sent = now,
+                              .session = own_session(),
+                              .sequence = next_sequence_++,
+                              .echoes = {}};
+  for (const auto& [id, peer] : peers_) {
+    for (const std::optional<Session>* known : {&peer.live, &peer.candidate}) {
+      const auto packet = *known ? (*known)->clock.fastest_recent_packet() : std::nullopt;
+      if (packet && packet->arrival <= now && packet->arrival > now - kEchoAge)
+        message.echoes.push_back({id, to_ns(packet->sent), to_ns(packet->arrival)});
+    }
+  }
+  EncodedPeerMessage encoded =
+      encode_peer_message(message, kMaxPeerMessage - (seal ? PacketSeal::kOverhead : 0));
+  if (seal) encoded.bytes = seal->seal(encoded.bytes);
+  counters_.add(MeshCounter::kSent);
+  counters_.add(MeshCounter::kSentBytes, encoded.bytes.size());
+  if (encoded.left_out > 0) counters_.add(MeshCounter::kLeftOutOfDatagrams, encoded.left_out);
+  if (encoded.refused > 0) counters_.add(MeshCounter::kRefusedToSend, encoded.refused);
+  return std::move(encoded.bytes);
+}
+
+std::vector<ClockStatus> PeerLink::clocks() const {
+  std::vector<ClockStatus> known;
+  for (const auto& [id, peer] : peers_) {
+    const auto clock = peer.live ? peer.live->clock.estimate() : std::nullopt;
+    if (clock && peer.live->clock.is_usable())
+      known.push_back({id, clock->offset_s, clock->skew * 1e6, clock->sigma_s});
+  }
+  return known;
+}
+
+std::vector<PeerTraffic> PeerLink::traffic(Timestamp now) const {
+  std::vector<PeerTraffic> heard;
+  for (const auto& [id, peer] : peers_) {
+    const std::optional<Session>& session = peer.heard();
+    if (!session) continue;
+    heard.push_back(session->traffic);
+    heard.back().received += session->sequence.received();
+    heard.back().lost += session->sequence.lost();
+    heard.back().age_s = to_seconds(now - session->last_arrival);
+  }
+  return heard;
+}
+
+}  // namespace crepes

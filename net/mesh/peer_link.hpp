@@ -1,0 +1,85 @@
+/// The protocol of the mesh without its socket: datagrams in, reports on our timeline out.
+///
+/// A peer that restarts opens a new session. The new session replaces the old one when it has
+/// echoed a recent datagram of ours. Recorded datagrams that are replayed cannot do so.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "estimator/core/outputs.hpp"
+#include "net/mesh/clock_offset.hpp"
+#include "net/mesh/mesh_counters.hpp"
+#include "net/mesh/packet_seal.hpp"
+#include "net/mesh/peer_message.hpp"
+#include "net/mesh/peer_status.hpp"
+#include "net/mesh/redundancy_filter.hpp"
+#include "net/mesh/sequence_window.hpp"
+
+namespace crepes {
+
+class PeerLink {
+ public:
+  /// `members` are all robots of the swarm; `self` may be among them.
+  PeerLink(RobotId self, const std::vector<RobotId>& members);
+
+  /// Removes peers that are no longer members; adds the new ones.
+  void set_members(const std::vector<RobotId>& members);
+
+  /// The report of a peer. Measurements that it repeats are returned once. Empty when the datagram
+  /// is refused (see `counters`), is our own, or the peer's clock is not known yet. With `seal`,
+  /// unsealed datagrams are refused; without it, sealed ones are.
+  [[nodiscard]] std::optional<ReceivedReport> receive(
+      std::span<const std::uint8_t> datagram, Timestamp arrival,
+      const std::optional<PacketSeal>& seal = std::nullopt);
+
+  /// The datagram to broadcast immediately; `now` is the time of sending.
+  [[nodiscard]] std::vector<std::uint8_t> compose(
+      const Report& report, Timestamp now, const std::optional<PacketSeal>& seal = std::nullopt);
+
+  /// Peers whose clock is known, ordered by id.
+  [[nodiscard]] std::vector<ClockStatus> clocks() const;
+  /// All peers that a datagram was received from, ordered by id.
+  [[nodiscard]] std::vector<PeerTraffic> traffic(Timestamp now) const;
+  /// Since the start: datagrams and bytes in and out, refusals by reason.
+  [[nodiscard]] const MeshCounters& counters() const { return counters_; }
+
+ private:
+  struct Session {
+    std::uint32_t id = 0;
+    ClockOffset clock;
+    SequenceWindow sequence;
+    RedundancyFilter redundancy;
+    PeerTraffic traffic;  ///< includes the earlier sessions
+    Timestamp last_arrival{};
+    bool has_echoed_us = false;  ///< a recent datagram of ours
+  };
+  struct Peer {
+    std::optional<Session> live;
+    std::optional<Session> candidate;  ///< has not echoed us yet
+    std::set<std::uint32_t> ended;     ///< sessions that were live
+    [[nodiscard]] const std::optional<Session>& heard() const { return live ? live : candidate; }
+  };
+
+  [[nodiscard]] std::optional<PeerMessage> open(std::span<const std::uint8_t> datagram,
+                                                const std::optional<PacketSeal>& seal);
+  [[nodiscard]] Session* admit(Peer& peer, const PeerMessage& message);
+  [[nodiscard]] bool update_clock(Session& session, const PeerMessage& message, Timestamp arrival);
+  static void replace_session(Peer& peer);
+  [[nodiscard]] bool was_sent_by_us(Timestamp sent, Timestamp now) const;
+  [[nodiscard]] std::uint32_t own_session() const;
+
+  RobotId self_;
+  std::map<RobotId, Peer> peers_;  ///< all members except us
+  MeshCounters counters_;
+  std::optional<Timestamp> first_sent_;
+  std::deque<Timestamp> sent_;  ///< in the last seconds: what a peer may echo
+  std::uint32_t next_sequence_ = 0;
+};
+
+}  // namespace crepes

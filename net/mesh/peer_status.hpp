@@ -1,0 +1,27 @@
+/// The state of the traffic with one peer.
+#pragma once
+
+#include <cstdint>
+
+#include "estimator/core/measurements.hpp"
+
+namespace crepes {
+
+/// The estimate of a peer's clock.
+struct ClockStatus {
+  RobotId peer{};
+  double offset_s = 0.0;  ///< peer's clock minus ours
+  double skew_ppm = 0.0;
+  double sigma_s = 0.0;
+};
+
+/// Totals of one peer's datagrams.
+struct PeerTraffic {
+  RobotId peer{};
+  std::uint64_t received = 0;
+  std::uint64_t lost = 0;      ///< gaps in the peer's sequence
+  std::uint64_t restarts = 0;  ///< of the peer or of its clock
+  double age_s = 0.0;          ///< since the last datagram
+};
+
+}  // namespace crepes

@@ -1,0 +1,29 @@
+/// Replay window over the sequence numbers of a peer; datagrams may arrive out of order.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace crepes {
+
+class SequenceWindow {
+ public:
+  enum class Verdict : std::uint8_t { kNew, kDuplicate, kTooOld };
+
+  /// How far behind the newest a datagram can be and still be checked for duplicates.
+  static constexpr std::uint32_t kSize = 64;
+
+  [[nodiscard]] Verdict accept(std::uint32_t sequence);
+
+  [[nodiscard]] std::uint64_t received() const { return received_; }
+  /// Missing between the first and the newest. A datagram that arrives late no longer counts.
+  [[nodiscard]] std::uint64_t lost() const;
+
+ private:
+  std::optional<std::uint32_t> first_;
+  std::uint32_t newest_ = 0;
+  std::uint64_t seen_ = 0;  ///< bit i: newest_ - i was received
+  std::uint64_t received_ = 0;
+};
+
+}  // namespace crepes

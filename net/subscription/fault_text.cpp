@@ -1,0 +1,27 @@
+#include "net/subscription/fault_text.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "estimator/core/constants.hpp"
+
+namespace crepes {
+
+std::string text_of(const TeamFault& fault) {
+  switch (fault.kind) {
+    case TeamFault::Kind::kCameraTurned:
+      return fmt::format(
+          "its camera points {:.1f} deg away from what the others see; calibrate it again",
+          kDegPerRad * fault.size);
+    case TeamFault::Kind::kCameraRefused:
+      return "its camera contradicts what the others see and is left out; check its calibration "
+             "and its clock";
+    case TeamFault::Kind::kRanges:
+      return fmt::format("its ranges are {:.2f} m too {} and are left out; check its antenna delay",
+                         std::abs(fault.size), fault.size > 0.0 ? "long" : "short");
+  }
+  return {};
+}
+
+}  // namespace crepes

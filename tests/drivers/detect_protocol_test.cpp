@@ -1,0 +1,46 @@
+#include "drivers/detect_protocol.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include "tests/support/recorded_files.hpp"
+
+namespace crepes {
+namespace {
+
+/// So many times the same frame, cut off at both ends.
+std::vector<std::uint8_t> stream_of(const std::string& name, int frames) {
+  const auto frame = recorded_file(name).bytes;
+  std::vector<std::uint8_t> stream(frame.begin() + 3, frame.end());
+  for (int i = 0; i < frames; ++i) stream = stream + frame;
+  stream.insert(stream.end(), frame.begin(), frame.begin() + 5);
+  return stream;
+}
+
+TEST(Recognize, NamesTheProtocolOfEveryRecordedFrameAndNoOther) {
+  EXPECT_EQ(detect_protocol(stream_of("imu/witmotion_hwt905_real", 2)), SerialProtocol::kWitMotion);
+  EXPECT_EQ(detect_protocol(stream_of("imu/hipnuc_hi91_official", 3)), SerialProtocol::kHipnuc);
+  EXPECT_EQ(detect_protocol(stream_of("imu/xsens_mtdata2_accgyr", 3)), SerialProtocol::kXsens);
+  EXPECT_EQ(detect_protocol(stream_of("imu/xsens_mtdata2_short", 3)), SerialProtocol::kXsens);
+  for (const char* name : {"imu/mavlink_highres_imu_v1", "imu/mavlink_highres_imu_v2",
+                           "imu/mavlink_raw_imu_v2", "imu/mavlink_scaled_imu2_v2"})
+    EXPECT_EQ(detect_protocol(stream_of(name, 3)), SerialProtocol::kMavlink) << name;
+  for (const char* name : {"nlink/nodeframe0_01", "nlink/nodeframe2_01", "nlink/tagframe0_01"})
+    EXPECT_EQ(detect_protocol(stream_of(name, 3)), SerialProtocol::kNlink) << name;
+}
+
+TEST(Recognize, WaitsForThreeFrames) {
+  EXPECT_EQ(detect_protocol(stream_of("imu/hipnuc_hi91_official", 2)), std::nullopt);
+  EXPECT_EQ(detect_protocol({}), std::nullopt);
+}
+
+TEST(Recognize, FindsNothingInNoise) {
+  EXPECT_TRUE(rc::check([] {
+    const auto noise =
+        *rc::gen::container<std::vector<std::uint8_t>>(2048, rc::gen::arbitrary<std::uint8_t>());
+    RC_ASSERT(!detect_protocol(noise));
+  }));
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,229 @@
+#include "estimator/core/imu_history.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "tests/support/random_geometry.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using test::RandomGeometry;
+
+ImuSample sample_at(Duration t, double value = 0.0) {
+  return {Timestamp{t}, Eigen::Vector3d::Constant(value), Eigen::Vector3d::Constant(2.0 * value)};
+}
+
+/// Samples every 10 ms, each the mean of sin(t) over the interval it ends.
+ImuHistory sine_history(int count) {
+  ImuHistory imu;
+  for (int i = 1; i <= count; ++i) {
+    const double mean = (std::cos(0.01 * (i - 1)) - std::cos(0.01 * i)) / 0.01;
+    imu.push(sample_at(i * 10ms, mean));
+  }
+  return imu;
+}
+
+TEST(ImuHistory, SumsOverWholeSamplesAreTheAnalyticIntegral) {
+  const ImuHistory imu = sine_history(100);
+
+  const ImuMean mean = imu.mean(Timestamp{200ms}, Timestamp{700ms});
+
+  const double analytic = (std::cos(0.2) - std::cos(0.7)) / 0.5;
+  EXPECT_NEAR(mean.gyro_radps.x(), analytic, 1e-12);
+  EXPECT_NEAR(mean.accel_mps2.z(), 2.0 * analytic, 1e-12);
+  EXPECT_EQ(mean.extrapolated, 0.0);
+}
+
+TEST(ImuHistory, MeansOfPartsAddUpToTheMeanOfTheWhole) {
+  const ImuHistory imu = sine_history(100);
+  RandomGeometry random(1);
+  for (int i = 0; i < 200; ++i) {
+    std::array<std::int64_t, 3> t{};
+    for (auto& x : t) x = 20'000'000 + random.index(900'000'000);
+    std::sort(t.begin(), t.end());
+    if (t[0] == t[1] || t[1] == t[2]) continue;
+    const auto integral = [&](int from, int to) -> Eigen::Vector3d {
+      const Timestamp a{Duration{t[static_cast<std::size_t>(from)]}};
+      const Timestamp b{Duration{t[static_cast<std::size_t>(to)]}};
+      return imu.mean(a, b).gyro_radps * to_seconds(b - a);
+    };
+
+    EXPECT_LT((integral(0, 1) + integral(1, 2) - integral(0, 2)).norm(), 1e-14);
+  }
+}
+
+/// Stamps in order, as the history keeps them.
+std::vector<std::int64_t> stamps_of(const ImuHistory& imu) {
+  std::vector<std::int64_t> stamps;
+  for (std::size_t i = 0; i < imu.size(); ++i) stamps.push_back(to_ns(imu[i].stamp));
+  return stamps;
+}
+
+TEST(ImuHistory, KeepsTheNewestDistinctStampsInOrderHoweverTheyArrive) {
+  EXPECT_TRUE(rc::check([] {
+    const auto arrivals = *rc::gen::container<std::vector<int>>(rc::gen::inRange(0, 600));
+    ImuHistory imu;
+    std::map<std::int64_t, int> expected;  // the same by the slow and simple way
+    for (const int t : arrivals) {
+      const bool full = expected.size() == ImuHistory::kCapacity;
+      const bool refused = expected.contains(t) || (full && t < expected.begin()->first);
+      RC_ASSERT(imu.push(sample_at(Duration{t}, 0.1 * t)) == !refused);
+      if (refused) continue;
+      expected.emplace(t, t);
+      if (expected.size() > ImuHistory::kCapacity) expected.erase(expected.begin());
+    }
+
+    RC_ASSERT(imu.size() == expected.size());
+    std::size_t i = 0;
+    for (const auto& [stamp, value] : expected) {
+      RC_ASSERT(to_ns(imu[i].stamp) == stamp);
+      RC_ASSERT(imu[i].gyro_radps.x() == 0.1 * value);
+      ++i;
+    }
+  }));
+}
+
+TEST(ImuHistory, ForgetsTheOldestBeyondItsCapacityAndRefusesWhatIsOlder) {
+  ImuHistory imu;
+  for (int i = 0; i < 300; ++i) ASSERT_TRUE(imu.push(sample_at(i * 10ms)));
+
+  EXPECT_EQ(imu.size(), ImuHistory::kCapacity);
+  EXPECT_EQ(imu[0].stamp, Timestamp{440ms});
+  EXPECT_FALSE(imu.push(sample_at(435ms)));
+  EXPECT_TRUE(imu.push(sample_at(445ms)));
+  EXPECT_EQ(stamps_of(imu).front(), 445'000'000);
+}
+
+TEST(ImuHistory, RefusesDuplicatesAndWhatIsNotFinite) {
+  ImuHistory imu;
+  ASSERT_TRUE(imu.push(sample_at(10ms, 1.0)));
+
+  EXPECT_FALSE(imu.push(sample_at(10ms, 2.0)));
+  EXPECT_FALSE(imu.push(sample_at(20ms, std::numeric_limits<double>::quiet_NaN())));
+  EXPECT_FALSE(imu.push(sample_at(20ms, std::numeric_limits<double>::infinity())));
+  EXPECT_EQ(imu.size(), 1U);
+  EXPECT_EQ(imu.newest().gyro_radps.x(), 1.0);
+}
+
+TEST(ImuHistory, RefusesWhatNoSensorMeasures) {
+  ImuHistory imu = sine_history(50);
+
+  EXPECT_FALSE(imu.push(sample_at(600ms, 1e200)));
+
+  imu.push(sample_at(610ms));
+  imu.push(sample_at(620ms));
+  EXPECT_TRUE(std::isfinite(imu.mean(Timestamp{600ms}, Timestamp{620ms}).gyro_noise_density));
+}
+
+TEST(ImuHistory, CallsGuessedWhatNoSampleCovers) {
+  ImuHistory imu;
+  imu.push(sample_at(100ms, 1.0));
+  imu.push(sample_at(110ms, 1.0));
+  imu.push(sample_at(210ms, 3.0));  // after a gap of 100 ms
+
+  EXPECT_EQ(imu.mean(Timestamp{100ms}, Timestamp{110ms}).extrapolated, 0.0);
+  EXPECT_EQ(imu.mean(Timestamp{120ms}, Timestamp{200ms}).extrapolated, 1.0);
+  EXPECT_NEAR(imu.mean(Timestamp{105ms}, Timestamp{115ms}).extrapolated, 0.5, 1e-12);
+  EXPECT_EQ(imu.mean(Timestamp{0ms}, Timestamp{50ms}).extrapolated, 1.0);
+  EXPECT_NEAR(imu.mean(Timestamp{0ms}, Timestamp{50ms}).gyro_radps.x(), 1.0, 1e-12);
+  EXPECT_EQ(imu.mean(Timestamp{210ms}, Timestamp{300ms}).extrapolated, 1.0);
+  EXPECT_NEAR(imu.mean(Timestamp{1s}, Timestamp{2s}).gyro_radps.x(), 3.0, 1e-12);
+}
+
+TEST(ImuHistory, RotationBackUndoesRotationForth) {
+  RandomGeometry random(2);
+  ImuHistory imu;
+  for (int i = 0; i < 200; ++i) imu.push({Timestamp{i * 10ms}, random.vector(), random.vector()});
+  for (int i = 0; i < 100; ++i) {
+    const Timestamp a{random.index(2'500) * 1ms};
+    const Timestamp b{random.index(2'500) * 1ms};
+
+    const Eigen::Quaterniond loop = imu.rotation(a, b) * imu.rotation(b, a);
+
+    EXPECT_LT(so3_log(loop).norm(), 1e-12);
+  }
+}
+
+TEST(ImuHistory, RotationIsTheTurnOfABodyAtConstantRate) {
+  const Eigen::Vector3d w(0.5, -1.0, 2.0);
+  ImuHistory imu;
+  for (int i = 0; i < 100; ++i) imu.push({Timestamp{i * 10ms}, w, Eigen::Vector3d::Zero()});
+
+  const Eigen::Quaterniond q = imu.rotation(Timestamp{123ms}, Timestamp{789ms});
+
+  EXPECT_LT((so3_log(q) - 0.666 * w).norm(), 1e-12);
+}
+
+/// A hand's swing: samples every 10 ms, each the mean over the interval that it ends.
+double swing_mean(double from_s, double to_s) {
+  constexpr double kOmega = 7.0;  // rad/s
+  return 3.0 * (std::sin(kOmega * to_s) - std::sin(kOmega * from_s)) / kOmega / (to_s - from_s);
+}
+
+TEST(ImuHistory, ASwingGoesOnBeyondTheNewestSample) {
+  double squares = 0.0;
+  double held_squares = 0.0;
+  ImuHistory imu;
+  for (int i = 1; i < 600; ++i) {
+    ASSERT_TRUE(imu.push(sample_at(i * 10ms, swing_mean(0.01 * (i - 1), 0.01 * i))));
+    if (i < 200) continue;
+    const ImuMean mean = imu.mean(Timestamp{i * 10ms + 10ms}, Timestamp{i * 10ms + 20ms});
+    const double truth = swing_mean(0.01 * i + 0.01, 0.01 * i + 0.02);
+    squares += std::pow(mean.gyro_radps.x() - truth, 2);
+    held_squares += std::pow(imu.newest().gyro_radps.x() - truth, 2);
+    EXPECT_NEAR(mean.accel_mps2.y(), 2.0 * mean.gyro_radps.y(), 1e-9);
+    EXPECT_EQ(mean.extrapolated, 1.0);
+  }
+  EXPECT_LT(squares, 0.05 * 0.05 * held_squares);
+}
+
+TEST(ImuHistory, HoldsAfterAGapAndForgetsNothing) {
+  ImuHistory imu;
+  for (int i = 1; i < 300; ++i) imu.push(sample_at(i * 10ms, swing_mean(0.01 * (i - 1), 0.01 * i)));
+  const auto ahead = [&imu](Duration by) {
+    const Timestamp t = imu.newest().stamp + by;
+    return imu.mean(t, t + 1ms).gyro_radps.x();
+  };
+  EXPECT_NE(ahead(20ms), imu.newest().gyro_radps.x());
+  EXPECT_EQ(ahead(40ms), ahead(400ms)) << "believed for three samples, then held";
+
+  imu.push(sample_at(3040ms, swing_mean(3.03, 3.04)));
+  EXPECT_EQ(ahead(20ms), imu.newest().gyro_radps.x());
+
+  for (int i = 305; i < 316; ++i)
+    imu.push(sample_at(i * 10ms, swing_mean(0.01 * (i - 1), 0.01 * i)));
+  EXPECT_NEAR(ahead(20ms), swing_mean(3.17, 3.171), 0.03);
+}
+
+TEST(ImuHistory, AConstantIsPredictedToTheBit) {
+  ImuHistory imu;
+  for (int i = 1; i < 300; ++i) imu.push(sample_at(i * 10ms, 0.7));
+
+  EXPECT_EQ(imu.mean(Timestamp{3s}, Timestamp{3020ms}).gyro_radps.x(), 0.7);
+}
+
+TEST(ImuHistory, ReadsTheWhiteNoiseOffTheSamples) {
+  RandomGeometry random(3);
+  ImuHistory imu;
+  for (int i = 0; i < 250; ++i) {
+    const Eigen::Vector3d slow = std::sin(0.02 * i) * Eigen::Vector3d::Ones();
+    imu.push({Timestamp{i * 10ms}, slow + random.vector(0.01), slow + random.vector(0.3)});
+  }
+
+  const ImuMean mean = imu.mean(Timestamp{2s}, Timestamp{2100ms});
+
+  // sigma of a sample times the root of its period; 50 effective samples of three axes: 10 %.
+  EXPECT_NEAR(mean.gyro_noise_density / (0.01 * 0.1), 1.0, 0.3);
+  EXPECT_NEAR(mean.accel_noise_density / (0.3 * 0.1), 1.0, 0.3);
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,115 @@
+#include "estimator/core/signal_model.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/support/random_geometry.hpp"
+
+namespace crepes {
+namespace {
+
+using test::RandomGeometry;
+
+constexpr double kPeriod = 0.01;  // s
+constexpr int kStride = SignalModel::kStride;
+
+/// `newest` and those before it.
+SignalModel::Window window_at(const std::vector<Eigen::Vector3d>& samples, std::size_t newest) {
+  SignalModel::Window window;
+  for (int back = 0; back < window.cols(); ++back)
+    window.col(back) = samples.at(newest - static_cast<std::size_t>(back));
+  return window;
+}
+
+struct Missed {
+  double predicted = 0.0;  ///< RMS
+  double held = 0.0;
+  double innovation_density = 0.0;  ///< of the model at the end
+};
+
+/// How far a model that learns along the way is from what comes kStride samples later.
+Missed missed_by(const std::vector<Eigen::Vector3d>& samples) {
+  SignalModel model;
+  Missed sum;
+  int n = 0;
+  for (std::size_t i = SignalModel::Window::ColsAtCompileTime; i + kStride < samples.size(); ++i) {
+    const auto window = window_at(samples, i);
+    model.observe(window, kPeriod);
+    if (i < samples.size() / 2) continue;
+    const Eigen::Vector3d change = samples.at(i + kStride) - samples.at(i);
+    sum.predicted += (model.next_change(window) - change).squaredNorm() / 3.0;
+    sum.held += change.squaredNorm() / 3.0;
+    ++n;
+  }
+  return {std::sqrt(sum.predicted / n), std::sqrt(sum.held / n), model.innovation_density()};
+}
+
+TEST(SignalModel, KnowsHowASwingGoesOn) {
+  for (const double noise : {0.0, 0.005, 0.05}) {
+    RandomGeometry random(4);
+    std::vector<Eigen::Vector3d> samples;
+    for (int i = 0; i < 2000; ++i) {
+      const double t = kPeriod * i;
+      samples.emplace_back(Eigen::Vector3d(2.0 * std::sin(6.0 * t), std::cos(4.0 * t + 1.0), 0.5) +
+                           random.normal_vector<3>(noise));
+    }
+
+    const Missed missed = missed_by(samples);
+
+    EXPECT_LT(missed.predicted, 0.1 * missed.held + 2.5 * noise);
+    EXPECT_NEAR(missed.innovation_density / (missed.predicted / std::sqrt(kStride * kPeriod)), 1.0,
+                0.4);
+  }
+}
+
+TEST(SignalModel, AveragesNoiseInsteadOfFollowingIt) {
+  RandomGeometry random(5);
+  std::vector<Eigen::Vector3d> samples;
+  for (int i = 0; i < 4000; ++i) samples.push_back(random.normal_vector<3>(0.2));
+
+  const Missed missed = missed_by(samples);
+
+  // The mean of three is off by sqrt(1 + 1/3) of a sample's noise, one sample by sqrt(2).
+  EXPECT_NEAR(missed.held / 0.2, std::sqrt(2.0), 0.05);
+  EXPECT_NEAR(missed.predicted / 0.2, std::sqrt(4.0 / 3.0), 0.06);
+}
+
+TEST(SignalModel, ReadsNoiseOffASwing) {
+  RandomGeometry random(6);
+  std::vector<Eigen::Vector3d> samples;
+  for (int i = 0; i < 1000; ++i) {
+    samples.emplace_back(Eigen::Vector3d::Constant(2.0 * std::sin(0.05 * i)) +
+                         random.normal_vector<3>(0.1));
+  }
+  SignalModel model;
+  for (std::size_t i = 10; i < samples.size(); ++i) model.observe(window_at(samples, i), kPeriod);
+
+  EXPECT_NEAR(model.noise_density() / (0.1 * std::sqrt(kPeriod)), 1.0, 0.3);
+}
+
+TEST(SignalModel, StaysWithinReasonWhateverItSees) {
+  for (int seed = 0; seed < 100; ++seed) {
+    RandomGeometry random(100 + seed);
+    SignalModel model;
+    std::vector<Eigen::Vector3d> samples;
+    Eigen::Vector3d value = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < 300; ++i) {
+      // Stands still, jumps to the end of the range and back, drifts by the least there is.
+      if (random.index(10) == 0) value = random.vector(random.index(2) == 0 ? 100.0 : 1e-300);
+      samples.push_back(value);
+      if (i < 10) continue;
+      const auto window = window_at(samples, i);
+      model.observe(window, kPeriod);
+      ASSERT_TRUE(model.next_change(window).allFinite());
+      ASSERT_TRUE(std::isfinite(model.innovation_density()) &&
+                  std::isfinite(model.noise_density()));
+      const double range = window.colwise().norm().maxCoeff();
+      ASSERT_LE(model.next_change(window).norm(), 4.0 * range) << "of a jump by twice the range";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace crepes

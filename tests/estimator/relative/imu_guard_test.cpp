@@ -1,0 +1,286 @@
+#include "estimator/relative/imu_guard.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "estimator/core/constants.hpp"
+#include "estimator/core/so3.hpp"
+#include "tests/support/random_geometry.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using test::RandomGeometry;
+
+constexpr Duration kPeriod = 10ms;
+constexpr int kSecond = 100;  // samples
+
+/// How a robot moves and shakes.
+struct Motion {
+  const char* name;
+  double swing_rad;  ///< amplitude of its attitude
+  double swing_hz;
+  double gyro_noise;   ///< of a sample, with vibration [rad/s]
+  double accel_noise;  ///< [m/s^2]
+};
+
+constexpr std::array kMotions{
+    Motion{"at rest", 0.0, 0.0, 0.0026, 0.018}, Motion{"flying", 0.2, 0.3, 0.01, 0.02},
+    Motion{"vibrating", 0.2, 0.5, 0.1, 3.0},
+    Motion{"swung by hand", 0.8, 1.0, 0.004, 0.02},  // 1800 deg/s^2
+};
+
+/// Mean rates over the periods that end at the stamps.
+std::vector<ImuSample> samples_of(const Motion& motion, std::uint64_t seed, int count) {
+  RandomGeometry random(seed);
+  const double omega = 2.0 * std::numbers::pi * motion.swing_hz;
+  const Eigen::Vector3d axis = random.direction();
+  const double phase = random.uniform(-3.0, 3.0);
+  const auto attitude = [&](double t) {
+    return so3_exp(motion.swing_rad * std::sin(omega * t + phase) * axis);
+  };
+  std::vector<ImuSample> samples;
+  const double dt = to_seconds(kPeriod);
+  for (int i = 1; i <= count; ++i) {
+    const double t = dt * i;
+    samples.push_back({Timestamp{i * kPeriod},
+                       so3_log(attitude(t - dt).conjugate() * attitude(t)) / dt +
+                           random.vector(motion.gyro_noise),
+                       attitude(t - 0.5 * dt).conjugate() * Eigen::Vector3d(0, 0, kGravityMps2) +
+                           random.vector(motion.accel_noise)});
+  }
+  return samples;
+}
+
+/// What a sensor makes of a sample.
+using Damage = void (*)(ImuSample&);
+
+struct NamedDamage {
+  const char* name;
+  Damage apply;
+};
+
+void swap_axes(ImuSample& s) {
+  s.gyro_radps = {s.gyro_radps.y(), s.gyro_radps.z(), s.gyro_radps.x()};
+  s.accel_mps2 = {s.accel_mps2.y(), s.accel_mps2.z(), s.accel_mps2.x()};
+}
+
+constexpr std::array kDamages{
+    NamedDamage{"gyroscope at its end", [](ImuSample& s) { s.gyro_radps.y() = 34.9; }},
+    NamedDamage{"gyroscope spike", [](ImuSample& s) { s.gyro_radps.x() += 4.0; }},
+    NamedDamage{"accelerometer at its end", [](ImuSample& s) { s.accel_mps2.x() = -156.9; }},
+    NamedDamage{"both", [](ImuSample& s) { s.gyro_radps *= -20.0, s.accel_mps2 *= -7.0; }},
+};
+constexpr std::array kSmallDamages{
+    // Hidden by a vibration of 3 m/s^2.
+    NamedDamage{"accelerometer in g", [](ImuSample& s) { s.accel_mps2 /= kGravityMps2; }},
+    NamedDamage{"axes swapped", swap_axes},
+};
+
+/// The samples that a guard believes.
+std::vector<ImuSample> believed_of(ImuGuard& guard, const std::vector<ImuSample>& samples) {
+  std::vector<ImuSample> all;
+  for (const ImuSample& sample : samples) {
+    const auto believed = guard.accept(sample);
+    all.insert(all.end(), believed.begin(), believed.end());
+  }
+  return all;
+}
+
+std::uint64_t count(const ImuGuard& guard, ImuFault fault) {
+  return guard.refused().at(static_cast<std::size_t>(fault));
+}
+
+TEST(ImuGuard, BelievesEveryHealthySample) {
+  for (const Motion& motion : kMotions) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      ImuGuard guard;
+      const auto samples = samples_of(motion, seed, 30 * kSecond);
+
+      EXPECT_EQ(believed_of(guard, samples).size(), samples.size()) << motion.name << ' ' << seed;
+    }
+  }
+}
+
+/// Damages a sample at random, once or twice a second, and counts which are believed.
+void expect_spikes_refused(const Motion& motion, const NamedDamage& damage, std::uint64_t seed) {
+  RandomGeometry random(seed);
+  auto samples = samples_of(motion, seed, 60 * kSecond);
+  std::vector<Timestamp> damaged;
+  for (std::size_t i = kSecond; i + kSecond < samples.size();) {
+    damage.apply(samples[i]);
+    damaged.push_back(samples[i].stamp);
+    i += 50 + static_cast<std::size_t>(random.index(50));
+  }
+  ImuGuard guard;
+
+  const auto believed = believed_of(guard, samples);
+
+  std::size_t missed = 0;
+  for (const ImuSample& sample : believed)
+    missed += std::ranges::binary_search(damaged, sample.stamp) ? 1U : 0U;
+  EXPECT_EQ(missed, 0U) << motion.name << ' ' << damage.name << ' ' << seed;
+  // No more than one in fifty healthy ones beside a damaged one is lost with it.
+  const std::size_t healthy = samples.size() - damaged.size();
+  EXPECT_GE(believed.size() - missed + damaged.size() / 50, healthy) << motion.name;
+  EXPECT_EQ(count(guard, ImuFault::kSpike), samples.size() - believed.size());
+}
+
+TEST(ImuGuard, RefusesADamagedSampleAndNoOther) {
+  for (const Motion& motion : kMotions) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed)
+      for (const NamedDamage& damage : kDamages) expect_spikes_refused(motion, damage, seed);
+  }
+}
+
+TEST(ImuGuard, RefusesSmallDamageWhereNothingVibrates) {
+  for (const Motion& motion : kMotions) {
+    if (motion.accel_noise > 1.0) continue;
+    for (std::uint64_t seed = 1; seed <= 5; ++seed)
+      for (const NamedDamage& damage : kSmallDamages) expect_spikes_refused(motion, damage, seed);
+  }
+}
+
+TEST(ImuGuard, ADamagedSampleIsNotBelievedForAMoment) {
+  auto samples = samples_of(kMotions[1], 1, 2 * kSecond);
+  samples[150].gyro_radps.x() = 34.9;
+  ImuGuard guard;
+  for (std::size_t i = 0; i < 150; ++i) EXPECT_EQ(guard.accept(samples[i]).size(), 1U);
+
+  EXPECT_TRUE(guard.accept(samples[150]).empty());
+  ASSERT_EQ(guard.accept(samples[151]).size(), 1U);
+  EXPECT_EQ(guard.accept(samples[152]).front().stamp, samples[152].stamp);
+}
+
+TEST(ImuGuard, AChangeThatStaysIsBelievedASampleLate) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    auto samples = samples_of(kMotions[0], seed, 2 * kSecond);
+    for (std::size_t i = 150; i < samples.size(); ++i) samples[i].gyro_radps.z() += 1.5;
+    ImuGuard guard;
+    std::size_t believed = 0;
+    for (std::size_t i = 0; i < 152; ++i) believed += guard.accept(samples[i]).size();
+
+    EXPECT_EQ(believed, 152U) << seed;
+  }
+}
+
+TEST(ImuGuard, ABlowIsBelieved) {
+  // The force of a collision ends with it; the rate that it causes stays.
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    auto samples = samples_of(kMotions[1], seed, 3 * kSecond);
+    samples[150].accel_mps2.x() += 60.0;
+    for (std::size_t i = 150; i < samples.size(); ++i) samples[i].gyro_radps.y() += 0.5;
+    ImuGuard guard;
+
+    EXPECT_EQ(believed_of(guard, samples).size(), samples.size()) << seed;
+  }
+}
+
+// From stillness to a vibration of 3 m/s^2.
+TEST(ImuGuard, LosesFewSamplesWhenRotorsStart) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    auto samples = samples_of(kMotions[0], seed, 4 * kSecond);
+    const auto vibrating = samples_of(kMotions[2], seed, 4 * kSecond);
+    for (std::size_t i = 200; i < samples.size(); ++i) {
+      const double share = std::min(1.0, 0.01 * static_cast<double>(i - 200));  // in a second
+      samples[i].gyro_radps += share * vibrating[i].gyro_radps;
+      samples[i].accel_mps2 +=
+          share * (vibrating[i].accel_mps2 - kGravityMps2 * Eigen::Vector3d::UnitZ());
+    }
+    ImuGuard guard;
+
+    EXPECT_GE(believed_of(guard, samples).size() + 25, samples.size()) << seed;
+  }
+}
+
+/// A fault of half a second, and how long after it samples are believed again.
+void expect_return(const Motion& motion, const NamedDamage& damage, std::uint64_t seed) {
+  auto samples = samples_of(motion, seed, 6 * kSecond);
+  constexpr std::size_t kBegin = 3 * kSecond;
+  constexpr std::size_t kEnd = 4 * kSecond;
+  for (std::size_t i = kBegin; i < kEnd; ++i) damage.apply(samples[i]);
+  ImuGuard guard;
+
+  std::size_t damaged = 0;
+  std::size_t back = samples.size();
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    for (const ImuSample& believed : guard.accept(samples[i])) {
+      if (believed.stamp >= samples[kBegin].stamp && believed.stamp < samples[kEnd].stamp)
+        ++damaged;
+      if (believed.stamp >= samples[kEnd].stamp) back = std::min(back, i);
+    }
+  }
+
+  EXPECT_EQ(damaged, 0U) << motion.name << ' ' << damage.name << ' ' << seed;
+  EXPECT_LE(back, kEnd + 25) << motion.name << ' ' << damage.name << ' ' << seed;
+}
+
+TEST(ImuGuard, AnotherUnitIsNotBelievedWhileItLastsAndTheRightOneSoonAfter) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    for (const std::size_t motion : {0U, 1U, 3U})
+      expect_return(kMotions.at(motion), kSmallDamages[0], seed);
+    expect_return(kMotions[3],
+                  {"gyroscope in degrees", [](ImuSample& s) { s.gyro_radps *= kDegPerRad; }}, seed);
+  }
+}
+
+TEST(ImuGuard, SwappedAxesAreNotBelieved) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed)
+    for (const std::size_t motion : {0U, 1U})
+      expect_return(kMotions.at(motion), kSmallDamages[1], seed);
+}
+
+TEST(ImuGuard, GarbageIsNotBelieved) {
+  static RandomGeometry random(7);
+  const NamedDamage garbage{"garbage", [](ImuSample& s) {
+                              s.gyro_radps = random.vector(20.0);
+                              s.accel_mps2 = random.vector(80.0);
+                            }};
+  for (std::uint64_t seed = 1; seed <= 20; ++seed)
+    for (const Motion& motion : kMotions) expect_return(motion, garbage, seed);
+}
+
+TEST(ImuGuard, RefusesWhatNoSensorMeasures) {
+  ImuGuard guard;
+  ImuSample sample{Timestamp{10ms}, Eigen::Vector3d::Zero(), {0.0, 0.0, kGravityMps2}};
+  sample.gyro_radps.x() = std::numeric_limits<double>::quiet_NaN();
+
+  EXPECT_TRUE(guard.accept(sample).empty());
+  EXPECT_EQ(count(guard, ImuFault::kImplausible), 1U);
+}
+
+TEST(ImuGuard, PassesALateSampleOn) {
+  const auto samples = samples_of(kMotions[1], 1, 2 * kSecond);
+  ImuGuard guard;
+  for (const ImuSample& sample : samples)
+    if (sample.stamp != samples[150].stamp) static_cast<void>(guard.accept(sample));
+
+  const auto late = guard.accept(samples[150]);
+
+  ASSERT_EQ(late.size(), 1U);
+  EXPECT_TRUE(guard.agrees(late.front(), {.gyro_radps = samples[149].gyro_radps,
+                                          .accel_mps2 = samples[149].accel_mps2}));
+  ImuSample bad = samples[150];
+  bad.gyro_radps.x() = 34.9;
+  EXPECT_FALSE(guard.agrees(
+      bad, {.gyro_radps = samples[149].gyro_radps, .accel_mps2 = samples[149].accel_mps2}));
+}
+
+TEST(ImuGuard, ForgetsThePredictionInAGap) {
+  const auto before = samples_of(kMotions[0], 1, 2 * kSecond);
+  ImuGuard guard;
+  static_cast<void>(believed_of(guard, before));
+  ImuSample after = before.back();
+  after.stamp += 300ms;
+  after.gyro_radps.x() += 1.0;
+
+  EXPECT_EQ(guard.accept(after).size(), 1U);
+}
+
+}  // namespace
+}  // namespace crepes

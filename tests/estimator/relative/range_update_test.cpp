@@ -1,0 +1,86 @@
+#include "estimator/relative/range_update.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/support/random_geometry.hpp"
+
+namespace crepes {
+namespace {
+
+using E = ErrorState;
+
+constexpr double kNoGate = std::numeric_limits<double>::infinity();
+constexpr double kNoise = 0.05;
+
+/// A neighbor 5 m ahead; lever arms are zero, all other states known.
+struct Scene {
+  NominalState state;
+  E::Covariance P;
+
+  Scene(double along, double across) {
+    state.motion.T_B_N.p = {5.0, 0.0, 0.0};
+    P.diagonal().segment<3>(E::kP) << along * along, across * across, across * across;
+  }
+  Fusion fuse(double range_m) {
+    const Eigen::Vector3d& p = state.motion.T_B_N.p;
+    const auto z =
+        linearize_range(state, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), range_m, kNoise);
+    const RangeUpdate update = update_by_range(*z, p.norm(), kNoGate, P);
+    inject(update.correction, state);
+    return update.fusion;
+  }
+  [[nodiscard]] double sigma(int axis) const { return std::sqrt(P.diagonal()(E::kP + axis)); }
+};
+
+TEST(RangeUpdate, ErrorsAreAsLargeAsItSaysAboutABadlyKnownDirection) {
+  constexpr int kRuns = 200;
+  double sum = 0.0;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    test::RandomGeometry random(seed);
+    Scene scene(0.2, 1.0);
+    const Eigen::Matrix3d prior = scene.P.seen().topLeftCorner<3, 3>();
+    const Eigen::Vector3d truth = scene.state.motion.T_B_N.p + random.draw<3>(prior);
+    for (int i = 0; i < 200; ++i)
+      scene.fuse(truth.norm() + random.draw<1>(Eigen::Matrix<double, 1, 1>(kNoise * kNoise))(0));
+
+    const Eigen::Vector3d e = truth - scene.state.motion.T_B_N.p;
+    const Eigen::Matrix3d P = scene.P.seen().topLeftCorner<3, 3>();
+    sum += e.dot(P.ldlt().solve(e)) / 3.0;
+  }
+  EXPECT_LT(sum / kRuns, 1.5);
+  EXPECT_GT(sum / kRuns, 0.5);
+}
+
+TEST(RangeUpdate, RangesDoNotMakeABadlyKnownDirectionKnown) {
+  Scene scene(0.2, 1.0);
+  for (int i = 0; i < 1000; ++i) {
+    // The neighbor circles by some degrees, so that all lines differ.
+    const double angle = 0.1 * std::sin(0.1 * i);
+    scene.state.motion.T_B_N.p = {5.0 * std::cos(angle), 5.0 * std::sin(angle), 0.0};
+    scene.fuse(5.0);
+  }
+  EXPECT_GT(scene.sigma(1), 0.5);
+  EXPECT_GT(scene.sigma(2), 0.95);
+}
+
+TEST(RangeUpdate, ABearingsWorthOfDirectionLeavesAllOfTheRange) {
+  Scene scene(0.2, 0.005);
+  scene.fuse(5.0);
+  const double of_a_linear_filter = 0.2 * kNoise / std::hypot(0.2, kNoise);
+  EXPECT_LT(scene.sigma(0), 1.25 * of_a_linear_filter);  // the rest: it may be false
+}
+
+TEST(RangeUpdate, OneRangeThatMayBeFalseDoesNotSettleTheDistance) {
+  Scene scene(0.25, 0.005);
+  scene.fuse(5.6);  // 2.4 sigma
+
+  EXPECT_GT(3.0 * scene.sigma(0), scene.state.motion.T_B_N.p.x() - 5.0);
+  for (int i = 0; i < 10; ++i) scene.fuse(5.0);
+  EXPECT_NEAR(scene.state.motion.T_B_N.p.x(), 5.0, 0.05);
+}
+
+}  // namespace
+}  // namespace crepes

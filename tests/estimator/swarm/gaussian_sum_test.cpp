@@ -1,0 +1,120 @@
+#include "estimator/swarm/gaussian_sum.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/support/resting_pair.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace test::resting;
+
+Pose turned(double yaw_rad) {
+  Vector6d turn = Vector6d::Zero();
+  turn(5) = yaw_rad;
+  return perturbed(kTruth, turn);
+}
+
+GaussianSum sum_of(const std::vector<Pose>& poses) {
+  std::vector<NeighborTrack> parts;
+  for (const Pose& pose : poses) parts.push_back(track_at(at_ms(0), {pose, covariance()}));
+  return GaussianSum(std::move(parts));
+}
+
+Association fuse(GaussianSum& sum, const Measurement& z) {
+  return sum.fuse({&z, 1}, kMounting, settings().gates);
+}
+
+TEST(GaussianSum, OfANarrowTrackIsThatTrack) {
+  const GaussianSum sum(track_at(at_ms(0)));
+
+  ASSERT_EQ(sum.size(), 1U);
+  EXPECT_EQ(sum.heaviest().pose().covariance, covariance());
+}
+
+TEST(GaussianSum, SplitsAWideAttitudeAndKeepsItsMeanAndCovariance) {
+  Matrix6d wide = covariance();
+  wide(3, 3) = 0.2 * 0.2;  // roll
+  const NeighborTrack whole = track_at(at_ms(0), {kTruth, wide});
+
+  const GaussianSum sum(whole);
+
+  EXPECT_GT(sum.size(), 5U);
+  const GaussianPose mean = sum.mean(sum.heaviest().pose());
+  EXPECT_LT(pose_difference(kTruth, mean.pose).norm(), 1e-6);
+  EXPECT_NEAR(std::sqrt(mean.covariance(3, 3)), 0.2, 0.005);
+  EXPECT_NEAR(mean.covariance(0, 0), wide(0, 0), 1e-9);
+  EXPECT_LT(sum.heaviest().pose().covariance(3, 3), 0.25 * wide(3, 3));
+}
+
+TEST(GaussianSum, PeerBearingsSelectTheHeading) {
+  GaussianSum sum = sum_of({turned(0.4), turned(0.0), turned(-0.4)});
+
+  for (int i = 0; i < 3; ++i) fuse(sum, peer_bearing(at_ms(0)));
+  sum.prune();
+
+  EXPECT_EQ(sum.size(), 1U);
+  EXPECT_LT(pose_difference(kTruth, sum.heaviest().pose().pose).tail<3>().norm(), 0.05);
+}
+
+TEST(GaussianSum, OwnBearingsCannotSelectAHeading) {
+  GaussianSum sum = sum_of({turned(0.4), turned(0.0), turned(-0.4)});
+
+  fuse(sum, bearing(at_ms(0)));
+  sum.prune();
+
+  EXPECT_EQ(sum.size(), 3U);
+}
+
+TEST(GaussianSum, PruneMergesEqualParts) {
+  GaussianSum sum = sum_of({turned(0.0), turned(0.4), turned(0.001)});
+
+  sum.prune();
+
+  EXPECT_EQ(sum.size(), 2U);
+}
+
+TEST(GaussianSum, ChoosesOneOfSeveralAlternatives) {
+  GaussianSum sum = sum_of({kTruth});
+  const std::array candidates{bearing(at_ms(0), 0.5), bearing(at_ms(0), 0.001)};
+
+  const Association association = sum.fuse(candidates, kMounting, settings().gates);
+
+  EXPECT_EQ(association.chosen, 1U);
+  EXPECT_EQ(association.fusion.verdict, Verdict::kFused);
+  EXPECT_GT(association.score, 0.0);
+}
+
+TEST(GaussianSum, AGatedReadingHasNoScore) {
+  GaussianSum sum = sum_of({kTruth, turned(0.4)});
+
+  const Association association = fuse(sum, bearing(at_ms(0), 1.0));
+
+  EXPECT_EQ(association.fusion.verdict, Verdict::kGated);
+  EXPECT_NEAR(association.score, 0.0, 1e-12);
+}
+
+TEST(GaussianSum, IsCompatibleWithANearPoseButNotWithAMirrorImage) {
+  const GaussianSum sum = sum_of({kTruth});
+  const Pose image{{0.0, kDistance, 0.0}, so3_exp({0.0, 0.0, 0.5 * std::numbers::pi})};
+
+  EXPECT_TRUE(sum.is_compatible_with(sum_of({turned(0.02)})));
+  EXPECT_FALSE(sum.is_compatible_with(sum_of({image})));
+}
+
+TEST(LogLikelihoodRatio, ComparesAFusedReadingWithClutterAndIgnoresOthers) {
+  Fusion fusion{.verdict = Verdict::kFused};
+  fusion.log_likelihood = 5.0;
+
+  EXPECT_GT(log_likelihood_ratio(fusion, MeasurementKind::kBearing), 5.0);
+  EXPECT_GT(log_likelihood_ratio(fusion, MeasurementKind::kRange),
+            log_likelihood_ratio(fusion, MeasurementKind::kBearing));
+  fusion.verdict = Verdict::kGated;
+  EXPECT_EQ(log_likelihood_ratio(fusion, MeasurementKind::kBearing), 0.0);
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,146 @@
+#include "estimator/swarm/neighbor_track.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/resting_pair.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace test::resting;
+
+/// A track that bearings have made certain, and the means to move it.
+class RestingTrack : public testing::Test {
+ protected:
+  Fusion fuse_at(int ms, Measurement z) {
+    track_.advance_to(at_ms(ms), imu_, imu_);
+    z.stamp = at_ms(ms);
+    return fuse(track_, z);
+  }
+
+  ImuHistory imu_ = imu_at_rest(2000);
+  NeighborTrack track_ = track_at(at_ms(0));
+};
+
+TEST_F(RestingTrack, RemembersWhenAReadingOfEachKindWasUsed) {
+  EXPECT_EQ(track_.last(MeasurementKind::kBearing), kNever);
+  EXPECT_EQ(track_.last_sighting(), kNever);
+
+  ASSERT_EQ(fuse_at(20, bearing({})).verdict, Verdict::kFused);
+  ASSERT_EQ(fuse_at(30, range({})).verdict, Verdict::kFused);
+
+  EXPECT_EQ(track_.last(MeasurementKind::kBearing), at_ms(20));
+  EXPECT_EQ(track_.last(MeasurementKind::kRange), at_ms(30));
+  EXPECT_EQ(track_.last_sighting(), at_ms(20));
+}
+
+TEST_F(RestingTrack, HasDivergedWhenAllBearingsOfAQuarterSecondWereGated) {
+  for (int ms = 0; ms < 250; ms += 10) {
+    EXPECT_FALSE(track_.is_diverged()) << ms;
+    ASSERT_EQ(fuse_at(ms, bearing({}, 1.0)).verdict, Verdict::kGated);
+  }
+  ASSERT_EQ(fuse_at(250, bearing({}, 1.0)).verdict, Verdict::kGated);
+
+  EXPECT_TRUE(track_.is_diverged());
+}
+
+TEST_F(RestingTrack, HasNotDivergedWhileSomeBearingsFit) {
+  for (int ms = 0; ms < 1000; ms += 10) {
+    const bool fits = ms % 200 == 0;
+    ASSERT_EQ(fuse_at(ms, bearing({}, fits ? 0.0 : 1.0)).verdict,
+              fits ? Verdict::kFused : Verdict::kGated);
+
+    EXPECT_FALSE(track_.is_diverged()) << ms;
+  }
+}
+
+TEST_F(RestingTrack, HasNotDivergedByAFewGatedBearings) {
+  for (int ms = 0; ms <= 256; ms += 32) {
+    ASSERT_EQ(fuse_at(ms, bearing({}, 1.0)).verdict, Verdict::kGated);
+  }
+
+  EXPECT_FALSE(track_.is_diverged());  // nine, for longer than a quarter second
+}
+
+TEST_F(RestingTrack, IsContradictedByBearingsInARowAfterAGapUntilOneFits) {
+  ASSERT_EQ(fuse_at(0, bearing({})).verdict, Verdict::kFused);
+  for (const int ms : {200, 210}) ASSERT_EQ(fuse_at(ms, bearing({}, 1.0)).verdict, Verdict::kGated);
+  EXPECT_FALSE(track_.is_contradicted());
+  ASSERT_EQ(fuse_at(220, bearing({}, 1.0)).verdict, Verdict::kGated);
+  EXPECT_TRUE(track_.is_contradicted());
+
+  ASSERT_EQ(fuse_at(230, peer_bearing({})).verdict, Verdict::kFused);
+  EXPECT_FALSE(track_.is_contradicted());  // a mirror image in our camera
+}
+
+TEST_F(RestingTrack, IsContradictedByRangesInARowUntilOneFits) {
+  ASSERT_EQ(fuse_at(0, range({}, kDistance)).verdict, Verdict::kFused);
+  for (const int ms : {10, 20}) ASSERT_EQ(fuse_at(ms, range({}, 7.0)).verdict, Verdict::kGated);
+  EXPECT_FALSE(track_.is_contradicted());
+  ASSERT_EQ(fuse_at(30, range({}, 7.0)).verdict, Verdict::kGated);
+  EXPECT_TRUE(track_.is_contradicted());
+
+  ASSERT_EQ(fuse_at(40, range({}, kDistance)).verdict, Verdict::kFused);
+  EXPECT_FALSE(track_.is_contradicted());
+}
+
+TEST_F(RestingTrack, SkipsAnotherCameraUntilTheFirstIsSilent) {
+  const Eigen::Vector3d other(0.0, 0.0, 0.05);
+  const Measurement by_other = bearing({}, 0.0, other);
+  ASSERT_EQ(fuse_at(0, bearing({})).verdict, Verdict::kFused);
+
+  EXPECT_EQ(fuse_at(10, by_other).verdict, Verdict::kSkipped);
+  EXPECT_EQ(fuse_at(100, by_other).verdict, Verdict::kSkipped);
+  EXPECT_EQ(fuse_at(110, by_other).verdict, Verdict::kFused);
+  EXPECT_EQ(fuse_at(120, bearing({})).verdict, Verdict::kSkipped);
+}
+
+TEST_F(RestingTrack, PrefersTheAlternativeNearestToItsPrediction) {
+  const std::array candidates{bearing(at_ms(0), 0.3), bearing(at_ms(0), -0.01),
+                              bearing(at_ms(0), 0.05)};
+
+  EXPECT_EQ(track_.most_likely(candidates, kMounting), 1U);
+}
+
+TEST_F(RestingTrack, AcceptsAnotherDistanceWhenOnlyTheRangesContradict) {
+  Verdict verdict = Verdict::kSkipped;
+  for (int ms = 0; ms <= 1000; ms += 10) {
+    fuse_at(ms, bearing({}));
+    fuse_at(ms, peer_bearing({}));
+    verdict = fuse_at(ms, range({}, ms <= 300 ? kDistance : 7.0)).verdict;
+    // Half a second, and some ranges more until 3 m off is more likely true than false.
+    ASSERT_EQ(verdict, ms <= 300 || ms > 830 ? Verdict::kFused : Verdict::kGated) << ms;
+  }
+
+  EXPECT_EQ(verdict, Verdict::kFused);
+  EXPECT_NEAR(track_.pose().pose.p.x(), 7.0, 0.5);
+}
+
+TEST_F(RestingTrack, RecordsTheCalibrationInTheOrderOfItsNames) {
+  for (int ms = 0; ms <= 500; ms += 10) {
+    fuse_at(ms, bearing({}, 0.002));
+    fuse_at(ms, range({}, 4.1));
+  }
+  const auto record = track_.calibration();
+
+  ASSERT_TRUE(record);
+  EXPECT_EQ(CalibrationRecord::kNames[CalibrationRecord::kRangeBias], "range_bias");
+  EXPECT_EQ(CalibrationRecord::kNames[CalibrationRecord::kMisalignB], "misalign_B_x");
+  EXPECT_EQ(CalibrationRecord::kNames[CalibrationRecord::kAccelN], "accel_N_x");
+  EXPECT_GT(record->value[CalibrationRecord::kRangeBias], 0.0);
+  EXPECT_LT(record->sigma[CalibrationRecord::kRangeBias], settings().priors.range_bias_m);
+  for (std::size_t i = 0; i < CalibrationRecord::kSize; ++i)
+    EXPECT_GT(record->sigma[i], 0.0) << CalibrationRecord::kNames[i];
+  EXPECT_EQ(record->stamp, at_ms(500));
+}
+
+TEST(NeighborTrack, OfThePapersProfileIsOnePartWithoutCalibration) {
+  const NeighborTrack track(at_ms(0), sighting().raw, settings(Profile::kPaper));
+
+  EXPECT_EQ(track.split().size(), 1U);
+  EXPECT_FALSE(track.calibration());
+  EXPECT_EQ(track.last(MeasurementKind::kRawPose), at_ms(0));
+}
+
+}  // namespace
+}  // namespace crepes

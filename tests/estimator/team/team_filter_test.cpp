@@ -1,0 +1,325 @@
+#include "estimator/team/team_filter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <set>
+
+#include "estimator/core/constants.hpp"
+#include "estimator/core/so3.hpp"
+#include "tests/support/simulated_team.hpp"
+
+namespace crepes {
+namespace {
+
+using test::kIntervalSeconds;
+using test::kSelf;
+using test::SimulatedTeam;
+
+constexpr double kProbation = 1.5;  // s; longer than robots are on probation, and some intervals
+
+const TeamPose* find(const TeamSolution& solution, RobotId robot) {
+  const auto found = std::ranges::find(solution.poses, robot, &TeamPose::neighbor);
+  return found == solution.poses.end() ? nullptr : &*found;
+}
+
+Vector6d error_of(const TeamPose& pose, const Pose& truth) {
+  return pose_difference(pose.T_B_N, truth);
+}
+
+double nees_of(const TeamPose& pose, const Pose& truth) {
+  Matrix6d P;
+  P << pose.covariance.topLeftCorner<3, 3>(), pose.covariance.topRightCorner<3, 3>(),
+      pose.covariance.bottomLeftCorner<3, 3>(), pose.covariance.bottomRightCorner<3, 3>();
+  const Vector6d e = error_of(pose, truth);
+  return e.dot(P.llt().solve(e));
+}
+
+TeamSolution solution_after(SimulatedTeam& team, TeamFilter& filter, double seconds) {
+  TeamSolution solution;
+  for (double t = 0.0; t < seconds; t += kIntervalSeconds) solution = filter.step(team.next());
+  return solution;
+}
+
+TEST(TeamFilter, ErrorsAgreeWithTheirCovarianceOverSeeds) {
+  double nees = 0.0;
+  int count = 0;
+  int beyond = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    for (const double seconds : {2.0, 4.0}) {
+      const TeamSolution solution = solution_after(team, filter, seconds);
+      ASSERT_EQ(solution.poses.size(), 3U);
+      for (const TeamPose& pose : solution.poses) {
+        const double one = nees_of(pose, team.truth(pose.neighbor));
+        nees += one;
+        ++count;
+        beyond += one > 22.5 ? 1 : 0;  // 99.9 % of chi-square with 6 degrees of freedom
+      }
+    }
+  }
+  EXPECT_GT(nees / count, 4.8);
+  EXPECT_LT(nees / count, 7.2);
+  EXPECT_LE(beyond, 3) << "of " << count;
+}
+
+TEST(TeamFilter, ReachesARobotThatOnlyOthersSee) {
+  constexpr RobotId kHidden{3};
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.sees = [](RobotId a, RobotId b) { return std::set{a, b} != std::set{kSelf, kHidden}; };
+    TeamFilter filter;
+    const TeamSolution solution = solution_after(team, filter, 5.0);
+    const TeamPose* pose = find(solution, kHidden);
+    ASSERT_NE(pose, nullptr);
+    EXPECT_LT(error_of(*pose, team.truth(kHidden)).head<3>().norm(), 0.1);
+    EXPECT_LT(nees_of(*pose, team.truth(kHidden)), 30.0);
+  }
+}
+
+// A robot whose camera is turned contradicts all others; the team goes on without its bearings.
+TEST(TeamFilter, ATurnedCameraHarmsNobody) {
+  constexpr RobotId kLiar{4};
+  double with = 0.0;
+  double without = 0.0;
+  for (const double turn_deg : {0.0, 5.0, 20.0}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      SimulatedTeam team(seed);
+      const Eigen::Quaterniond turn = so3_exp(radians(turn_deg) * Eigen::Vector3d(0.6, 0.0, 0.8));
+      team.damage = [&](TeamInterval& interval) {
+        for (TeamBearing& b : interval.bearings)
+          if (b.observer == kLiar) b.bearing.u_B = turn * b.bearing.u_B;
+      };
+      TeamFilter filter;
+      const TeamSolution solution = solution_after(team, filter, 5.0);
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        ASSERT_NE(pose, nullptr) << turn_deg;
+        (turn_deg > 0.0 ? with : without) +=
+            error_of(*pose, team.truth(robot)).head<3>().squaredNorm() / (turn_deg > 0.0 ? 2 : 1);
+      }
+    }
+  }
+  EXPECT_LT(std::sqrt(with), 1.2 * std::sqrt(without));
+}
+
+const TeamFault* fault_of(const TeamSolution& solution, RobotId robot) {
+  const auto found = std::ranges::find(solution.faults, robot, &TeamFault::robot);
+  return found == solution.faults.end() ? nullptr : &*found;
+}
+
+TEST(TeamFilter, FindsNoFaultInAHealthyTeam) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    for (double t = 0.0; t < 5.0; t += kIntervalSeconds)
+      EXPECT_TRUE(filter.step(team.next()).faults.empty()) << seed;
+  }
+}
+
+// Found by how much, or left out: both are safe.
+TEST(TeamFilter, NamesATurnedCamera) {
+  constexpr RobotId kLiar{4};
+  int measured = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 3.0));
+    const Eigen::Quaterniond turn = so3_exp(radians(8.0) * Eigen::Vector3d(0.6, 0.0, 0.8));
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamBearing& b : interval.bearings)
+        if (b.observer == kLiar) b.bearing.u_B = turn * b.bearing.u_B;
+    };
+    const TeamSolution solution = solution_after(team, filter, 5.0);
+    const TeamFault* fault = fault_of(solution, kLiar);
+    ASSERT_NE(fault, nullptr) << seed;
+    EXPECT_NE(fault->kind, TeamFault::Kind::kRanges);
+    if (fault->kind == TeamFault::Kind::kCameraTurned) {
+      EXPECT_NEAR(fault->size, radians(8.0), radians(1.0)) << seed;
+      ++measured;
+    }
+    for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+      ASSERT_NE(find(solution, robot), nullptr);
+      EXPECT_LT(nees_of(*find(solution, robot), team.truth(robot)), 30.0) << seed;
+      EXPECT_EQ(fault_of(solution, robot), nullptr) << seed;
+    }
+  }
+  EXPECT_GE(measured, 2);
+}
+
+TEST(TeamFilter, NamesRangesThatAreTooLong) {
+  constexpr RobotId kLiar{4};
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamRange& r : interval.ranges)
+        if (r.neighbor == kLiar) std::swap(r.observer, r.neighbor);
+      for (TeamRange& r : interval.ranges)
+        if (r.observer == kLiar) r.reading.range_m += 1.0;
+    };
+    TeamFilter filter;
+    const TeamSolution solution = solution_after(team, filter, 5.0);
+    const TeamFault* fault = fault_of(solution, kLiar);
+    ASSERT_NE(fault, nullptr) << seed;
+    EXPECT_EQ(fault->kind, TeamFault::Kind::kRanges);
+    EXPECT_NEAR(fault->size, 1.0, 0.15) << seed;
+    for (const TeamPose& pose : solution.poses)
+      EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0) << seed;
+  }
+}
+
+// All estimates of a robot are a metre off at a sigma of 5 cm.
+TEST(TeamFilter, ARobotThatStartsAtAWrongPlaceMovesNobody) {
+  constexpr RobotId kLiar{4};
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      for (RelativePoseEdge& edge : interval.edges) {
+        if (edge.to == kLiar) edge.T_from_to.pose.p += Eigen::Vector3d(0.6, 0.0, 0.8);
+        if (edge.from == kLiar) edge.T_from_to.pose.p -= Eigen::Vector3d(0.6, 0.0, 0.8);
+      }
+    };
+    TeamFilter filter;
+    for (double t = 0.0; t < 8.0; t += kIntervalSeconds) {
+      for (const TeamPose& pose : filter.step(team.next()).poses) {
+        if (pose.neighbor == kLiar) continue;
+        EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 40.0) << seed << " at " << t;
+      }
+    }
+    const TeamSolution solution = solution_after(team, filter, kIntervalSeconds);
+    for (const TeamPose& pose : solution.poses)
+      EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 40.0) << seed;
+    EXPECT_EQ(solution.poses.size(), 3U) << seed;
+  }
+}
+
+TEST(TeamFilter, IgnoresEstimatesThatAreNone) {
+  const double kNone = std::numeric_limits<double>::quiet_NaN();
+  SimulatedTeam team(1);
+  int count = 0;
+  team.damage = [&](TeamInterval& interval) {
+    for (RelativePoseEdge& edge : interval.edges) {
+      if (edge.from != RobotId{4} && edge.to != RobotId{4}) continue;
+      switch (++count % 4) {
+        case 0:
+          edge.T_from_to.pose.p.x() = kNone;
+          break;
+        case 1:
+          edge.T_from_to.covariance(0, 0) = kNone;
+          break;
+        case 2:
+          edge.T_from_to.covariance(0, 1) = edge.T_from_to.covariance(1, 0) = 10.0;
+          break;
+        default:
+          edge.v_from_to.z() = std::numeric_limits<double>::infinity();
+      }
+    }
+  };
+  TeamFilter filter;
+  const TeamSolution solution = solution_after(team, filter, 3.0);
+  ASSERT_EQ(solution.poses.size(), 2U);
+  for (const TeamPose& pose : solution.poses)
+    EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0);
+}
+
+// A configuration that claims to know the cameras' directions exactly is no reason to restart.
+TEST(TeamFilter, WorksWithoutMisalignmentToEstimate) {
+  SimulatedTeam team(1);
+  team.damage = [](TeamInterval& interval) { interval.settings.priors.misalignment_rad = 0.0; };
+  TeamFilter filter;
+  static_cast<void>(solution_after(team, filter, kProbation));
+  for (double t = 0.0; t < 3.0; t += kIntervalSeconds)
+    EXPECT_EQ(filter.step(team.next()).poses.size(), 3U);
+}
+
+TEST(TeamFilter, LocatesRobotsBeyondItsSizeThroughTheOthers) {
+  static constexpr RobotId kHidden{6};
+  SimulatedTeam team(1, 6);
+  team.sees = [](RobotId a, RobotId b) { return std::set{a, b} != std::set{kSelf, kHidden}; };
+  team.damage = [](TeamInterval& interval) {
+    interval.settings.max_robots = 4;
+    // The hidden robot's estimates are the worst, so that it is not one of the four.
+    for (RelativePoseEdge& edge : interval.edges)
+      if (edge.from == kHidden || edge.to == kHidden) edge.T_from_to.covariance *= 1.2;
+  };
+  TeamFilter filter;
+  const TeamSolution solution = solution_after(team, filter, 4.0);
+  ASSERT_NE(find(solution, kHidden), nullptr);
+  EXPECT_LT(nees_of(*find(solution, kHidden), team.truth(kHidden)), 30.0);
+  EXPECT_LT(error_of(*find(solution, kHidden), team.truth(kHidden)).head<3>().norm(), 0.5);
+  EXPECT_EQ(solution.poses.size(), 4U);  // three of the filter, and the hidden one
+}
+
+TEST(TeamFilter, ForgetsARobotWithoutImuAndFindsItAgain) {
+  SimulatedTeam team(1);
+  TeamFilter filter;
+  EXPECT_NE(find(solution_after(team, filter, 2.0), RobotId{2}), nullptr);
+  team.damage = [](TeamInterval& interval) {
+    std::erase_if(interval.members, [](const TeamMember& m) { return m.robot == RobotId{2}; });
+  };
+  const TeamSolution without = filter.step(team.next());
+  EXPECT_EQ(find(without, RobotId{2}), nullptr);
+  EXPECT_NE(find(without, RobotId{3}), nullptr);
+  team.damage = [](TeamInterval&) {};
+  const TeamSolution again = solution_after(team, filter, kProbation);
+  ASSERT_NE(find(again, RobotId{2}), nullptr);
+  EXPECT_LT(nees_of(*find(again, RobotId{2}), team.truth(RobotId{2})), 30.0);
+}
+
+TEST(TeamFilter, KnowsNobodyWithoutThisRobotsImu) {
+  SimulatedTeam team(1);
+  TeamFilter filter;
+  EXPECT_EQ(solution_after(team, filter, kProbation).poses.size(), 3U);
+  team.damage = [](TeamInterval& interval) {
+    std::erase_if(interval.members, [](const TeamMember& m) { return m.robot == kSelf; });
+  };
+  EXPECT_TRUE(filter.step(team.next()).poses.empty());
+  team.damage = [](TeamInterval&) {};
+  EXPECT_EQ(solution_after(team, filter, kProbation).poses.size(), 3U);
+}
+
+// A robot that names another place of its camera with every bearing costs no memory.
+TEST(TeamFilter, TakesNoMoreThanAFewCamerasOfARobot) {
+  SimulatedTeam team(2);
+  double place_m = 0.0;
+  team.damage = [&](TeamInterval& interval) {
+    for (TeamBearing& b : interval.bearings) {
+      if (b.observer == RobotId{4}) b.bearing.p_B_C.x() = place_m += 1e-6;
+    }
+  };
+  TeamFilter filter;
+  const TeamSolution solution = solution_after(team, filter, 3.0);
+  ASSERT_NE(find(solution, RobotId{2}), nullptr);
+  EXPECT_LT(nees_of(*find(solution, RobotId{2}), team.truth(RobotId{2})), 30.0);
+}
+
+TEST(TeamFilter, BeginsAnewAfterAGap) {
+  SimulatedTeam team(2);
+  TeamFilter filter;
+  EXPECT_EQ(solution_after(team, filter, kProbation).poses.size(), 3U);
+  static_cast<void>(team.next());
+  EXPECT_TRUE(filter.step(team.next()).poses.empty());
+  const TeamSolution after = solution_after(team, filter, kProbation);
+  ASSERT_EQ(after.poses.size(), 3U);
+  for (const TeamPose& pose : after.poses)
+    EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0);
+}
+
+TEST(TeamFilter, TheSameIntervalsGiveTheSameBits) {
+  std::vector<TeamSolution> solutions;
+  for (int run = 0; run < 2; ++run) {
+    SimulatedTeam team(3);
+    TeamFilter filter;
+    solutions.push_back(solution_after(team, filter, 2.0));
+  }
+  ASSERT_EQ(solutions[0].poses.size(), solutions[1].poses.size());
+  for (std::size_t i = 0; i < solutions[0].poses.size(); ++i) {
+    EXPECT_TRUE(solutions[0].poses[i].T_B_N == solutions[1].poses[i].T_B_N);
+    EXPECT_EQ(solutions[0].poses[i].covariance, solutions[1].poses[i].covariance);
+  }
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,109 @@
+#include "estimator/team/team_update.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "tests/support/random_geometry.hpp"
+
+namespace crepes {
+namespace {
+
+using test::RandomGeometry;
+
+constexpr int kStates = 30;
+
+Eigen::MatrixXd random_covariance(RandomGeometry& random) {
+  Eigen::MatrixXd A(kStates, kStates);
+  for (double& a : A.reshaped()) a = random.normal(1.0);
+  return A * A.transpose() + 0.1 * Eigen::MatrixXd::Identity(kStates, kStates);
+}
+
+std::vector<TeamRow> random_rows(RandomGeometry& random, int count) {
+  std::vector<TeamRow> rows(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    TeamRow& row = rows[i];
+    row.dimension = i % 3 == 0 ? 1 : 2;
+    row.variance = random.uniform(0.01, 1.0);
+    row.size = 7;
+    row.H.setZero();
+    for (int a = 0; a < row.size; ++a) {
+      row.columns.at(static_cast<std::size_t>(a)) = (static_cast<int>(i) * 5 + 3 * a) % kStates;
+      for (int d = 0; d < row.dimension; ++d) row.H(d, a) = random.normal(1.0);
+    }
+    for (int d = 0; d < row.dimension; ++d) row.residual(d) = random.normal(1.0);
+  }
+  return rows;
+}
+
+struct Dense {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd r;
+  Eigen::VectorXd variance;
+};
+
+Dense dense(const std::vector<TeamRow>& rows) {
+  Eigen::Index m = 0;
+  for (const TeamRow& row : rows) m += row.dimension;
+  Dense all{Eigen::MatrixXd::Zero(m, kStates), Eigen::VectorXd(m), Eigen::VectorXd(m)};
+  Eigen::Index k = 0;
+  for (const TeamRow& row : rows) {
+    for (int d = 0; d < row.dimension; ++d, ++k) {
+      for (int a = 0; a < row.size; ++a)
+        all.H(k, row.columns.at(static_cast<std::size_t>(a))) += row.H(d, a);
+      all.r(k) = row.residual(d);
+      all.variance(k) = row.variance;
+    }
+  }
+  return all;
+}
+
+TEST(TeamUpdate, IsThatOfTheInformationFilter) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    RandomGeometry random(seed);
+    Eigen::MatrixXd P = random_covariance(random);
+    const std::vector<TeamRow> rows = random_rows(random, 12);
+    const Dense all = dense(rows);
+    const Eigen::VectorXd dx = Eigen::VectorXd::Random(kStates);
+    const Eigen::MatrixXd W = all.variance.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd expected = (P.inverse() + all.H.transpose() * W * all.H).eval().inverse();
+    const Eigen::VectorXd expected_dx = expected * all.H.transpose() * W * (all.r + all.H * dx);
+
+    const TeamUpdate update(rows, P);
+    ASSERT_TRUE(update.is_valid());
+    EXPECT_LT((update.correction(rows, dx) - expected_dx).norm(), 1e-8 * expected_dx.norm());
+    update.correct(std::vector<bool>(kStates, true), P);
+    EXPECT_LT((P - expected).norm(), 1e-8 * expected.norm());
+    EXPECT_EQ(P, P.transpose().eval());
+  }
+}
+
+// With the gain of the corrected states alone, Joseph's form holds.
+TEST(TeamUpdate, StatesThatAreNotCorrectedCountAllTheSame) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    RandomGeometry random(seed);
+    Eigen::MatrixXd P = random_covariance(random);
+    const Eigen::MatrixXd before = P;
+    const std::vector<TeamRow> rows = random_rows(random, 6);
+    const Dense all = dense(rows);
+    std::vector<bool> corrected(kStates, true);
+    const Eigen::MatrixXd S =
+        all.H * P * all.H.transpose() + Eigen::MatrixXd(all.variance.asDiagonal());
+    Eigen::MatrixXd K = P * all.H.transpose() * S.inverse();
+    for (int i = 0; i < kStates; i += 3) {
+      corrected[static_cast<std::size_t>(i)] = false;
+      K.row(i).setZero();
+    }
+    const Eigen::MatrixXd rest = Eigen::MatrixXd::Identity(kStates, kStates) - K * all.H;
+    const Eigen::MatrixXd expected =
+        rest * P * rest.transpose() + K * all.variance.asDiagonal() * K.transpose();
+    TeamUpdate(rows, P).correct(corrected, P);
+    EXPECT_LT((P - expected).norm(), 1e-8 * expected.norm());
+    for (int i = 0; i < kStates; i += 3) EXPECT_EQ(P(i, i), before(i, i));
+    EXPECT_EQ(Eigen::LLT<Eigen::MatrixXd>(P).info(), Eigen::Success);
+  }
+}
+
+}  // namespace
+}  // namespace crepes

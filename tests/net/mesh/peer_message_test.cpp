@@ -1,0 +1,318 @@
+#include "net/mesh/peer_message.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+
+#include "net/mesh/crc32.hpp"
+#include "net/mesh/mesh_counters.hpp"
+#include "net/mesh/wire_codes.hpp"
+
+namespace crepes {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Timestamp kSent{Duration{993'638'158'694'177}};
+
+Eigen::Vector3d random_vector(std::mt19937& random, double scale) {
+  std::normal_distribution<double> normal(0, scale);
+  return {normal(random), normal(random), normal(random)};
+}
+
+Matrix6d random_covariance(std::mt19937& random) {
+  Matrix6d A;
+  std::normal_distribution<double> normal(0, 1);
+  for (double& v : A.reshaped()) v = normal(random);
+  const Vector6d scale{0.1, 0.2, 0.05, 0.01, 0.02, 0.03};
+  return scale.asDiagonal() * Matrix6d(A * A.transpose() + 0.1 * Matrix6d::Identity()) *
+         scale.asDiagonal();
+}
+
+/// The full report of a robot with `neighbors`: 160 ms of 100 Hz IMU and 50 Hz
+/// ranges, and bearings from a 200 Hz camera.
+OutgoingPeerMessage full_message(int neighbors, std::uint32_t seed = 1, int bearing_frames = 20) {
+  std::mt19937 random(seed);
+  OutgoingPeerMessage message;
+  message.sent = kSent;
+  message.session = 77;
+  message.sequence = seed;
+  Report& report = message.report;
+  report.sender = RobotId{1};
+  report.stamp = kSent - milliseconds{2};
+  report.tilt = {kSent - milliseconds{3}, random_vector(random, 1).normalized(), 0.01};
+  for (int i = 0; i < 20; ++i)
+    report.imu.push_back({kSent - milliseconds{10 * i}, random_vector(random, 1.5),
+                          Eigen::Vector3d(0, 0, 9.81) + random_vector(random, 2)});
+  for (int n = 0; n < neighbors; ++n) {
+    const RobotId neighbor{static_cast<std::uint16_t>(n + 2)};
+    message.echoes.push_back({neighbor, 1'000'000'000'000 + n, to_ns(kSent) - 40'000'000});
+    for (int i = 0; i < bearing_frames; ++i)
+      report.bearings.push_back({kSent - milliseconds{5 * i},
+                                 neighbor,
+                                 random_vector(random, 1).normalized(),
+                                 {0.06, 0.0, 0.04},
+                                 7e-4});
+    for (int i = 0; i < 8; ++i)
+      report.ranges.push_back(
+          {kSent - milliseconds{20 * i + n % 7}, neighbor, 3.0 + n, -81.5, -78.0});
+    NeighborEstimate estimate;
+    estimate.stamp = kSent - milliseconds{4};
+    estimate.neighbor = neighbor;
+    estimate.T_B_N.pose = {random_vector(random, 5), so3_exp(random_vector(random, 1))};
+    estimate.T_B_N.covariance = random_covariance(random);
+    estimate.v_B_N = random_vector(random, 1);
+    report.estimates.push_back(estimate);
+  }
+  return message;
+}
+
+std::vector<std::uint8_t> resealed(std::vector<std::uint8_t> body) {
+  const std::uint32_t sum = crc32(body);
+  for (int i = 0; i < 4; ++i) body.push_back(static_cast<std::uint8_t>(sum >> (8 * i)));
+  return body;
+}
+
+std::vector<std::uint8_t> body_of(const OutgoingPeerMessage& message) {
+  auto bytes = encode_peer_message(message).bytes;
+  bytes.resize(bytes.size() - 4);
+  return bytes;
+}
+
+PeerMessageError fault_of(std::span<const std::uint8_t> bytes) {
+  const auto message = decode_peer_message(bytes);
+  EXPECT_FALSE(message.has_value());
+  return message ? PeerMessageError{} : message.error();
+}
+
+bool is_finite(const PeerMessage& message) {
+  const auto& report = message.report;
+  const auto all = [](const auto& items, auto finite) {
+    return std::all_of(items.begin(), items.end(), finite);
+  };
+  return report.tilt.up_B.allFinite() && std::isfinite(report.tilt.sigma_rad) &&
+         all(report.imu,
+             [](const auto& s) { return s.gyro_radps.allFinite() && s.accel_mps2.allFinite(); }) &&
+         all(report.bearings,
+             [](const auto& b) {
+               return b.u_B.allFinite() && b.p_B_C.allFinite() && b.sigma_rad > 0 &&
+                      b.neighbor.value > 0;
+             }) &&
+         all(report.ranges, [](const auto& r) { return std::isfinite(r.range_m); }) &&
+         all(report.estimates, [](const auto& e) {
+           return e.T_B_N.pose.p.allFinite() && e.T_B_N.pose.q.coeffs().allFinite() &&
+                  e.T_B_N.covariance.allFinite() && e.v_B_N.allFinite();
+         });
+}
+
+TEST(PeerMessage, CarriesTheReportsOfFourRobotsWithRedundancy) {
+  const OutgoingPeerMessage message = full_message(3);
+
+  const auto encoded = encode_peer_message(message);
+  const auto decoded = decode_peer_message(encoded.bytes);
+
+  ASSERT_TRUE(decoded.has_value()) << name_of(counter_of(decoded.error()));
+  EXPECT_LE(encoded.bytes.size(), kMaxPeerMessage);
+  EXPECT_EQ(encoded.refused, 0U);
+  const PeerReport& report = decoded->report;
+  EXPECT_EQ(report.sender, RobotId{1});
+  EXPECT_EQ(decoded->session, 77U);
+  EXPECT_EQ(to_ns(decoded->sent), to_ns(kSent));
+  EXPECT_EQ(decoded->echoes.size(), 3U);
+  EXPECT_EQ(report.imu.size(), 16U);
+  EXPECT_EQ(report.estimates.size(), 3U);
+  ASSERT_GE(report.bearings.size(), 45U);
+  const auto oldest = std::min_element(report.bearings.begin(), report.bearings.end(),
+                                       [](auto& a, auto& b) { return a.stamp < b.stamp; });
+  EXPECT_LT(to_ns(oldest->stamp), to_ns(kSent - milliseconds{60}));  // three packets deep
+}
+
+TEST(PeerMessage, FitsWithTwentyNeighborsAndReportsThemInTurn) {
+  std::set<RobotId> echoed;
+  std::set<RobotId> estimated;
+  for (std::uint32_t sequence = 0; sequence < 8; ++sequence) {
+    OutgoingPeerMessage message = full_message(20);
+    message.sequence = sequence;
+
+    const auto encoded = encode_peer_message(message);
+    const auto decoded = decode_peer_message(encoded.bytes);
+
+    ASSERT_TRUE(decoded.has_value());
+    ASSERT_LE(encoded.bytes.size(), kMaxPeerMessage);
+    EXPECT_GT(encoded.left_out, 0U);
+    EXPECT_EQ(decoded->report.imu.size(), 16U);
+    EXPECT_GE(decoded->report.bearings.size(), 20U);
+    for (const auto& echo : decoded->echoes) echoed.insert(echo.peer);
+    for (const auto& estimate : decoded->report.estimates) estimated.insert(estimate.neighbor);
+  }
+
+  EXPECT_EQ(echoed.size(), 20U);
+  EXPECT_EQ(estimated.size(), 20U);
+}
+
+TEST(PeerMessage, DecodesToWhatWasEncodedWithinItsResolution) {
+  EXPECT_TRUE(rc::check([] {
+    const OutgoingPeerMessage message =
+        full_message(2, *rc::gen::inRange<std::uint32_t>(1, 1'000'000));
+    const auto decoded = decode_peer_message(encode_peer_message(message).bytes);
+    RC_ASSERT(decoded.has_value());
+    const Report& in = message.report;
+    const PeerReport& out = decoded->report;
+
+    RC_ASSERT(std::abs(to_ns(out.stamp) - to_ns(in.stamp)) <= 5'000);
+    RC_ASSERT((out.tilt.up_B - in.tilt.up_B).norm() < 5e-5);
+    for (std::size_t i = 0; i < out.imu.size(); ++i) {
+      const ImuSample& sent = in.imu[out.imu.size() - 1 - i];  // newest first
+      RC_ASSERT(std::abs(to_ns(out.imu[i].stamp) - to_ns(sent.stamp)) <= 5'000);
+      RC_ASSERT((out.imu[i].gyro_radps - sent.gyro_radps).norm() < 4e-4);
+      RC_ASSERT((out.imu[i].accel_mps2 - sent.accel_mps2).norm() < 2e-3);
+    }
+    for (const auto& b : out.bearings) {
+      const auto original =
+          std::find_if(in.bearings.begin(), in.bearings.end(), [&](const Bearing& candidate) {
+            return candidate.neighbor == b.neighbor &&
+                   std::abs(to_ns(candidate.stamp) - to_ns(b.stamp)) <= 5'000;
+          });
+      RC_ASSERT(original != in.bearings.end());
+      RC_ASSERT((b.u_B - original->u_B).norm() < 5e-5);
+      RC_ASSERT((b.p_B_C - original->p_B_C).norm() < 1e-6);
+      RC_ASSERT(std::abs(b.sigma_rad / original->sigma_rad - 1) < 0.03);
+    }
+    for (std::size_t i = 0; i < out.estimates.size(); ++i) {
+      const Pose& a = in.estimates[i].T_B_N.pose;
+      const Pose& b = out.estimates[i].T_B_N.pose;
+      RC_ASSERT(pose_difference(a, b).norm() < 1e-4);
+      const Matrix6d& P = in.estimates[i].T_B_N.covariance;
+      RC_ASSERT((out.estimates[i].T_B_N.covariance - P).norm() < 2e-3 * P.norm());
+    }
+  }));
+}
+
+TEST(PeerMessage, KeepsTheStampInEveryCopyOfAMeasurement) {
+  EXPECT_TRUE(rc::check([] {
+    OutgoingPeerMessage message = full_message(1);
+    const Duration later{*rc::gen::inRange<std::int64_t>(0, 100'000'000)};
+    const auto first = decode_peer_message(encode_peer_message(message).bytes);
+    message.sent += later;
+    const auto second = decode_peer_message(encode_peer_message(message).bytes);
+    RC_ASSERT(first && second);
+    RC_ASSERT(first->report.imu.front().stamp == second->report.imu.front().stamp);
+    RC_ASSERT(first->report.bearings.front().stamp == second->report.bearings.front().stamp);
+  }));
+}
+
+TEST(PeerMessage, KeepsCovariancesPositiveHoweverCorrelated) {
+  EXPECT_TRUE(rc::check([] {
+    std::mt19937 random(*rc::gen::arbitrary<std::uint32_t>());
+    const Eigen::Vector3d a = random_vector(random, 1);
+    Vector6d direction;
+    direction << a, random_vector(random, 1);
+    const Matrix6d P = direction * direction.transpose() + 1e-4 * Matrix6d::Identity();
+    const auto code = encode_covariance(P);
+    RC_ASSERT(code.has_value());
+    const Matrix6d decoded = *decode_covariance(*code);
+    RC_ASSERT(Eigen::SelfAdjointEigenSolver<Matrix6d>(decoded).eigenvalues().minCoeff() > 0);
+    RC_ASSERT((decoded - P).norm() < 2e-3 * P.norm());
+  }));
+}
+
+TEST(PeerMessage, RefusesEveryTruncation) {
+  const auto bytes = encode_peer_message(full_message(3)).bytes;
+
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_FALSE(decode_peer_message(std::span(bytes).first(size)).has_value()) << size;
+}
+
+TEST(PeerMessage, RefusesEveryDamagedByte) {
+  const auto bytes = encode_peer_message(full_message(3)).bytes;
+
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    for (const int flip : {0x01, 0x80, 0xFF}) {
+      auto damaged = bytes;
+      damaged[i] ^= static_cast<std::uint8_t>(flip);
+      EXPECT_FALSE(decode_peer_message(damaged).has_value()) << i;
+    }
+}
+
+TEST(PeerMessage, DecodesToFiniteValuesOrNotAtAllWhateverASenderSeals) {
+  const auto body = body_of(full_message(3));
+
+  for (std::size_t i = 0; i < body.size(); ++i)
+    for (const int value : {0x00, 0x01, 0x7F, 0x80, 0xFF}) {
+      auto odd = body;
+      odd[i] = static_cast<std::uint8_t>(value);
+      const auto message = decode_peer_message(resealed(odd));
+      EXPECT_TRUE(!message || is_finite(*message)) << i;
+    }
+  for (std::size_t size = 4; size < body.size(); ++size)
+    EXPECT_FALSE(decode_peer_message(resealed({body.begin(), body.begin() + long(size)})));
+}
+
+TEST(PeerMessage, SurvivesRandomBytesBehindAValidSeal) {
+  EXPECT_TRUE(rc::check([] {
+    auto body = *rc::gen::container<std::vector<std::uint8_t>>(rc::gen::arbitrary<std::uint8_t>());
+    const std::vector<std::uint8_t> preamble{'C', 'R', 'P', 1, 2, 0};
+    body.insert(body.begin(), preamble.begin(), preamble.end());
+    const auto message = decode_peer_message(resealed(body));
+    const bool is_sound = !message || is_finite(*message);  // RC_ASSERT's own || evaluates both
+    RC_ASSERT(is_sound);
+  }));
+}
+
+TEST(PeerMessage, ReturnsTheFirstError) {
+  const auto body = body_of(full_message(1));
+  const auto with = [&](std::size_t at, std::initializer_list<int> values) {
+    auto odd = body;
+    for (const int value : values) odd[at++] = static_cast<std::uint8_t>(value);
+    return fault_of(resealed(odd));
+  };
+  auto longer = body;
+  longer.push_back(0);
+
+  EXPECT_EQ(fault_of({}), PeerMessageError::kTooShort);
+  EXPECT_EQ(fault_of(std::vector<std::uint8_t>(1401)), PeerMessageError::kTooLong);
+  EXPECT_EQ(fault_of(std::vector<std::uint8_t>(100)), PeerMessageError::kForeign);
+  EXPECT_EQ(with(3, {2}), PeerMessageError::kOtherVersion);
+  EXPECT_EQ(fault_of(body), PeerMessageError::kDamaged);
+  EXPECT_EQ(fault_of(resealed({body.begin(), body.end() - 1})), PeerMessageError::kTruncated);
+  EXPECT_EQ(fault_of(resealed(longer)), PeerMessageError::kTrailingBytes);
+  EXPECT_EQ(with(4, {0, 0}), PeerMessageError::kBadId);
+  EXPECT_EQ(with(21, {0x7F}), PeerMessageError::kBadStamp);
+  EXPECT_EQ(with(30, {0x00, 0x80}), PeerMessageError::kNotUnit);
+  EXPECT_EQ(with(34, {0, 0, 0xC0, 0x7F}), PeerMessageError::kNotFinite);
+  EXPECT_EQ(with(34, {0, 0, 0, 0}), PeerMessageError::kOutOfRange);
+  EXPECT_EQ(with(body.size() - 2, {0xFF, 0x7F}), PeerMessageError::kBadCovariance);
+}
+
+TEST(PeerMessage, OmitsAndCountsWhatCannotBeEncoded) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  OutgoingPeerMessage message = full_message(1, 1, 2);
+  const auto fine = encode_peer_message(message);
+  message.report.imu[0].gyro_radps.x() = kNan;
+  message.report.bearings[0].u_B = Eigen::Vector3d::Zero();
+  message.report.ranges[0].range_m = -1.0;
+  message.report.estimates[0].T_B_N.covariance.setZero();
+  message.report.imu[1].stamp -= milliseconds{400};
+  message.report.tilt.sigma_rad = kNan;
+
+  const auto encoded = encode_peer_message(message);
+  const auto decoded = decode_peer_message(encoded.bytes);
+
+  ASSERT_TRUE(decoded.has_value());
+  EXPECT_EQ(encoded.refused, 4U);
+  EXPECT_EQ(fine.refused, 0U);
+  EXPECT_EQ(decoded->report.bearings.size(), 1U);
+  EXPECT_EQ(decoded->report.ranges.size(), 7U);
+  EXPECT_TRUE(decoded->report.estimates.empty());
+  EXPECT_GT(decoded->report.tilt.sigma_rad, 3.0);  // unknown
+}
+
+}  // namespace
+}  // namespace crepes

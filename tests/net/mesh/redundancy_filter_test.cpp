@@ -1,0 +1,30 @@
+#include "net/mesh/redundancy_filter.hpp"
+
+#include <gtest/gtest.h>
+
+namespace crepes {
+namespace {
+
+using std::chrono::milliseconds;
+
+TEST(RedundancyFilter, PassesABoardAndItsMirrorImageOnceEach) {
+  PeerReport report;
+  report.stamp = PeerTimestamp{milliseconds{1000}};
+  const BasicBearing<PeerTimestamp> board{report.stamp, RobotId{1}, Eigen::Vector3d::UnitX(),
+                                          Eigen::Vector3d::Zero(), 0.001};
+  BasicBearing<PeerTimestamp> image = board;
+  image.u_B = Eigen::Vector3d(1.0, 0.0, -0.1).normalized();
+  report.bearings = {board, image, board};
+  RedundancyFilter filter;
+
+  PeerReport first = report;
+  filter.remove_repeated(first);
+  PeerReport again = report;
+  filter.remove_repeated(again);
+
+  EXPECT_EQ(first.bearings.size(), 2U);
+  EXPECT_TRUE(again.bearings.empty());
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,72 @@
+#include "tests/study/liar.hpp"
+
+#include "estimator/core/constants.hpp"
+
+namespace crepes::study {
+namespace {
+
+constexpr double kWrong = 2.0;           // m
+constexpr double kClaimedSigma = 0.001;  // m and rad
+constexpr double kTooLong = 1.0;         // m
+constexpr Duration kStampedLate = std::chrono::milliseconds(20);
+
+/// The robot goes by a camera that points elsewhere than the one that made the recording.
+void turn_camera(Config& config, double angle_rad) {
+  const Pose turn{Eigen::Vector3d::Zero(),
+                  Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()))};
+  for (CameraConfig& camera : config.cameras)
+    camera.calibration.T_cam_imu = camera.calibration.T_cam_imu * turn;
+}
+
+void stamp_late(RobotRecording& robot) {
+  for (ImuSample& sample : robot.imu) sample.stamp += kStampedLate;
+  for (UwbRange& range : robot.ranges) range.stamp += kStampedLate;
+  for (CameraRecording& camera : robot.cameras) {
+    for (SpotFrame& frame : camera.spots) frame.stamp += kStampedLate;
+    for (RecordedImage& image : camera.images) image.stamp += kStampedLate;
+  }
+}
+
+void lengthen(RobotRecording& robot, RobotId liar) {
+  for (UwbRange& range : robot.ranges)
+    if (robot.robot.id == liar || range.neighbor == liar) range.range_m += kTooLong;
+}
+
+void corrupt(Lie lie, RobotRecording& robot) {
+  switch (lie) {
+    case Lie::kEstimates:
+    case Lie::kAntennaDelay:
+      return;
+    case Lie::kCamera5:
+      return turn_camera(robot.config, radians(5.0));
+    case Lie::kCamera20:
+      return turn_camera(robot.config, radians(20.0));
+    case Lie::kClock:
+      return stamp_late(robot);
+    case Lie::kRanges:
+      return lengthen(robot, robot.robot.id);
+  }
+}
+
+}  // namespace
+
+void corrupt(Lie lie, RobotId robot, SwarmDataset& dataset) {
+  for (RobotRecording& recording : dataset.robots) {
+    if (recording.robot.id == robot) corrupt(lie, recording);
+    if (lie == Lie::kAntennaDelay) lengthen(recording, robot);
+  }
+}
+
+std::function<void(Report&)> corrupted_reports(Lie lie, RobotId robot) {
+  if (lie != Lie::kEstimates) return {};
+  return [robot](Report& report) {
+    if (report.sender != robot) return;
+    for (NeighborEstimate& estimate : report.estimates) {
+      // Each along another axis: one offset of all would be an error of the liar's place alone.
+      estimate.T_B_N.pose.p(estimate.neighbor.value % 3) += kWrong;
+      estimate.T_B_N.covariance = kClaimedSigma * kClaimedSigma * Matrix6d::Identity();
+    }
+  };
+}
+
+}  // namespace crepes::study

@@ -1,0 +1,1 @@
+// CMake wants a source in every target; see precompiled.hpp.
