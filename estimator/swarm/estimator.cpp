@@ -264,10 +264,10 @@ GraphProblem Estimator::State::graph_problem(const std::vector<NeighborEstimate>
   return graph_builder.build(stamp, id, own, [this](RobotId robot) { return imu_of(robot); });
 }
 
-/// What was measured until the lag before `now`. Empty for a team of two: it has nothing to share.
+/// What was measured until a lag before `now`. Empty for a team of two: it has nothing to share.
 std::optional<TeamInterval> Estimator::State::team_interval(Timestamp now) {
   const auto imus = [this](RobotId robot) { return imu_of(robot); };
-  auto interval = team_intake.drain(id, now - filters.lag, swarm, filters, imus);
+  auto interval = team_intake.drain(id, now, swarm, filters, imus);
   if (!interval || interval->members.size() < 3) return std::nullopt;
   interval->settings.max_robots = team_size;
   interval->edges = graph_builder.build(interval->to, id, {}, imus).edges;

@@ -29,7 +29,7 @@ struct EstimatorConfig {
     v.choice("profile", profile, kProfiles,
              "tight: fuses every measurement by itself; paper: fuses raw poses");
     v.field("lag_ms", lag_ms, Bounds{5, 1000},
-            "how long to wait for late measurements; poses do not wait");
+            "the least time to wait for late measurements; the longest is 500; poses do not wait");
     v.field("output_rate_hz", output_rate_hz, Bounds{1, 200}, "poses per second");
     v.field("camera_misalignment_deg", camera_misalignment_deg, Bounds{0, 10},
             "error of T_cam_imu's rotation, one sigma");

@@ -20,7 +20,6 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
     : id_(neighbor.id),
       name_(neighbor.name),
       self_id_(self.id),
-      lag_(settings.lag),
       recent_(settings.recent),
       forget_(settings.forget),
       intake_(neighbor.id, settings),
@@ -29,7 +28,6 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
       publisher_(neighbor.id, mounting_of(self, neighbor), settings) {}
 
 void Neighbor::reconfigure(const FilterSettings& settings) {
-  lag_ = settings.lag;
   recent_ = settings.recent;
   forget_ = settings.forget;
   intake_.reconfigure(settings);
@@ -73,8 +71,9 @@ void Neighbor::add_report(const ReceivedReport& received, const RobotState& self
 }
 
 void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
-  const bool sighted = !hypotheses_.empty() &&
-                       stamp - hypotheses_.leader().heaviest().last_sighting() <= recent_ + lag_;
+  const bool sighted =
+      !hypotheses_.empty() &&
+      stamp - hypotheses_.leader().heaviest().last_sighting() <= recent_ + intake_.buffer().lag();
   if (sighted) {
     publisher_.add_graph_correction(stamp, pose);
   } else if (!body_.lacks_imu(stamp)) {
@@ -126,7 +125,7 @@ void Neighbor::fuse_released(Timestamp now, const RobotState& self) {
   hypotheses_.prune();
   // Without readings the filter advances too: IMU samples are kept for a limited time, and the cost
   // of a prediction must not grow with the silence.
-  const Timestamp latest_start = now - lag_ - kMaxBehind;
+  const Timestamp latest_start = now - buffer.lag() - kMaxBehind;
   if (can_move && !hypotheses_.empty() && hypotheses_.stamp() < latest_start)
     hypotheses_.advance_to(latest_start, self.imu, body_.imu);
 }

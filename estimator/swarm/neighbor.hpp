@@ -49,7 +49,6 @@ class Neighbor {
   RobotId id_;
   std::string name_;
   RobotId self_id_;
-  Duration lag_;
   Duration recent_;
   Duration forget_;
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr Duration kMaxAge = std::chrono::milliseconds{20};  // of a published state
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
-constexpr Duration kTeamLife = std::chrono::milliseconds{500};
+constexpr Duration kTeamLife = std::chrono::milliseconds{800};  // the longest lag, and a solution
 
 }  // namespace
 
@@ -98,14 +98,15 @@ void PosePublisher::update_team(Timestamp now, const RobotState& self, const Rob
       predicted(team_->pose, {self.imu, neighbor.imu, team_->bias_B, team_->bias_N}, team_->stamp,
                 stamp, noise_);
   const auto is_recent = [&](Timestamp t) { return stamp - t <= recent_; };
+  const bool team_sees = team_->stamp - team.last_sighting <= recent_;
   const Timestamp sighted = std::max(last.seen, last.seen_by);
   NeighborPose pose;
   pose.neighbor = neighbor_;
   pose.stamp = stamp;
   pose.published = now;
-  pose.mode = is_recent(sighted)              ? PoseMode::kDirect
-              : is_recent(team.last_sighting) ? PoseMode::kGraph
-                                              : PoseMode::kPredicted;
+  pose.mode = is_recent(sighted) ? PoseMode::kDirect
+              : team_sees        ? PoseMode::kGraph
+                                 : PoseMode::kPredicted;
   pose.T_B_N.pose = team.T_B_N;
   const auto& P = team.covariance;
   pose.T_B_N.covariance << P.topLeftCorner<3, 3>(), P.topRightCorner<3, 3>(),

@@ -11,7 +11,7 @@ void ReadingIntake::reconfigure(const FilterSettings& settings) {
   // The waiting readings are meant for the filter of the former profile.
   if (settings.profile != settings_.profile) buffer_.clear();
   settings_ = settings;
-  buffer_.set_lag(settings.lag);
+  buffer_.set_least_lag(settings.lag);
 }
 
 void ReadingIntake::add_report_stamp(Timestamp stamp) {

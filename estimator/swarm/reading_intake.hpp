@@ -38,6 +38,7 @@ class ReadingIntake {
 
   [[nodiscard]] const LastContact& last_contact() const { return last_; }
   [[nodiscard]] ReorderBuffer& buffer() { return buffer_; }
+  [[nodiscard]] const ReorderBuffer& buffer() const { return buffer_; }
   [[nodiscard]] OutcomeLog& outcomes() { return outcomes_; }
   [[nodiscard]] const OutcomeLog& outcomes() const { return outcomes_; }
 

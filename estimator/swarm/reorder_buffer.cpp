@@ -6,6 +6,9 @@
 namespace crepes {
 
 bool ReorderBuffer::push(Measurement measurement) {
+  // A pose of the graph is no reading: it is late because it took time to estimate.
+  if (measurement.kind != MeasurementKind::kGraphPose && now_ > Timestamp::min())
+    lag_.add(now_ - measurement.stamp);
   if (measurement.stamp < released_) return false;
   const auto place = std::upper_bound(
       pending_.begin(), pending_.end(), measurement.stamp,
@@ -19,7 +22,8 @@ bool ReorderBuffer::push(Measurement measurement) {
 }
 
 std::span<const Measurement> ReorderBuffer::pop_ready(Timestamp now) {
-  if (pending_.empty() || pending_.front().stamp > now - lag_) return {};
+  now_ = now;
+  if (pending_.empty() || pending_.front().stamp > now - lag_.value()) return {};
   released_ = pending_.front().stamp;
   const auto count = static_cast<std::ptrdiff_t>(leading_group(pending_).size());
   ready_.assign(pending_.begin(), pending_.begin() + count);

@@ -50,6 +50,7 @@ void TeamIntake::add_report(const Report& report, double turn_sigma_rad, const S
   for (Bearing bearing : report.bearings) {
     if (!is_other_member(bearing.neighbor, report.sender, swarm)) continue;
     bearing.sigma_rad = std::max(std::hypot(bearing.sigma_rad, turn_sigma_rad), kLeastBearingSigma);
+    note_delay(bearing.stamp);
     if (bearings_.size() < kMaxWaiting) bearings_.push_back({report.sender, bearing});
   }
   for (const UwbRange& range : report.ranges) {
@@ -70,16 +71,24 @@ void TeamIntake::add_own_report(const Report& report, const SwarmConfig& swarm,
   add_report(news, 0.0, swarm, settings);
 }
 
+void TeamIntake::note_delay(Timestamp stamp) {
+  if (now_ != kNever) lag_.add(now_ - stamp);
+}
+
 void TeamIntake::add_range(RobotId observer, const UwbRange& range,
                            const FilterSettings& settings) {
+  note_delay(range.stamp);
   if (ranges_.size() >= kMaxWaiting) return;
   if (!screens_[pair_of(observer, range.neighbor)].accepts(range, settings)) return;
   ranges_.push_back(
       {observer, range.neighbor, range.stamp, {range.range_m, settings.range_sigma_m}});
 }
 
-std::optional<TeamInterval> TeamIntake::drain(RobotId self, Timestamp to, const SwarmConfig& swarm,
+std::optional<TeamInterval> TeamIntake::drain(RobotId self, Timestamp now, const SwarmConfig& swarm,
                                               const FilterSettings& settings, const ImuOf& imu_of) {
+  now_ = now;
+  lag_.set_least(settings.lag);
+  const Timestamp to = now - lag_.value();
   if (to <= last_) return std::nullopt;
   TeamInterval interval;
   interval.self = self;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/core/swarm_config.hpp"
+#include "estimator/swarm/adaptive_lag.hpp"
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/neighbor_track.hpp"
 #include "estimator/swarm/range_screen.hpp"
@@ -30,14 +31,15 @@ class TeamIntake {
   void add_own_report(const Report& report, const SwarmConfig& swarm,
                       const FilterSettings& settings);
 
-  /// The interval since the last one until `to`. Measurements of it that arrive later are lost.
-  /// Empty if `to` is not after the last one: a reload may have made the lag longer.
-  [[nodiscard]] std::optional<TeamInterval> drain(RobotId self, Timestamp to,
+  /// The interval since the last one until the lag before `now`. Measurements of it that arrive
+  /// later are lost; the lag follows their delays. Empty while it grows as fast as the time.
+  [[nodiscard]] std::optional<TeamInterval> drain(RobotId self, Timestamp now,
                                                   const SwarmConfig& swarm,
                                                   const FilterSettings& settings,
                                                   const ImuOf& imu_of);
 
  private:
+  void note_delay(Timestamp stamp);
   void add_range(RobotId observer, const UwbRange& range, const FilterSettings& settings);
 
   std::vector<TeamBearing> bearings_;
@@ -45,6 +47,8 @@ class TeamIntake {
   std::map<std::pair<RobotId, RobotId>, RangeScreen> screens_;
   Timestamp own_newest_ = kNever;
   Timestamp last_ = kNever;
+  AdaptiveLag lag_{Duration::zero()};
+  Timestamp now_ = kNever;  ///< of the last interval
 };
 
 }  // namespace crepes

@@ -134,7 +134,7 @@ void record_swarm(const fs::path& dir, const RecordingOptions& options) {
   SwarmManifest manifest;
   manifest.scenario = "simulated";
   manifest.duration_s = options.duration_s;
-  manifest.network = {3.0, 3.0, 0.02, static_cast<std::uint64_t>(options.seed)};
+  manifest.network = {options.latency_ms, 3.0, 0.02, static_cast<std::uint64_t>(options.seed)};
   for (const DemoRobot& robot : swarm) {
     const RobotId id = robot.config.robot.id;
     const std::string name = "r" + std::to_string(id.value);

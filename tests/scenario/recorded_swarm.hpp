@@ -18,10 +18,11 @@ struct RecordingOptions {
   int seed = 1;
   double duration_s = 10.0;
   SpotSource spots = SpotSource::kPictures;
+  double latency_ms = 3.0;  ///< the least of a datagram
 };
 
-/// Writes a whole data set with truth to `dir`: clocks seconds apart, 3 to 6 ms of latency, 2 %
-/// loss.
+/// Writes a whole data set with truth to `dir`: clocks seconds apart, up to 3 ms more than the
+/// latency, 2 % loss.
 void record_swarm(const std::filesystem::path& dir, const RecordingOptions& options);
 
 }  // namespace crepes::test

@@ -147,6 +147,17 @@ TEST_F(Replay, HiddenNeighborsAreReachedThroughOthers) {
   }
 }
 
+TEST_F(Replay, AMeshSlowerThanTheLagStillGivesPoses) {
+  record("slow", {.scenario = SimScenario::kLine, .duration_s = 10.0, .latency_ms = 200.0});
+
+  const SwarmScore score = replay(path("slow"), "out", Profile::kTight);
+
+  EXPECT_EQ(score.pairs.size(), 12U);
+  expect_sound(score, 1e-3);
+  for (const ScoredPair& pair : score.pairs)
+    EXPECT_LT(statistics_of(pair.score.position_errors_m).rmse, 0.2) << name_of(pair);
+}
+
 TEST_F(Replay, PicturesGiveThePosesOfIdealSpots) {
   record("pictures", {.seed = 5, .duration_s = 8.0, .spots = SpotSource::kPictures});
   record("projected", {.seed = 5, .duration_s = 8.0, .spots = SpotSource::kProjection});

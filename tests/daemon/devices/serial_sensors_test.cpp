@@ -140,9 +140,13 @@ TEST_F(SerialSensors, FindTheSameDeviceAgainUnderAnotherTty) {
   std::filesystem::remove(link);
   EXPECT_EQ(sensor.open().error().code, ErrorCode::kNotFound);
 
-  const auto other = PseudoTerminal::open();  // it receives the number that is free now
-  line_ = std::make_unique<PseudoTerminal>(std::move(*PseudoTerminal::open()));
-  ASSERT_NE(line_->path(), config_.imu.device.port);
+  // Two terminals under other numbers than the first; one of these may receive its number.
+  std::vector<PseudoTerminal> others;
+  while (others.size() < 2 || others.back().path() == config_.imu.device.port)
+    others.push_back(std::move(*PseudoTerminal::open()));
+  line_ = std::make_unique<PseudoTerminal>(std::move(others.back()));
+  others.pop_back();
+  const PseudoTerminal* other = &others.back();
   std::filesystem::create_symlink(other->path(), scratch->path() / "usb-other");
   std::filesystem::create_symlink(line_->path(), link);
   device = open(sensor);

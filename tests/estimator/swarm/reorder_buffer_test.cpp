@@ -4,6 +4,7 @@
 #include <rapidcheck.h>
 
 #include <algorithm>
+#include <map>
 #include <vector>
 
 namespace crepes {
@@ -42,6 +43,42 @@ TEST(ReorderBuffer, RefusesWhatComesAfterAYoungerOneWasReleased) {
 
   EXPECT_FALSE(buffer.push(at(19ms)));
   EXPECT_TRUE(buffer.push(at(20ms)));
+}
+
+// Readings arrive every 10 ms, and a reading's delay depends on its number.
+template <class Delay>
+std::size_t count_late(ReorderBuffer& buffer, Timestamp begin, int count, const Delay& delay) {
+  std::map<Timestamp, Duration> arrivals;
+  for (int i = 0; i < count; ++i) arrivals[begin + i * 10ms + delay(i)] = begin + i * 10ms - begin;
+  std::size_t late = 0;
+  for (const auto& [arrival, measured] : arrivals) {
+    if (!buffer.push(at(begin.time_since_epoch() + measured))) ++late;
+    (void)release_all(buffer, arrival);
+  }
+  return late;
+}
+
+TEST(ReorderBuffer, WaitsLongerWhereReadingsArriveLaterAndShorterAgain) {
+  ReorderBuffer buffer(50ms);
+  // Up to 200 ms, in any order.
+  const auto slow = [](int i) { return Duration{i * 7919 % 200 * 1ms}; };
+  const auto fast = [](int) { return Duration{5ms}; };
+
+  (void)count_late(buffer, Timestamp{1s}, 1000, slow);
+  EXPECT_LT(count_late(buffer, Timestamp{20s}, 1000, slow), 30U);
+  EXPECT_GT(buffer.lag(), 180ms);
+  EXPECT_LT(buffer.lag(), 220ms);
+
+  EXPECT_EQ(count_late(buffer, Timestamp{40s}, 10'000, fast), 0U);
+  EXPECT_EQ(buffer.lag(), 50ms);
+}
+
+TEST(ReorderBuffer, WaitsNoLongerThanHalfASecondWhateverArrives) {
+  ReorderBuffer buffer(50ms);
+
+  (void)count_late(buffer, Timestamp{1000s}, 5000, [](int i) { return Duration{i % 2 * 900s}; });
+
+  EXPECT_LE(buffer.lag(), 500ms);
 }
 
 TEST(ReorderBuffer, KeepsTheOrderOfArrivalAmongEqualStamps) {
