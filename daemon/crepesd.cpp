@@ -9,6 +9,7 @@
 #include "daemon/runtime.hpp"
 #include "daemon/service/logging.hpp"
 #include "daemon/service/reload.hpp"
+#include "daemon/service/robot_lock.hpp"
 #include "daemon/service/signals.hpp"
 #include "daemon/service/watchdog.hpp"
 #include "daemon/version.hpp"
@@ -28,14 +29,33 @@ int print(const Result<std::string>& text) {
   return text ? kDone : kBadInput;
 }
 
+void print_lines(const std::string& prefix, const std::vector<ConfigFault>& faults) {
+  for (const ConfigFault& fault : faults) std::cerr << prefix << to_string(fault) << '\n';
+  std::cerr << std::flush;
+}
+
+int check(const std::string& file, bool strict) {
+  const CheckedConfig checked = check_config(file);
+  print_lines("", checked.faults);
+  print_lines("warning: ", checked.warnings);
+  if (!checked.faults.empty() || (strict && !checked.warnings.empty())) return kBadInput;
+  return print(file + ": good\n");
+}
+
 int run(const std::string& file) {
-  Result<Config> config = load_config(file);
-  if (!config) return print(tl::unexpected(config.error()));
+  CheckedConfig checked = check_config(file);
+  print_lines("", checked.faults);
+  if (!checked.faults.empty()) return kBadInput;
+  Config* const config = &checked.config;
+  const auto lock = lock_robot(config->robot.id, config->net.interface, config->net.port);
+  if (!lock) return print(tl::unexpected(lock.error()));
   const Signals signals;
   const LogSession log(config->log.level);
   const MonotonicClock machine;
   Runtime runtime(std::move(*config), machine);
   Watchdog watchdog(runtime.heartbeats());
+  for (const ConfigFault& doubt : checked.warnings)
+    log_message(LogLevel::kWarning, to_string(doubt));
   log_message(LogLevel::kInfo, "running with " + file);
   Watchdog::notify_ready();
   Timestamp next_check = machine.now() + kCheckPeriod;
@@ -62,14 +82,22 @@ int main(int argc, char** argv) {
   const auto add_file_option = [&](const std::string& name, const std::string& help) {
     return app.add_option(name, file, help)->expected(0, 1)->capture_default_str();
   };
-  add_file_option("--config", "run with this configuration; the default without any option");
-  const auto* check =
-      add_file_option("--check-config", "print every fault of the configuration and exit");
-  const auto* dump = add_file_option("--dump-config", "print the merged configuration and exit");
+  auto* run =
+      add_file_option("--config", "run with this configuration; the default without any option");
+  auto* check = add_file_option("--check-config",
+                                "print every fault and warning of the configuration and exit")
+                    ->excludes(run);
+  auto* dump = add_file_option("--dump-config", "print the merged configuration and exit")
+                   ->excludes(run)
+                   ->excludes(check);
+  bool strict = false;
+  app.add_flag("--strict", strict, "warnings are faults")->needs(check);
   bool reference = false;
-  app.add_flag("--write-reference", reference, "print a configuration with all keys and exit");
+  app.add_flag("--write-reference", reference, "print a configuration with all keys and exit")
+      ->excludes(run)
+      ->excludes(check)
+      ->excludes(dump);
   app.set_version_flag("--version", std::string(crepes::kVersion));
-  app.require_option(0, 1);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -77,7 +105,5 @@ int main(int argc, char** argv) {
   }
   if (reference) return crepes::print(crepes::reference_config());
   if (*dump) return crepes::print(crepes::load_config(file).map(crepes::write_config));
-  if (!*check) return crepes::run(file);
-  const auto confirm = [&](const crepes::Config& /*config*/) { return file + ": good\n"; };
-  return crepes::print(crepes::load_config(file).map(confirm));
+  return *check ? crepes::check(file, strict) : crepes::run(file);
 }

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr ssize_t kKeyBytes = std::tuple_size_v<MeshKey>;
+constexpr ssize_t kKeyBytes = MeshKey::kSize;
 
 tl::unexpected<Error> refuse(const fs::path& file, const std::string& reason) {
   return fail(ErrorCode::kIo, fmt::format("{}: {}", file.string(), reason));
@@ -36,9 +36,9 @@ Result<MeshKey> write_mesh_key(const fs::path& file) {
     return refuse(file, "is there already; a key that is in use is not overwritten");
   if (!fd) return refuse_for(file, errno);
   MeshKey key{};
-  randombytes_buf(key.data(), key.size());
+  randombytes_buf(key.bytes.data(), key.bytes.size());
   errno = ENOSPC;  // the likely reason for a short write
-  const bool is_whole = ::write(fd.get(), key.data(), key.size()) == kKeyBytes;
+  const bool is_whole = ::write(fd.get(), key.bytes.data(), key.bytes.size()) == kKeyBytes;
   if (is_whole && ::fsync(fd.get()) == 0) return key;
   const int error = errno;
   ::unlink(file.c_str());
@@ -59,7 +59,7 @@ Result<MeshKey> read_mesh_key(const fs::path& file) {
   if ((about.st_mode & S_IRWXO) != 0)
     return refuse(file, "is open to everybody; chmod o= " + file.string());
   MeshKey key{};
-  const ssize_t read = ::read(fd.get(), key.data(), key.size());
+  const ssize_t read = ::read(fd.get(), key.bytes.data(), key.bytes.size());
   if (read < 0) return refuse_for(file, errno);
   if (read != kKeyBytes || about.st_size != kKeyBytes) {
     return refuse(file,
@@ -71,7 +71,7 @@ Result<MeshKey> read_mesh_key(const fs::path& file) {
 
 std::string fingerprint(const MeshKey& key) {
   std::array<std::uint8_t, crypto_generichash_BYTES> hash{};
-  crypto_generichash(hash.data(), hash.size(), key.data(), key.size(), nullptr, 0);
+  crypto_generichash(hash.data(), hash.size(), key.bytes.data(), key.bytes.size(), nullptr, 0);
   std::array<char, 9> text{};
   sodium_bin2hex(text.data(), text.size(), hash.data(), 4);
   return text.data();

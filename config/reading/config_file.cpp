@@ -8,6 +8,7 @@
 
 #include "config/reading/config_reader.hpp"
 #include "config/reading/config_sources.hpp"
+#include "config/schema/plausibility.hpp"
 #include "config/schema/validation.hpp"
 #include "config/writing/config_writer.hpp"
 
@@ -30,6 +31,27 @@ void add_rule_faults(const Config& config, ReadLog& log) {
   }
 }
 
+std::vector<ConfigFault> warnings_of(const Config& config, const ConfigNode& root) {
+  std::vector<ConfigFault> warnings;
+  for (RuleFault& doubt : doubtful_settings(config)) {
+    const Place place = place_of(root, doubt.key);
+    warnings.push_back({place.file, place.line, std::move(doubt.key), std::move(doubt.reason)});
+  }
+  return warnings;
+}
+
+/// Control characters as \xNN.
+std::string escaped(std::string_view text) {
+  std::string plain;
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    constexpr unsigned char kSpace = 0x20;
+    constexpr unsigned char kDelete = 0x7f;
+    plain += code < kSpace || code == kDelete ? fmt::format("\\x{:02x}", code) : std::string(1, c);
+  }
+  return plain;
+}
+
 /// `faults` are those found while `root` was merged from its files.
 CheckedConfig read_config(const ConfigNode& root, std::vector<ConfigFault> faults) {
   CheckedConfig checked;
@@ -47,6 +69,7 @@ CheckedConfig read_config(const ConfigNode& root, std::vector<ConfigFault> fault
   std::ranges::stable_sort(
       faults, {}, [](const ConfigFault& fault) { return std::tie(fault.file, fault.line); });
   checked.faults = std::move(faults);
+  if (checked.faults.empty()) checked.warnings = warnings_of(checked.config, root);
   return checked;
 }
 
@@ -54,8 +77,8 @@ CheckedConfig read_config(const ConfigNode& root, std::vector<ConfigFault> fault
 
 std::string to_string(const ConfigFault& fault) {
   const std::string key = fault.key.empty() ? "" : fault.key + ": ";
-  if (fault.line <= 0) return fmt::format("{}: {}{}", fault.file, key, fault.reason);
-  return fmt::format("{}:{}: {}{}", fault.file, fault.line, key, fault.reason);
+  const std::string line = fault.line <= 0 ? "" : fmt::format("{}:", fault.line);
+  return escaped(fmt::format("{}:{} {}{}", fault.file, line, key, fault.reason));
 }
 
 CheckedConfig check_config_text(const std::string& text, const std::string& file) {

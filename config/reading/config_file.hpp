@@ -18,13 +18,14 @@ struct ConfigFault {
   std::string reason;
 };
 
-/// `file:line: key: reason`
+/// `file:line: key: reason`, in one line whatever the file contains.
 [[nodiscard]] std::string to_string(const ConfigFault& fault);
 
 /// A file as read. `config` is valid only when there are no faults, and must not be used otherwise.
 struct CheckedConfig {
   Config config;
-  std::vector<ConfigFault> faults;  ///< in order of their lines
+  std::vector<ConfigFault> faults;    ///< in order of their lines
+  std::vector<ConfigFault> warnings;  ///< what can hardly be meant; none if there are faults
 };
 
 [[nodiscard]] CheckedConfig check_config_text(const std::string& text, const std::string& file);

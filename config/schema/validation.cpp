@@ -1,12 +1,15 @@
 #include "config/schema/validation.hpp"
 
 #include <fmt/core.h>
+#include <net/if.h>
+#include <sys/un.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "estimator/vision/camera_model.hpp"
@@ -143,6 +146,8 @@ void check_members(const Config& config, RuleFaults& faults) {
   }
 }
 
+constexpr double kMostArm_m = 5.0;  // as of the members' lever arms
+
 void check_driver(const std::string& key, const CameraConfig& camera, RuleFaults& faults) {
   constexpr double kMicroseconds = 1e6;
   if (camera.device.driver == CameraDriver::kFolder && camera.device.folder.empty())
@@ -173,6 +178,9 @@ void check_cameras(const std::vector<CameraConfig>& cameras, RuleFaults& faults)
     check_name(key + ".name", cameras[i].calibration.name, faults);
     for (CalibrationFault& fault : calibration_faults(cameras[i].calibration))
       faults.push_back({fmt::format("{}.{}", key, fault.key), std::move(fault.reason)});
+    const Eigen::Vector3d& arm = cameras[i].calibration.T_cam_imu.p;
+    if (!(arm.cwiseAbs().maxCoeff() <= kMostArm_m))
+      faults.push_back({key + ".T_cam_imu", "moves by more than 5 m: the unit is metres"});
     check_driver(key, cameras[i], faults);
   }
 }
@@ -181,12 +189,46 @@ void check_imu(const ImuDeviceConfig& imu, RuleFaults& faults) {
   constexpr double kLeastVolume = 0.1;  // of the box that T makes of a unit cube
   if (!imu.T_body_imu.p.isZero(0.0))
     faults.push_back({"imu.T_body_imu", "the body's origin is the IMU: the last column must be 0"});
-  const auto check_triad = [&](const std::string& key, const TriadConfig& triad) {
+  const auto check_triad = [&](const std::string& key, const TriadConfig& triad, double most) {
+    if (!(triad.bias.cwiseAbs().maxCoeff() <= most))
+      faults.push_back({key + ".bias", fmt::format("no sensor is off by more than {}", most)});
     if (triad.misalignment.determinant() >= kLeastVolume) return;
     faults.push_back({key + ".misalignment", "mirrors or flattens: its determinant is below 0.1"});
   };
-  check_triad("imu.accelerometer", imu.accelerometer);
-  check_triad("imu.gyroscope", imu.gyroscope);
+  constexpr double kMostAccelBias = 20.0;  // m/s^2
+  constexpr double kMostGyroBias = 2.0;    // rad/s
+  check_triad("imu.accelerometer", imu.accelerometer, kMostAccelBias);
+  check_triad("imu.gyroscope", imu.gyroscope, kMostGyroBias);
+}
+
+/// Bytes that the kernel takes for a name; the last one ends it.
+bool is_name_of_at_most(std::size_t bytes, const std::string& name) {
+  return name.size() < bytes && name.find('\0') == std::string::npos;
+}
+
+void check_ports(const Config& config, RuleFaults& faults) {
+  if (!config.imu.device.port.empty() && config.imu.device.port == config.uwb.device.port)
+    faults.push_back({"uwb.port", "is imu.port: each needs a line of its own"});
+  if (!is_name_of_at_most(sizeof(sockaddr_un::sun_path), config.recording.socket))
+    faults.push_back({"recording.socket", "a socket's path has at most 107 bytes, none of them 0"});
+}
+
+void check_listen(const std::vector<std::string>& listen, RuleFaults& faults) {
+  std::set<Endpoint> known;
+  for (const std::string& address : listen) {
+    const auto endpoint = Endpoint::parse(address, 1);
+    const bool is_any = address == "0.0.0.0" || address == "::";
+    const auto refuse = [&](const char* reason) {
+      faults.push_back({"subscription.listen", fmt::format("\"{}\" {}", address, reason)});
+    };
+    if (!endpoint) {
+      refuse("is not a numeric IPv4 or IPv6 address");
+    } else if (!is_any && !endpoint->is_unicast()) {
+      refuse("is no host's address");
+    } else if (!known.insert(*endpoint).second) {
+      refuse("is listed twice");
+    }
+  }
 }
 
 void check_push(const std::string& key, const PushConfig& push, const Config& config,
@@ -205,12 +247,11 @@ void check_push(const std::string& key, const PushConfig& push, const Config& co
 void check_network(const Config& config, RuleFaults& faults) {
   if (config.net.port == config.subscription.port)
     faults.push_back({"subscription.port", "is taken by net.port"});
-  for (const std::string& address : config.subscription.listen) {
-    if (!Endpoint::parse(address, 0)) {
-      faults.push_back({"subscription.listen",
-                        fmt::format("\"{}\" is not a numeric IPv4 or IPv6 address", address)});
-    }
-  }
+  const std::string& interface = config.net.interface;
+  if (interface.empty() || !is_name_of_at_most(IF_NAMESIZE, interface) ||
+      interface.find_first_of("/ \t\n") != std::string::npos)
+    faults.push_back({"net.interface", "an interface's name has 1 to 15 letters, no / or space"});
+  check_listen(config.subscription.listen, faults);
   const std::vector<PushConfig>& push = config.subscription.push;
   if (push.size() > kMaxPush) faults.push_back({"subscription.push", "more than 8"});
   for (std::size_t i = 0; i < push.size(); ++i)
@@ -225,6 +266,7 @@ std::vector<RuleFault> validate(const Config& config) {
   check_cameras(config.cameras, faults);
   check_imu(config.imu.device, faults);
   check_network(config, faults);
+  check_ports(config, faults);
   if (config.vision.min_area_px2 >= config.vision.max_area_px2)
     faults.push_back({"vision.max_area_px2", "must be above min_area_px2"});
   return faults;

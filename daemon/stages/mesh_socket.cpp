@@ -1,5 +1,7 @@
 #include "daemon/stages/mesh_socket.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
@@ -56,6 +58,22 @@ void KeyMismatchMonitor::update(const PeerLink& link) {
   const std::string before =
       std::exchange(fault_, received > 0 && unopened == received ? kOtherKey : "");
   if (!fault_.empty() && before.empty()) log_message(LogLevel::kWarning, "mesh: " + fault_);
+}
+
+void DoubledIdMonitor::update(const PeerLink& link, const Endpoint& from, Timestamp arrival) {
+  const std::optional<DoubledId>& doubled = link.doubled_id();
+  if (!doubled || doubled->last != arrival) return;
+  const bool is_new = fault(arrival).empty();
+  last_ = arrival;
+  fault_ =
+      fmt::format("a second robot uses id {}: it sends from {}; give each robot its own robot.id",
+                  doubled->robot.value, from.to_string());
+  if (is_new) log_message(LogLevel::kError, "mesh: " + fault_);
+}
+
+std::string DoubledIdMonitor::fault(Timestamp now) const {
+  constexpr Duration kMemory = std::chrono::seconds{5};
+  return last_ && now - *last_ < kMemory ? fault_ : "";
 }
 
 }  // namespace crepes

@@ -9,6 +9,7 @@
 
 #include "estimator/core/result.hpp"
 #include "estimator/core/time.hpp"
+#include "net/endpoint.hpp"
 #include "net/mesh/mesh_config.hpp"
 #include "net/mesh/packet_seal.hpp"
 #include "net/mesh/peer_link.hpp"
@@ -56,6 +57,19 @@ class KeyMismatchMonitor {
  private:
   std::uint64_t received_ = 0;
   std::uint64_t unopened_ = 0;
+  std::string fault_;
+};
+
+/// Detects that two robots use one id.
+class DoubledIdMonitor {
+ public:
+  /// Call after each datagram, with its sender's address and arrival.
+  void update(const PeerLink& link, const Endpoint& from, Timestamp arrival);
+  /// The current fault; empty without one. It lasts five seconds longer than its cause.
+  [[nodiscard]] std::string fault(Timestamp now) const;
+
+ private:
+  std::optional<Timestamp> last_;
   std::string fault_;
 };
 

@@ -81,7 +81,9 @@ class NetLoop {
   }
 
   [[nodiscard]] std::string mesh_fault() const {
-    return mesh_.fault().empty() ? key_monitor_.fault() : mesh_.fault();
+    const std::string doubled = doubled_ids_.fault(clock_.now());
+    if (!mesh_.fault().empty()) return mesh_.fault();
+    return doubled.empty() ? key_monitor_.fault() : doubled;
   }
 
   /// Sends the status line to systemd if it has changed.
@@ -119,6 +121,7 @@ class NetLoop {
       if (!*datagram) return;
       if (auto report = link_.receive((*datagram)->bytes, arrival, mesh_.seal()))
         stage_.on_report(std::move(*report));
+      doubled_ids_.update(link_, (*datagram)->from, arrival);
     }
   }
 
@@ -171,6 +174,7 @@ class NetLoop {
   PeerLink link_;
   MeshSocket mesh_;
   KeyMismatchMonitor key_monitor_;
+  DoubledIdMonitor doubled_ids_;
   std::uint64_t unsent_ = 0;
   std::optional<SubscriptionServer> server_;
   EstimatorStatus estimator_;

@@ -15,6 +15,9 @@ Result<std::string> read_text(const std::filesystem::path& file, std::uintmax_t 
   constexpr std::uintmax_t kMiB = 1U << 20U;
   std::error_code status;
   if (std::filesystem::is_directory(file, status)) return fail(ErrorCode::kIo, "is a directory");
+  // Opening a pipe would block; a device may never end.
+  if (std::filesystem::exists(file, status) && !std::filesystem::is_regular_file(file, status))
+    return fail(ErrorCode::kIo, "is not a file");
   std::ifstream in(file, std::ios::binary);
   if (!in) {
     return fail(ErrorCode::kNotFound,

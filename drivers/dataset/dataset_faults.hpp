@@ -24,10 +24,15 @@ class DatasetFaults {
   [[nodiscard]] const std::map<std::string, std::uint64_t, std::less<>>& counts() const {
     return counts_;
   }
+  /// Refused rows in all.
+  [[nodiscard]] std::uint64_t total() const;
+  /// The latest one, as in `list`; empty without any.
+  [[nodiscard]] const std::string& last() const { return last_; }
   [[nodiscard]] bool empty() const { return counts_.empty(); }
 
  private:
   std::vector<std::string> list_;
+  std::string last_;
   std::map<std::string, std::uint64_t, std::less<>> counts_;
 };
 

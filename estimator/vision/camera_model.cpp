@@ -24,8 +24,14 @@ Eigen::Vector4d pinhole_of(const CameraCalibration& config) {
 
 void check_pinhole(const CameraCalibration& config, Faults& faults) {
   const Eigen::Vector4d pinhole = pinhole_of(config);
-  if (!(pinhole[0] > 0 && pinhole[1] > 0))
-    faults.push_back({"intrinsics", "focal lengths must be positive"});
+  constexpr double kShortest = 10.0;  // px
+  constexpr double kLongest = 1e5;
+  for (const double focal : {pinhole[0], pinhole[1]}) {
+    if (!(focal >= kShortest && focal <= kLongest)) {
+      faults.push_back({"intrinsics", "focal lengths are 10 to 100000 px"});
+      break;
+    }
+  }
   const auto [width, height] = config.resolution;
   if (width > 0 &&
       !(pinhole[2] >= 0 && pinhole[2] <= width && pinhole[3] >= 0 && pinhole[3] <= height))

@@ -25,6 +25,7 @@ enum class MeshCounter : std::uint8_t {
   kRefusedBadStamp,
   kRefusedClockJump,  ///< its stamps contradict the peer's clock
   kRefusedDamaged,
+  kRefusedDoubledId,  ///< of a second robot that uses a peer's id
   kRefusedDuplicate,
   kRefusedEcho,  ///< echoes, not datagrams: of a datagram that we never sent
   kRefusedForeign,
@@ -38,7 +39,8 @@ enum class MeshCounter : std::uint8_t {
   kRefusedSealMissing,
   kRefusedSealUnexpected,  ///< sealed, and we have no key
   kRefusedSealVersion,
-  kRefusedToSend,  ///< measurements of ours that cannot be encoded
+  kRefusedToSend,       ///< measurements of ours that cannot be encoded
+  kRefusedTooFarAhead,  ///< its number is further ahead than time has passed
   kRefusedTooLong,
   kRefusedTooOld,
   kRefusedTooShort,
@@ -48,7 +50,7 @@ enum class MeshCounter : std::uint8_t {
   kSent,       ///< datagrams
   kSentBytes,  ///< of those
 };
-inline constexpr std::size_t kMeshCounterCount = 32;
+inline constexpr std::size_t kMeshCounterCount = 34;
 
 /// As STATUS and report.json call it.
 [[nodiscard]] std::string_view name_of(MeshCounter counter);

@@ -3,6 +3,7 @@
 #include <sodium.h>
 
 #include <algorithm>
+#include <new>
 
 #include "estimator/core/contract.hpp"
 
@@ -15,13 +16,20 @@ constexpr std::size_t kNonce = crypto_aead_xchacha20poly1305_ietf_NPUBBYTES;
 constexpr std::size_t kTag = crypto_aead_xchacha20poly1305_ietf_ABYTES;
 
 static_assert(kMark.size() + kNonce + kTag == PacketSeal::kOverhead);
-static_assert(crypto_aead_xchacha20poly1305_ietf_KEYBYTES == std::tuple_size_v<MeshKey>);
+static_assert(crypto_aead_xchacha20poly1305_ietf_KEYBYTES == MeshKey::kSize);
+
+std::shared_ptr<const MeshKey> locked(const MeshKey& key) {
+  CREPES_EXPECT(sodium_init() >= 0, "the system has random numbers");
+  void* const memory = sodium_malloc(sizeof(MeshKey));
+  CREPES_EXPECT(memory != nullptr, "there is memory for a key");
+  return {new (memory) MeshKey(key), sodium_free};
+}
 
 }  // namespace
 
-PacketSeal::PacketSeal(const MeshKey& key) : key_(key) {
-  CREPES_EXPECT(sodium_init() >= 0, "the system has random numbers");
-}
+MeshKey::~MeshKey() { sodium_memzero(bytes.data(), bytes.size()); }
+
+PacketSeal::PacketSeal(const MeshKey& key) : key_(locked(key)) {}
 
 std::vector<std::uint8_t> PacketSeal::seal(std::span<const std::uint8_t> plain) const {
   std::vector<std::uint8_t> sealed(plain.size() + kOverhead);
@@ -29,7 +37,7 @@ std::vector<std::uint8_t> PacketSeal::seal(std::span<const std::uint8_t> plain) 
   randombytes_buf(nonce, kNonce);
   crypto_aead_xchacha20poly1305_ietf_encrypt(nonce + kNonce, nullptr, plain.data(), plain.size(),
                                              kMark.data(), kMark.size(), nullptr, nonce,
-                                             key_.data());
+                                             key_->bytes.data());
   return sealed;
 }
 
@@ -43,7 +51,7 @@ tl::expected<std::vector<std::uint8_t>, UnsealError> PacketSeal::open(
   std::vector<std::uint8_t> plain(secret.size() - kTag);
   const int verdict = crypto_aead_xchacha20poly1305_ietf_decrypt(
       plain.data(), nullptr, nullptr, secret.data(), secret.size(), kMark.data(), kMark.size(),
-      nonce.data(), key_.data());
+      nonce.data(), key_->bytes.data());
   if (verdict != 0) return tl::unexpected(UnsealError::kNotAuthentic);
   return plain;
 }

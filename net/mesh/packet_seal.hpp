@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -16,7 +17,15 @@
 
 namespace crepes {
 
-using MeshKey = std::array<std::uint8_t, 32>;
+/// The secret that all robots of a swarm share. Every copy is overwritten when it ends.
+struct MeshKey {
+  static constexpr std::size_t kSize = 32;
+
+  std::array<std::uint8_t, kSize> bytes{};
+
+  ~MeshKey();
+  [[nodiscard]] bool operator==(const MeshKey&) const = default;
+};
 
 /// Why a datagram cannot be opened.
 enum class UnsealError : std::uint8_t {
@@ -40,7 +49,7 @@ class PacketSeal {
   [[nodiscard]] static bool is_sealed(std::span<const std::uint8_t> datagram);
 
  private:
-  MeshKey key_;
+  std::shared_ptr<const MeshKey> key_;  ///< in memory that is not swapped and not dumped
 };
 
 }  // namespace crepes

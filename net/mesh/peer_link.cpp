@@ -11,6 +11,9 @@ namespace {
 
 constexpr Duration kEchoAge = std::chrono::seconds{1};      // older packets are not echoed
 constexpr Duration kMaxEchoAge = std::chrono::seconds{10};  // older echoes are refused
+constexpr Duration kSilence = std::chrono::seconds{1};  // after which a replaced session may return
+constexpr std::size_t kMaxEnded = 16;                   // sessions of a peer that are remembered
+constexpr double kMaxRateHz = 250.0;                    // of a peer's datagrams
 
 Report to_local(const PeerReport& theirs, const ClockOffset& clock) {
   Report ours;
@@ -26,6 +29,13 @@ Report to_local(const PeerReport& theirs, const ClockOffset& clock) {
   for (const auto& [stamp, neighbor, T_B_N, v_B_N] : theirs.estimates)
     ours.estimates.push_back({clock.to_local(stamp), neighbor, T_B_N, v_B_N});
   return ours;
+}
+
+/// How far a number may be ahead after a silence. Those of the window remain valid in any case.
+std::uint32_t max_ahead(Duration silence) {
+  constexpr double kMost = 1e9;
+  const double missed = kMaxRateHz * std::max(0.0, to_seconds(silence));
+  return SequenceWindow::kSize - 1 + static_cast<std::uint32_t>(std::min(kMost, missed));
 }
 
 /// The message, or the counter of the reason why there is none.
@@ -56,7 +66,7 @@ void PeerLink::set_members(const std::vector<RobotId>& members) {
 std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> datagram,
                                                 Timestamp arrival,
                                                 const std::optional<PacketSeal>& seal) {
-  auto message = open(datagram, seal);
+  auto message = open(datagram, arrival, seal);
   if (!message) return std::nullopt;
   const auto found = peers_.find(message->report.sender);
   if (found == peers_.end()) {
@@ -64,12 +74,12 @@ std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> da
     return std::nullopt;
   }
   Peer& peer = found->second;
-  Session* session = admit(peer, *message);
+  Session* session = admit(peer, *message, arrival);
   if (session == nullptr) return std::nullopt;
   session->last_arrival = arrival;
   if (!update_clock(*session, *message, arrival)) return std::nullopt;
   if (peer.candidate && peer.candidate->has_echoed_us) {
-    replace_session(peer);
+    replace_session(peer, arrival);
     session = &*peer.live;
   }
   if (!session->clock.is_usable()) {
@@ -82,12 +92,12 @@ std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> da
 }
 
 /// Decodes and counts a datagram; empty if it is our own or refused.
-std::optional<PeerMessage> PeerLink::open(std::span<const std::uint8_t> datagram,
+std::optional<PeerMessage> PeerLink::open(std::span<const std::uint8_t> datagram, Timestamp arrival,
                                           const std::optional<PacketSeal>& seal) {
   auto message = decode(datagram, seal);
   if (message && message->report.sender == self_) {
     const bool is_ours = first_sent_ && message->session == own_session();
-    if (!is_ours) counters_.add(MeshCounter::kRefusedOwnId);  // another robot uses our id
+    if (!is_ours) count_doubled(MeshCounter::kRefusedOwnId, self_, arrival);
     return std::nullopt;
   }
   counters_.add(MeshCounter::kReceived);
@@ -97,12 +107,14 @@ std::optional<PeerMessage> PeerLink::open(std::span<const std::uint8_t> datagram
   return std::nullopt;
 }
 
+void PeerLink::count_doubled(MeshCounter counter, RobotId robot, Timestamp now) {
+  counters_.add(counter);
+  doubled_ = {robot, now};
+}
+
 /// The session of the message, if the message is new in it.
-PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message) {
-  if (peer.ended.contains(message.session)) {
-    counters_.add(MeshCounter::kRefusedOldSession);  // delayed or replayed
-    return nullptr;
-  }
+PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message, Timestamp arrival) {
+  if (!readmit(peer, message, arrival)) return nullptr;
   const auto is_it = [&](const std::optional<Session>& session) {
     return session && session->id == message.session;
   };
@@ -110,10 +122,11 @@ PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message) {
     Session fresh;
     fresh.id = message.session;
     fresh.traffic.peer = message.report.sender;
+    fresh.last_arrival = arrival;
     peer.candidate = std::move(fresh);
   }
   Session& session = is_it(peer.live) ? *peer.live : *peer.candidate;
-  switch (session.sequence.accept(message.sequence)) {
+  switch (session.sequence.accept(message.sequence, max_ahead(arrival - session.last_arrival))) {
     case SequenceWindow::Verdict::kNew:
       return &session;
     case SequenceWindow::Verdict::kDuplicate:
@@ -122,8 +135,32 @@ PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message) {
     case SequenceWindow::Verdict::kTooOld:
       counters_.add(MeshCounter::kRefusedTooOld);
       return nullptr;
+    case SequenceWindow::Verdict::kTooFarAhead:
+      counters_.add(MeshCounter::kRefusedTooFarAhead);
+      return nullptr;
   }
   return nullptr;
+}
+
+/// False if the message is of a session that was replaced and may not return. A message that echoes
+/// what we sent since then is no recording: two robots have the peer's id.
+bool PeerLink::readmit(Peer& peer, const PeerMessage& message, Timestamp arrival) {
+  const auto ended = std::ranges::find(peer.ended, message.session, &EndedSession::id);
+  if (ended == peer.ended.end()) return true;
+  const bool is_alive = std::ranges::any_of(message.echoes, [&](const ClockEcho& echo) {
+    const Timestamp sent{Duration{echo.sent_ns}};
+    return echo.peer == self_ && sent > ended->at && was_sent_by_us(sent, arrival);
+  });
+  if (!is_alive) {
+    counters_.add(MeshCounter::kRefusedOldSession);  // delayed or replayed
+    return false;
+  }
+  if (peer.live && arrival - peer.live->last_arrival < kSilence) {
+    count_doubled(MeshCounter::kRefusedDoubledId, message.report.sender, arrival);
+    return false;
+  }
+  peer.ended.erase(ended);
+  return true;
 }
 
 /// False when the stamps of the message contradict the estimate of the peer's clock.
@@ -158,7 +195,7 @@ bool PeerLink::update_clock(Session& session, const PeerMessage& message, Timest
 }
 
 /// The candidate replaces the live session.
-void PeerLink::replace_session(Peer& peer) {
+void PeerLink::replace_session(Peer& peer, Timestamp now) {
   Session next = std::move(*peer.candidate);
   peer.candidate.reset();
   if (peer.live) {
@@ -166,7 +203,8 @@ void PeerLink::replace_session(Peer& peer) {
     next.traffic.received += before.received + peer.live->sequence.received();
     next.traffic.lost += before.lost + peer.live->sequence.lost();
     next.traffic.restarts += before.restarts + 1;
-    peer.ended.insert(peer.live->id);
+    peer.ended.push_back({peer.live->id, now});
+    if (peer.ended.size() > kMaxEnded) peer.ended.pop_front();
   }
   peer.live = std::move(next);
 }

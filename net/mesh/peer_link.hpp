@@ -1,14 +1,15 @@
 /// The protocol of the mesh without its socket: datagrams in, reports on our timeline out.
 ///
 /// A peer that restarts opens a new session. The new session replaces the old one when it has
-/// echoed a recent datagram of ours. Recorded datagrams that are replayed cannot do so.
+/// echoed a recent datagram of ours. Recorded datagrams that are replayed cannot do so. A session
+/// that was replaced returns if it echoes what we sent after that, and the other one is silent:
+/// then a second robot with the peer's id was there for a while.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <map>
 #include <optional>
-#include <set>
 #include <span>
 #include <vector>
 
@@ -46,6 +47,8 @@ class PeerLink {
   [[nodiscard]] std::vector<ClockStatus> clocks() const;
   /// All peers that a datagram was received from, ordered by id.
   [[nodiscard]] std::vector<PeerTraffic> traffic(Timestamp now) const;
+  /// The latest datagram of a second robot that uses our id or a peer's.
+  [[nodiscard]] const std::optional<DoubledId>& doubled_id() const { return doubled_; }
   /// Since the start: datagrams and bytes in and out, refusals by reason.
   [[nodiscard]] const MeshCounters& counters() const { return counters_; }
 
@@ -59,24 +62,32 @@ class PeerLink {
     Timestamp last_arrival{};
     bool has_echoed_us = false;  ///< a recent datagram of ours
   };
+  struct EndedSession {
+    std::uint32_t id = 0;
+    Timestamp at{};
+  };
   struct Peer {
     std::optional<Session> live;
     std::optional<Session> candidate;  ///< has not echoed us yet
-    std::set<std::uint32_t> ended;     ///< sessions that were live
+    std::deque<EndedSession> ended;    ///< the latest that were live
     [[nodiscard]] const std::optional<Session>& heard() const { return live ? live : candidate; }
   };
 
   [[nodiscard]] std::optional<PeerMessage> open(std::span<const std::uint8_t> datagram,
+                                                Timestamp arrival,
                                                 const std::optional<PacketSeal>& seal);
-  [[nodiscard]] Session* admit(Peer& peer, const PeerMessage& message);
+  [[nodiscard]] Session* admit(Peer& peer, const PeerMessage& message, Timestamp arrival);
+  [[nodiscard]] bool readmit(Peer& peer, const PeerMessage& message, Timestamp arrival);
   [[nodiscard]] bool update_clock(Session& session, const PeerMessage& message, Timestamp arrival);
-  static void replace_session(Peer& peer);
+  void count_doubled(MeshCounter counter, RobotId robot, Timestamp now);
+  static void replace_session(Peer& peer, Timestamp now);
   [[nodiscard]] bool was_sent_by_us(Timestamp sent, Timestamp now) const;
   [[nodiscard]] std::uint32_t own_session() const;
 
   RobotId self_;
   std::map<RobotId, Peer> peers_;  ///< all members except us
   MeshCounters counters_;
+  std::optional<DoubledId> doubled_;
   std::optional<Timestamp> first_sent_;
   std::deque<Timestamp> sent_;  ///< in the last seconds: what a peer may echo
   std::uint32_t next_sequence_ = 0;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <optional>
 
@@ -10,6 +11,9 @@
 namespace crepes {
 namespace wire {
 namespace {
+
+constexpr Duration kMaxAhead = std::chrono::milliseconds{100};  // of stamps, whose clock is one
+constexpr Duration kMaxReportAge = std::chrono::seconds{2};     // when it leaves
 
 /// Reads field by field and stores the first error; fields after it are not used.
 class Decoder {
@@ -31,7 +35,12 @@ class Decoder {
     message.sent = PeerTimestamp{Duration{bounded_stamp(in_.read<std::int64_t>())}};
     base_tick_ = floor_to_ticks(to_ns(message.sent));
     message.report.stamp = time(in_.read<std::int32_t>());
+    expect(message.report.stamp <= message.sent + kMaxAhead &&
+               message.report.stamp >= message.sent - kMaxReportAge,
+           PeerMessageError::kBadStamp);
     message.report.tilt = tilt();
+    expect(message.report.tilt.stamp <= message.report.stamp + kMaxAhead,
+           PeerMessageError::kBadStamp);
     each(kEchoSize, [&] { message.echoes.push_back(echo(message.sent)); });
     imu(message.report.imu);
     bearings(message.report.bearings);

@@ -15,6 +15,12 @@ struct ClockStatus {
   double sigma_s = 0.0;
 };
 
+/// Two robots with one id.
+struct DoubledId {
+  RobotId robot{};
+  Timestamp last{};  ///< when the second one was heard
+};
+
 /// Totals of one peer's datagrams.
 struct PeerTraffic {
   RobotId peer{};

@@ -10,11 +10,15 @@ namespace {
 /// Longer than the history in a message and than any reordering of packets.
 constexpr Duration kMemory = std::chrono::seconds{2};
 
+/// A second of a hundred robots at 50 Hz: more comes from nobody who keeps to the protocol.
+constexpr std::size_t kMaxItems = 5000;
+
 template <class Item, class Key, class KeyOf>
 void keep_first_copies(std::vector<Item>& items, std::set<Key>& passed, std::int64_t forget_before,
                        KeyOf key_of) {
   std::erase_if(items, [&](const Item& item) { return !passed.insert(key_of(item)).second; });
-  while (!passed.empty() && std::get<0>(*passed.begin()) < forget_before)
+  while (passed.size() > kMaxItems ||
+         (!passed.empty() && std::get<0>(*passed.begin()) < forget_before))
     passed.erase(passed.begin());
 }
 

@@ -13,8 +13,12 @@ namespace crepes {
 class RedundancyFilter {
  public:
   /// Removes measurements that were passed before. Stamps must be on the sender's clock, where they
-  /// are equal in every copy.
+  /// are equal in every copy. Memory is bounded whatever the stamps are.
   void remove_repeated(PeerReport& report);
+  /// Measurements that are remembered.
+  [[nodiscard]] std::size_t size() const {
+    return imu_.size() + bearings_.size() + ranges_.size() + estimates_.size();
+  }
 
  private:
   using Time = std::int64_t;

@@ -4,11 +4,12 @@
 
 namespace crepes {
 
-SequenceWindow::Verdict SequenceWindow::accept(std::uint32_t sequence) {
+SequenceWindow::Verdict SequenceWindow::accept(std::uint32_t sequence, std::uint32_t max_ahead) {
   if (!first_) {
     first_ = newest_ = sequence;
   } else if (sequence > newest_) {
     const std::uint32_t ahead = sequence - newest_;
+    if (ahead > max_ahead) return Verdict::kTooFarAhead;
     seen_ = ahead < kSize ? seen_ << ahead : 0;
     newest_ = sequence;
   }

@@ -8,12 +8,13 @@ namespace crepes {
 
 class SequenceWindow {
  public:
-  enum class Verdict : std::uint8_t { kNew, kDuplicate, kTooOld };
+  enum class Verdict : std::uint8_t { kNew, kDuplicate, kTooOld, kTooFarAhead };
 
   /// How far behind the newest a datagram can be and still be checked for duplicates.
   static constexpr std::uint32_t kSize = 64;
 
-  [[nodiscard]] Verdict accept(std::uint32_t sequence);
+  /// `max_ahead` bounds a jump forward: one forged number must not make all true ones too old.
+  [[nodiscard]] Verdict accept(std::uint32_t sequence, std::uint32_t max_ahead);
 
   [[nodiscard]] std::uint64_t received() const { return received_; }
   /// Missing between the first and the newest. A datagram that arrives late no longer counts.

@@ -39,7 +39,10 @@ Result<void> SubscriberTable::make_room(const Endpoint& client, Timestamp now, b
   const auto limit = static_cast<std::size_t>(config_.max_subscribers);
   if (subscribers_.size() >= limit)
     return fail(ErrorCode::kUsage, fmt::format("too many subscribers, at most {}", limit));
-  const auto is_beside = [&](const auto& entry) { return entry.first.address == client.address; };
+  const auto is_beside = [&](const auto& entry) {
+    return entry.first.address == client.address ||
+           (entry.first.is_loopback() && client.is_loopback());
+  };
   if (std::ranges::count_if(subscribers_, is_beside) < config_.max_per_address) return {};
   const auto floods = std::ranges::find_if(subscribers_, [&](const auto& entry) {
     return is_light_user && is_beside(entry) &&

@@ -30,8 +30,9 @@ class SubscriberTable {
   void reconfigure(const SubscriptionConfig& config) { config_ = config; }
 
   /// Begins, renews, changes or ends a subscription. Refused when the table is full or the address
-  /// has used all its subscriptions. In the latter case a new client that `is_light_user` replaces
-  /// one that recently exceeded its rate. Replies are sent over `socket`.
+  /// has used all its subscriptions; this machine's addresses are one. In the latter case a new
+  /// client that `is_light_user` replaces one that recently exceeded its rate. Replies are sent
+  /// over `socket`.
   [[nodiscard]] Result<void> watch(const Endpoint& client, const WatchRequest& request,
                                    Timestamp now, std::size_t socket = 0,
                                    bool is_light_user = false);

@@ -1,5 +1,6 @@
 /// Whole daemons whose settings change while they run.
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
@@ -19,6 +20,8 @@
 #include "daemon/ctl/demo/child_process.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
+#include "drivers/base/monotonic_clock.hpp"
+#include "drivers/base/text_file.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
 
@@ -253,6 +256,16 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsTold) {
     };
   };
   ASSERT_TRUE(client.await_status(has_generation(1)));
+
+  auto second =
+      ChildProcess::start(crepesd_path(), {"--config", file.string()}, folder.path() / "second");
+  ASSERT_TRUE(second);
+  const MonotonicClock clock;
+  const Timestamp end = clock.now() + std::chrono::seconds{20};
+  while (!second->exit_reason() && clock.now() < end) ::poll(nullptr, 0, 20);
+  EXPECT_EQ(second->exit_reason(), "exit code 1");
+  EXPECT_NE(read_text_file(folder.path() / "second").value().find("already runs on this machine"),
+            std::string::npos);
 
   config.estimator.output_rate_hz = 20;
   write("");

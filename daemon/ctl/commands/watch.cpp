@@ -15,7 +15,7 @@ void add_watch(CommandLine& line) {
          "--for", [&options](double seconds) { options.for_s = seconds; },
          "stop after this many seconds")
       ->check(CLI::Range(0.1, 1e6));
-  sub->add_flag("--once", options.once, "one table, then stop");
+  sub->add_flag("--once", options.once, "one table, or with --json its messages, then stop");
   line.run(sub, [&options] { return watch(options); });
 }
 

@@ -207,9 +207,12 @@ std::vector<StatusMessage::Clock> ask_for_clocks(const SubscriptionConfig& subsc
 
 /// Why the recording ends now; empty while it continues.
 std::string end_reason(const RecordOptions& options, const RecordProgress& progress,
-                       StopSignals& signals) {
+                       Duration elapsed, StopSignals& signals) {
+  constexpr double kLate_s = 1.0;  // measurements come a little after they were made, or not at all
   if (signals.requested()) return "stopped";
-  if (options.duration_s && progress.seconds >= *options.duration_s) return "--duration is over";
+  if (options.duration_s &&
+      std::max(progress.seconds, to_seconds(elapsed) - kLate_s) >= *options.duration_s)
+    return "--duration is over";
   if (progress.bytes >= options.max_bytes) return "--max-size is reached";
   return "";
 }
@@ -218,7 +221,8 @@ std::string end_reason(const RecordOptions& options, const RecordProgress& progr
 Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recording& recording,
                         StopSignals& signals) {
   const MonotonicClock clock;
-  Timestamp next_manifest = clock.now();
+  const Timestamp start = clock.now();
+  Timestamp next_manifest = start;
   for (;;) {
     const Result<bool> goes_on = daemon.receive();
     if (!goes_on) return tl::unexpected(goes_on.error());
@@ -229,7 +233,8 @@ Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recor
       if (auto taken = recording.append(**block); !taken) return tl::unexpected(taken.error());
     }
     if (options.on_progress) options.on_progress(recording.progress());
-    if (std::string why = end_reason(options, recording.progress(), signals); !why.empty())
+    const Duration elapsed = clock.now() - start;
+    if (std::string why = end_reason(options, recording.progress(), elapsed, signals); !why.empty())
       return why;
     if (!*goes_on) return "the daemon hung up";
     if (clock.now() < next_manifest) continue;

@@ -63,17 +63,23 @@ std::vector<bool> in_order(const std::vector<DatasetRow<Value>>& rows) {
   return kept;
 }
 
-/// Reads all good rows of `file` with `parse(csv, row) -> bool`.
+/// Reads all good rows of `file` with `parse(csv, row) -> bool`. A file without one is an error.
 template <class Value, class Parse>
 Result<std::vector<DatasetRow<Value>>> read_rows(const fs::path& file, std::size_t columns,
                                                  const Context& context, const Parse& parse) {
   Result<CsvFile> csv = CsvFile::open(file, columns, context.faults);
   if (!csv) return tl::unexpected(csv.error());
+  const std::uint64_t faults_before = context.faults.total();
   std::vector<DatasetRow<Value>> rows;
   while (csv->next(context.faults)) {
     DatasetRow<Value> row;
     row.line = csv->line();
     if (read_stamp(*csv, row.stamp, context) && parse(*csv, row)) rows.push_back(std::move(row));
+  }
+  const std::uint64_t refused = context.faults.total() - faults_before;
+  if (rows.empty() && refused > 0) {
+    return fail(ErrorCode::kFormat, fmt::format("{}: none of {} rows is good; the last: {}",
+                                                file.string(), refused, context.faults.last()));
   }
   const std::vector<bool> kept = in_order(rows);
   std::size_t count = 0;

@@ -49,9 +49,11 @@ class SwarmTruth {
   [[nodiscard]] static Result<SwarmTruth> load(const std::filesystem::path& dir,
                                                const SwarmManifest& manifest);
 
-  /// T_W_B at an instant of true time; empty outside the recorded times.
+  /// T_W_B at an instant of true time; empty outside the recorded times and for a robot
+  /// without truth.
   [[nodiscard]] std::optional<Pose> pose(RobotId robot, double true_s) const;
-  /// T_B_N at an instant of the observer's own clock; empty outside the recorded times.
+  /// T_B_N at an instant of the observer's own clock; empty outside the recorded times and
+  /// for robots without truth.
   [[nodiscard]] std::optional<Pose> relative(RobotId observer, RobotId neighbor,
                                              Timestamp local) const;
 

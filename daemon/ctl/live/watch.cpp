@@ -51,22 +51,34 @@ Result<void> converse(const WatchOptions& options, WatchScreen& screen, const Sh
   return client->unwatch();
 }
 
+/// Whether the screen is complete: poses arrive within a period or two after STATUS, which names
+/// all neighbors.
+class Completeness {
+ public:
+  [[nodiscard]] bool reached(const WatchScreen& screen, Timestamp now) {
+    constexpr Duration kCollect = 300ms;
+    if (screen.has_status() && !since_) since_ = now;
+    return since_ && now - *since_ >= kCollect;
+  }
+
+ private:
+  std::optional<Timestamp> since_;
+};
+
 Result<void> stream_json(const WatchOptions& options) {
   WatchScreen screen;
-  return converse(options, screen, [](const std::optional<DaemonAnswer>& answer, Timestamp) {
-    return !answer || print(answer->text + "\n");
+  Completeness complete;
+  return converse(options, screen, [&](const std::optional<DaemonAnswer>& answer, Timestamp now) {
+    if (answer && !print(answer->text + "\n")) return false;
+    return !(options.once && complete.reached(screen, now));
   });
 }
 
-/// Poses arrive within a period or two; STATUS names all neighbors.
 Result<void> show_once(const WatchOptions& options) {
-  constexpr Duration kCollect = 300ms;
   WatchScreen screen;
-  std::optional<Timestamp> first;
+  Completeness complete;
   return converse(options, screen, [&](const auto& /*answer*/, Timestamp now) {
-    if (!screen.has_status()) return true;
-    if (!first) first = now;
-    if (now - *first < kCollect) return true;
+    if (!complete.reached(screen, now)) return true;
     print(screen.text(now, false));
     return false;
   });

@@ -10,7 +10,7 @@ namespace crepes {
 struct WatchOptions {
   DaemonAddress daemon;
   std::optional<double> for_s;  ///< stop after this time; otherwise on a signal or key
-  bool once = false;            ///< one table, then stop
+  bool once = false;            ///< one table or its messages, then stop
   bool json = false;            ///< the daemon's objects as they arrive, one a line
 };
 

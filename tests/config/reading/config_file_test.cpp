@@ -1,6 +1,8 @@
 #include "config/reading/config_file.hpp"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -9,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "tests/support/places.hpp"
 
 namespace crepes {
@@ -319,6 +322,86 @@ TEST(ConfigFile, ServesPosesAtNumericAddresses) {
   EXPECT_EQ(faults_of(replaced("uwb: {noise_m: 0.05}",
                                "subscription: {listen: [\"::1\", 0.0.0.0, localhost]}")),
             "f:11: subscription.listen: \"localhost\" is not a numeric IPv4 or IPv6 address");
+}
+
+TEST(ConfigFile, RefusesAddressesThatCannotServe) {
+  const auto listening = [](const std::string& addresses) {
+    return faults_of(
+        replaced("uwb: {noise_m: 0.05}", "subscription: {listen: [" + addresses + "]}"));
+  };
+  EXPECT_EQ(listening("224.0.0.1"),
+            "f:11: subscription.listen: \"224.0.0.1\" is no host's address");
+  EXPECT_EQ(listening("127.0.0.1, 127.0.0.1"),
+            "f:11: subscription.listen: \"127.0.0.1\" is listed twice");
+}
+
+TEST(ConfigFile, RefusesNumbersThatCannotBeMeant) {
+  const auto with = [](const std::string& from, const std::string& to) {
+    const std::string faults = faults_of(replaced(from, to));
+    EXPECT_FALSE(faults.empty()) << to;
+    return faults.substr(0, faults.find(':', faults.find(':', 2) + 2));
+  };
+  EXPECT_EQ(with("0.01], [1", "1.0e+4], [1"), "f:10: cameras[0].T_cam_imu");
+  EXPECT_EQ(with("0.01], [1", "1.0e+300], [1"), "f:10: cameras[0].T_cam_imu");
+  EXPECT_EQ(with("316.7", "1.0e-300"), "f:8: cameras[0].intrinsics");
+  EXPECT_EQ(with("uwb:", "imu: {accelerometer: {bias: [1.0e+300, 0, 0]}}\nuwb:"),
+            "f:11: imu.accelerometer.bias");
+  EXPECT_EQ(with("uwb: {", "imu: {port: /dev/ttyUSB0}\nuwb: {port: /dev/ttyUSB0, "),
+            "f:12: uwb.port");
+  EXPECT_EQ(with("uwb:", "net: {interface: " + std::string(5000, 'x') + "}\nuwb:"),
+            "f:11: net.interface");
+  EXPECT_EQ(with("uwb:", "recording: {socket: /" + std::string(200, 'x') + "}\nuwb:"),
+            "f:11: recording.socket");
+  EXPECT_EQ(with("uwb:", "recording: {socket: \"/a\\0b\"}\nuwb:"), "f:11: recording.socket");
+}
+
+TEST(ConfigFile, WarnsOfWhatCanHardlyBeMeant) {
+  const auto warnings_of = [](const std::string& text) {
+    const CheckedConfig checked = check_config_text(text, "f");
+    EXPECT_TRUE(checked.faults.empty());
+    std::string keys;
+    for (const ConfigFault& warning : checked.warnings)
+      keys += fmt::format("{} {}\n", warning.line, warning.key);
+    return keys;
+  };
+  const std::string sound =
+      replaced("duty: 0.3", "duty: 0.3, p_body_led: [0.1, 0, 0], p_body_uwb: [0, 0, 0.1]");
+  const auto and_in = [&](const std::string& from, const std::string& to) {
+    std::string text = sound;
+    text.replace(text.find("\"}"), 2, "\", p_body_led: [0.1, 0, 0], p_body_uwb: [0, 0, 0.1]}");
+    return text.replace(text.find(from), from.size(), to) + "net: {interface: lo}\n";
+  };
+
+  EXPECT_EQ(warnings_of(and_in("id: 1", "id: 1")), "");
+  EXPECT_EQ(warnings_of(sound + "net: {interface: lo}\n"),
+            "4 swarm.members[0].p_body_led\n4 swarm.members[0].p_body_uwb\n");
+  EXPECT_EQ(warnings_of(and_in("[0.1, 0, 0]", "[3, 0, 0]")), "4 swarm.members[0].p_body_led\n");
+  EXPECT_EQ(warnings_of(and_in("[[0, -1, 0, 0], [0, 0, -1, 0.01], [1, 0, 0, -0.06], [0, 0, 0, 1]]",
+                               "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")),
+            "10 cameras[0].T_cam_imu\n");
+  EXPECT_EQ(warnings_of(and_in("resolution:", "rate_hz: 120\n    resolution:")),
+            "9 cameras[0].rate_hz\n");
+  EXPECT_EQ(
+      warnings_of(and_in("resolution:", "driver: folder\n    folder: /nowhere\n    resolution:")),
+      "10 cameras[0].folder\n");
+  EXPECT_EQ(warnings_of(and_in("{noise_m: 0.05}", "{noise_m: 0.05}") + "#"), "");
+}
+
+TEST(ConfigFile, PrintsEachFaultInOneLineWhateverTheFileContains) {
+  const std::string faults = faults_of(replaced("name: r1", "name: \"a\\nb\\e[2J\""));
+
+  EXPECT_EQ(faults.find('\n'), std::string::npos);
+  EXPECT_EQ(faults.find('\x1b'), std::string::npos);
+  EXPECT_NE(faults.find("a\\x0ab\\x1b[2J"), std::string::npos) << faults;
+}
+
+TEST(ConfigFile, RefusesAPipeAtOnce) {
+  const auto scratch = ScratchDirectory::create("").value();
+  const fs::path pipe = scratch.path() / "crepesd.yaml";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+
+  EXPECT_EQ(load_config(pipe).error().message, pipe.string() + ": is not a file");
+  EXPECT_EQ(load_config("/dev/zero").error().message, "/dev/zero: is not a file");
 }
 
 TEST(ConfigFile, TellsAllFaultsAtOnceInOrderOfLines) {

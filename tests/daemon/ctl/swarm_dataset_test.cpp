@@ -186,13 +186,23 @@ TEST(SwarmDataset, TellsOfACameraWithoutCalibration) {
 
 TEST(SwarmDataset, RefusesPicturesThatAreNotThere) {
   const TinySwarm files;
-  files.write("r1/cam0/data.csv", "#t_ns,file\n10000000000,a.png\n10005000000,../../swarm.yaml\n");
+  files.write("r1/cam0/data.csv",
+              "#t_ns,file\n10000000000,a.png\n10005000000,../../swarm.yaml\n10010000000,b.png\n");
   files.write("r1/cam0/data/b.png", "");
 
   const SwarmDataset swarm = load_swarm(files.dir()).value();
 
   EXPECT_EQ(swarm.faults.counts().at("no such picture"), 2U);
-  EXPECT_TRUE(swarm.robots[0].cameras[0].images.empty());
+  EXPECT_EQ(swarm.robots[0].cameras[0].images.size(), 1U);
+}
+
+TEST(SwarmDataset, NamesASensorOfWhichNoRowIsGood) {
+  const TinySwarm files;
+  files.write("r1/uwb0/data.csv", "#t_ns,peer,range,fp,rx\n10000000000,2,far,-80,-79\n");
+
+  EXPECT_NE(error_of(files).find("uwb0/data.csv: none of 1 rows is good; the last: "),
+            std::string::npos)
+      << error_of(files);
 }
 
 TEST(SwarmDataset, NamesAFileThatIsMissing) {

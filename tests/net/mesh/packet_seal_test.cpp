@@ -8,8 +8,8 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr MeshKey kKey{1, 2, 3};
-constexpr MeshKey kOtherKey{1, 2, 4};
+const MeshKey kKey{1, 2, 3};
+const MeshKey kOtherKey{1, 2, 4};
 
 RC_GTEST_PROP(PacketSeal, GivesBackWhatWasSealed, (const Bytes& plain)) {
   const PacketSeal seal(kKey);

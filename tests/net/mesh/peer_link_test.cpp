@@ -26,6 +26,7 @@ class Mesh {
   void run_until(double end_s) {
     for (; now_s_ < end_s; now_s_ += 0.001, ++step_) {
       if (step_ % 20 == 0) send(two, report_of_two(), local_of_two());
+      if (step_ % 20 == 5 && twin) send(*twin, empty_report(RobotId{2}), local_of_two());
       if (step_ % 20 == 10) send(one, empty_report(RobotId{1}), local_of_one());
       for (int i = 0; i < 3 && !to_replay.empty(); ++i, to_replay.pop_front())
         deliver_to_one(to_replay.front());
@@ -34,6 +35,7 @@ class Mesh {
         wire_.pop();
         deliver_to_one(packet.bytes);
         (void)two.receive(packet.bytes, local_of_two(), seal_of_two);
+        if (twin) (void)twin->receive(packet.bytes, local_of_two());
       }
     }
   }
@@ -50,6 +52,7 @@ class Mesh {
 
   PeerLink one{RobotId{1}, {RobotId{1}, RobotId{2}}};
   PeerLink two{RobotId{2}, {RobotId{1}, RobotId{2}}};
+  std::optional<PeerLink> twin;  ///< also uses id 2
   Duration offset_of_two = std::chrono::hours{2};
   std::optional<PacketSeal> seal_of_one;
   std::optional<PacketSeal> seal_of_two;
@@ -292,6 +295,63 @@ TEST(PeerLink, IsNotMisledByAReplayedSession) {
   EXPECT_NEAR(mesh.one.clocks().at(0).offset_s, 3600.0, 1e-3);
 }
 
+TEST(PeerLink, KnowsAPeerAgainWhenASecondRobotWithItsIdHasLeft) {
+  Mesh mesh;
+  mesh.run_until(103.0);
+  mesh.twin.emplace(RobotId{2}, std::vector{RobotId{1}, RobotId{2}});
+  mesh.run_until(106.0);
+  ASSERT_TRUE(mesh.one.doubled_id());
+  EXPECT_EQ(mesh.one.doubled_id()->robot, RobotId{2});
+  EXPECT_GT(mesh.count_of_one("refused_doubled_id"), 0U);
+  ASSERT_TRUE(mesh.two.doubled_id());  // hears its own id
+  mesh.twin.reset();
+  mesh.run_until(108.0);
+  mesh.received.clear();
+
+  mesh.run_until(109.0);
+
+  EXPECT_GT(mesh.received.size(), 45U);
+  EXPECT_NEAR(mesh.one.clocks().at(0).offset_s, 7200.0, 1e-3);
+}
+
+TEST(PeerLink, IsNotSilencedByOneForgedNumber) {
+  Mesh mesh;
+  mesh.run_until(103.0);
+  PeerMessage forged = decode_peer_message(mesh.sent_by_two.back()).value();
+  for (const std::uint32_t ahead : {1U << 31U, 10'000U, 60U}) {
+    OutgoingPeerMessage message;
+    message.report.sender = RobotId{2};
+    message.report.stamp = message.sent = mesh.local_of_two();
+    message.report.tilt = {message.sent, Eigen::Vector3d::UnitZ(), 0.01};
+    message.session = forged.session;
+    message.sequence = forged.sequence + ahead;
+    (void)mesh.one.receive(encode_peer_message(message).bytes, mesh.local_of_one());
+  }
+  EXPECT_EQ(mesh.count_of_one("refused_too_far_ahead"), 2U);
+  mesh.received.clear();
+
+  mesh.run_until(105.0);
+
+  EXPECT_GT(mesh.received.size(), 90U);
+}
+
+TEST(PeerLink, HearsAPeerThatWasOutOfRangeForAnHour) {
+  SequenceWindow window;
+  ASSERT_EQ(window.accept(7, 0), SequenceWindow::Verdict::kNew);
+  Mesh mesh;
+  mesh.run_until(102.0);
+  Report report;
+  report.sender = RobotId{2};
+  for (int i = 0; i < 50 * 3600; ++i) (void)mesh.two.compose(report, mesh.local_of_two());
+  report.stamp = mesh.local_of_two() + std::chrono::hours{1};
+  report.tilt.stamp = report.stamp;
+  const auto bytes = mesh.two.compose(report, report.stamp);
+
+  (void)mesh.one.receive(bytes, mesh.local_of_one() + std::chrono::hours{1});
+
+  EXPECT_EQ(mesh.count_of_one("refused_too_far_ahead"), 0U);
+}
+
 TEST(PeerLink, RefusesAnEchoOfWhatItNeverSent) {
   Mesh mesh;
   mesh.run_until(100.5);
@@ -312,14 +372,15 @@ TEST(SequenceWindow, CountsLossesButNotLateDatagrams) {
   SequenceWindow window;
   using Verdict = SequenceWindow::Verdict;
 
-  EXPECT_EQ(window.accept(10), Verdict::kNew);
-  EXPECT_EQ(window.accept(13), Verdict::kNew);
+  EXPECT_EQ(window.accept(10, 1000), Verdict::kNew);
+  EXPECT_EQ(window.accept(13, 1000), Verdict::kNew);
   EXPECT_EQ(window.lost(), 2U);
-  EXPECT_EQ(window.accept(11), Verdict::kNew);
-  EXPECT_EQ(window.accept(11), Verdict::kDuplicate);
+  EXPECT_EQ(window.accept(11, 1000), Verdict::kNew);
+  EXPECT_EQ(window.accept(11, 1000), Verdict::kDuplicate);
   EXPECT_EQ(window.lost(), 1U);
-  EXPECT_EQ(window.accept(1000), Verdict::kNew);
-  EXPECT_EQ(window.accept(13), Verdict::kTooOld);
+  EXPECT_EQ(window.accept(1000, 1000), Verdict::kNew);
+  EXPECT_EQ(window.accept(13, 1000), Verdict::kTooOld);
+  EXPECT_EQ(window.accept(2001, 1000), Verdict::kTooFarAhead);
   EXPECT_EQ(window.received(), 4U);
 }
 

@@ -26,5 +26,19 @@ TEST(RedundancyFilter, PassesABoardAndItsMirrorImageOnceEach) {
   EXPECT_TRUE(again.bearings.empty());
 }
 
+TEST(RedundancyFilter, RemembersABoundedNumberWhateverTheStamps) {
+  RedundancyFilter filter;
+  PeerReport first;
+  for (int i = 0; i < 200'000; ++i) {
+    PeerReport report;
+    report.stamp = PeerTimestamp{};  // the sender's clock stands still
+    report.ranges = {{PeerTimestamp{milliseconds{i}}, RobotId{1}, 1.0, -80.0, -79.0}};
+    if (i == 0) first = report;
+    filter.remove_repeated(report);
+  }
+
+  EXPECT_LE(filter.size(), 5000U);
+}
+
 }  // namespace
 }  // namespace crepes

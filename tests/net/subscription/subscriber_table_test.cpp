@@ -54,6 +54,18 @@ TEST(SubscriberTable, CountsTheRateOfEachNeighborByItself) {
   EXPECT_EQ(table.deliveries(RobotId{3}, kStart + milliseconds{20}).size(), 0U);
 }
 
+TEST(SubscriberTable, CountsAllAddressesOfThisMachineAsOne) {
+  SubscriberTable table(config_for(32));
+  int admitted = 0;
+  for (std::uint8_t i = 1; i <= 32; ++i) {
+    const Endpoint address = Endpoint::ipv4({127, 0, i, i}, 5000);
+    admitted += table.watch(address, {}, kStart) ? 1 : 0;
+  }
+
+  EXPECT_EQ(admitted, SubscriptionConfig{}.max_per_address);
+  EXPECT_TRUE(table.watch(Endpoint::ipv4({10, 0, 0, 7}, 5000), {}, kStart));
+}
+
 TEST(SubscriberTable, NumbersTheDatagramsOfAClient) {
   SubscriberTable table{SubscriptionConfig{}};
   ASSERT_TRUE(table.watch(client(1), {}, kStart));
@@ -134,7 +146,7 @@ TEST(SubscriberTable, GivesAnAddressItsShareAndLeavesRoomForOthers) {
 
   const auto refused = table.watch(client(5), {}, kStart);
   const auto renewed = table.watch(client(4), {}, kStart);
-  const auto elsewhere = table.watch(Endpoint::ipv4({127, 0, 0, 2}, 1), {}, kStart);
+  const auto elsewhere = table.watch(Endpoint::ipv4({10, 0, 0, 2}, 1), {}, kStart);
 
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("at this address, at most 4"), std::string::npos);
@@ -148,7 +160,7 @@ TEST(SubscriberTable, HasWhoAsksTooMuchGiveWayToWhoDoesNot) {
     ASSERT_TRUE(table.watch(client(port), {}, kStart));
   for (int i = 0; i < 1000; ++i) (void)table.allows(client(3), kStart);
 
-  const auto elsewhere = Endpoint::ipv4({127, 0, 0, 2}, 1);
+  const auto elsewhere = Endpoint::ipv4({10, 0, 0, 2}, 1);
   ASSERT_TRUE(table.watch(elsewhere, {}, kStart));
   const auto greedy = table.watch(client(7), {}, kStart + seconds{1}, 0, /*is_light_user=*/false);
   const auto newcomer = table.watch(client(5), {}, kStart + seconds{1}, 0, /*is_light_user=*/true);
@@ -180,9 +192,9 @@ TEST(SubscriberTable, HasRoomForThirtyTwo) {
   SubscriberTable table{SubscriptionConfig{}};
   for (std::uint8_t host = 1; host <= 8; ++host)
     for (std::uint16_t port = 1; port <= 4; ++port)
-      ASSERT_TRUE(table.watch(Endpoint::ipv4({127, 0, 0, host}, port), {}, kStart));
+      ASSERT_TRUE(table.watch(Endpoint::ipv4({10, 0, 0, host}, port), {}, kStart));
 
-  EXPECT_FALSE(table.watch(Endpoint::ipv4({127, 0, 0, 9}, 1), {}, kStart));
+  EXPECT_FALSE(table.watch(Endpoint::ipv4({10, 0, 0, 9}, 1), {}, kStart));
 }
 
 TEST(SubscriberTable, AnswersOverTheSocketThatTheClientAsked) {

@@ -1,0 +1,70 @@
+#include "config/schema/plausibility.hpp"
+
+#include <fmt/core.h>
+#include <net/if.h>
+
+#include <filesystem>
+
+namespace crepes {
+namespace {
+
+using Doubts = std::vector<RuleFault>;
+
+constexpr double kLongArm_m = 1.0;  // of a lever arm on a robot
+constexpr double kFewFrames = 2.0;  // of a slot
+constexpr double kMillisecond_s = 1e-3;
+
+void doubt_members(const SwarmConfig& swarm, Doubts& doubts) {
+  for (std::size_t i = 0; i < swarm.members.size(); ++i) {
+    const MemberConfig& member = swarm.members[i];
+    const auto doubt_arm = [&](const char* key, const Eigen::Vector3d& arm, const char* what) {
+      const std::string path = fmt::format("swarm.members[{}].{}", i, key);
+      if (arm.isZero(0.0))
+        doubts.push_back({path, fmt::format("is 0: measure where the {} is", what)});
+      if (arm.norm() > kLongArm_m)
+        doubts.push_back({path, fmt::format("is {:.2f} m long: the unit is metres", arm.norm())});
+    };
+    doubt_arm("p_body_led", member.p_body_led, "center of the LED ring");
+    doubt_arm("p_body_uwb", member.p_body_uwb, "UWB antenna");
+  }
+}
+
+void doubt_cameras(const Config& config, Doubts& doubts) {
+  std::error_code status;
+  for (std::size_t i = 0; i < config.cameras.size(); ++i) {
+    const CameraConfig& camera = config.cameras[i];
+    const std::string key = fmt::format("cameras[{}]", i);
+    const Pose& T_C_B = camera.calibration.T_cam_imu;
+    if (T_C_B.q.isApprox(Eigen::Quaterniond::Identity()) && T_C_B.p.isZero(0.0))
+      doubts.push_back({key + ".T_cam_imu",
+                        "is the identity: the camera would look along the body's z, upwards"});
+    if (T_C_B.p.norm() > kLongArm_m)
+      doubts.push_back({key + ".T_cam_imu",
+                        fmt::format("moves by {:.2f} m: the unit is metres", T_C_B.p.norm())});
+    const double frames = camera.calibration.rate_hz * config.swarm.slot_ms * kMillisecond_s;
+    if (frames < kFewFrames)
+      doubts.push_back({key + ".rate_hz",
+                        fmt::format("gives {:.1f} frames a slot (swarm.slot_ms); two or more can "
+                                    "be read reliably",
+                                    frames)});
+    if (camera.device.driver == CameraDriver::kFolder &&
+        !std::filesystem::is_directory(camera.device.folder, status))
+      doubts.push_back({key + ".folder", "there is no such folder now"});
+  }
+}
+
+}  // namespace
+
+std::vector<RuleFault> doubtful_settings(const Config& config) {
+  Doubts doubts;
+  doubt_members(config.swarm, doubts);
+  doubt_cameras(config, doubts);
+  if (::if_nametoindex(config.net.interface.c_str()) == 0)
+    doubts.push_back({"net.interface", "there is no such interface now"});
+  if (config.net.key_file.empty() && config.net.interface != "lo")
+    doubts.push_back(
+        {"net.key_file", "is empty: whoever is on the mesh can read and forge; crepesctl keygen"});
+  return doubts;
+}
+
+}  // namespace crepes
