@@ -16,7 +16,7 @@ void add(const ImuSample& sample, double dt, ImuMean& sum) {
   sum.accel_mps2 += dt * sample.accel_mps2;
 }
 
-// Integral of the square of the time since the last sample, from `since` on and for `dt`.
+// Integral of the square of the time to the sample that is held, from `since` on and for `dt`.
 double extrapolation_time_squared(double since, double dt) {
   const double most = to_seconds(ImuHistory::kMaxHold);
   const double end = std::min(since + dt, most);
@@ -116,7 +116,8 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
     const Timestamp end = std::min(to, sample.stamp);
     const double dt = to_seconds(end - t);
     add(sample, dt, sum);
-    if (!covered) extrapolate(to_seconds(kMaxHold), dt);
+    // In a gap the next sample is held, so that the error shrinks towards it.
+    if (!covered) extrapolate(to_seconds(sample.stamp - end), dt);
     t = end;
   }
   if (t < to) {

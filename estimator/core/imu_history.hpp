@@ -17,7 +17,8 @@ struct ImuMean {
   Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
   double extrapolated = 0.0;  ///< share of the interval, 0..1, that no sample covers
-  /// Mean square of the time since the last sample where none covers, at most kMaxHold^2 [s^2].
+  /// Mean square of the time to the nearest sample that is held where none covers, at most
+  /// kMaxHold^2 [s^2].
   double extrapolation_time2_s2 = 0.0;
   /// White noise measured in the samples, with vibration.
   double gyro_noise_density = 0.0;   ///< [rad/s/sqrt(Hz)]
@@ -38,7 +39,7 @@ class ImuHistory {
  public:
   static constexpr std::size_t kCapacity = 256;
   static constexpr Duration kMaxGap = std::chrono::milliseconds{50};
-  static constexpr Duration kMaxHold = std::chrono::milliseconds{100};
+  static constexpr Duration kMaxHold = std::chrono::milliseconds{500};
 
   /// False, and nothing changes, if the sample is implausible, a duplicate, or older than all kept.
   bool push(const ImuSample& sample);

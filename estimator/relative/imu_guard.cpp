@@ -21,7 +21,7 @@ constexpr std::size_t kDecided = 6;  // samples after which a change is called a
 constexpr double kMostSteps = 10.0;  // over which an innovation grows as a random walk
 constexpr Duration kTypicalPeriod = std::chrono::milliseconds{10};
 // Across a longer gap there is no prediction.
-constexpr Duration kLongestGap = ImuHistory::kMaxHold;
+constexpr Duration kLongestGap = std::chrono::milliseconds{100};
 
 // Medians of innovations: half again the vibration of a sample, which no airframe exceeds.
 constexpr PerSensor kMostVibration{.gyro = 3.0, .accel = 30.0};

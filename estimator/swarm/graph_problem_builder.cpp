@@ -1,6 +1,7 @@
 #include "estimator/swarm/graph_problem_builder.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "estimator/relative/propagation.hpp"
 
@@ -8,9 +9,18 @@ namespace crepes {
 namespace {
 
 constexpr Duration kMaxEstimateAge = std::chrono::milliseconds{500};
+// An estimate is not carried across a longer time without samples: the error that it gains there is
+// not in its covariance.
+constexpr Duration kMaxExtrapolation = std::chrono::milliseconds{200};
 // Errors that IMU integration adds to a propagated estimate.
 constexpr double kSpeedError = 0.1;  // m/s
 constexpr double kTurnError = 0.02;  // rad/s
+
+bool is_covered(const ImuHistory& imu, Timestamp from, Timestamp to) {
+  if (to < from) std::swap(from, to);
+  if (from == to) return true;
+  return imu.mean(from, to).extrapolated * to_seconds(to - from) <= to_seconds(kMaxExtrapolation);
+}
 
 // The estimate propagated to `stamp`. Its position covariance turns with the observer's axes.
 RelativePoseEdge propagated_edge(RobotId from, const NeighborEstimate& estimate,
@@ -54,7 +64,9 @@ GraphProblem GraphProblemBuilder::build(Timestamp stamp, RobotId self,
     if (std::chrono::abs(stamp - estimate.stamp) > kMaxEstimateAge) continue;
     const ImuHistory* imu_from = imu_of(pair.first);
     const ImuHistory* imu_to = imu_of(pair.second);
-    if (imu_from == nullptr || imu_to == nullptr) continue;
+    if (imu_from == nullptr || imu_to == nullptr || !is_covered(*imu_from, estimate.stamp, stamp) ||
+        !is_covered(*imu_to, estimate.stamp, stamp))
+      continue;
     problem.edges.push_back(propagated_edge(pair.first, estimate, *imu_from, *imu_to, stamp));
   }
   return problem;

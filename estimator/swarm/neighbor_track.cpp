@@ -181,6 +181,12 @@ GaussianPose NeighborTrack::pose() const {
       filter_);
 }
 
+double NeighborTrack::speed_sigma() const {
+  const auto* tight = std::get_if<NeighborFilter>(&filter_);
+  if (tight == nullptr) return 0.0;
+  return std::sqrt(tight->covariance().diagonal().segment<3>(ErrorState::kV).maxCoeff());
+}
+
 std::optional<CalibrationRecord> NeighborTrack::calibration() const {
   const auto* tight = std::get_if<NeighborFilter>(&filter_);
   if (tight == nullptr) return std::nullopt;

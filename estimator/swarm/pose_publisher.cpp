@@ -40,6 +40,7 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
   if (!is_certain(T_B_N.covariance) || track.is_contradicted()) return;
   if (hypotheses.generation() != std::exchange(generation_, hypotheses.generation())) {
     ++starts_;
+    started_ = stamp;
     correction_.reset();
   }
 
@@ -65,6 +66,7 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
                   .imu = is_recent(neighbor.imu.newest().stamp),
                   .graph = is_recent(graph)};
   pose_ = pose;
+  speed_sigma_ = track.speed_sigma();
 }
 
 void PosePublisher::add_graph_correction(Timestamp stamp, const GraphPose& pose) {
@@ -74,7 +76,11 @@ void PosePublisher::add_graph_correction(Timestamp stamp, const GraphPose& pose)
 }
 
 std::optional<NeighborEstimate> PosePublisher::estimate() const {
-  if (!pose_ || pose_->mode != PoseMode::kDirect) return std::nullopt;
+  constexpr double kMaxSpeedSigma = 0.3;  // m/s; those who start from it assume as much
+  constexpr Duration kSettling = std::chrono::milliseconds{500};
+  const bool is_settled =
+      pose_ && pose_->stamp - started_ >= kSettling && speed_sigma_ <= kMaxSpeedSigma;
+  if (!is_settled || pose_->mode != PoseMode::kDirect) return std::nullopt;
   return NeighborEstimate{pose_->stamp, neighbor_, pose_->T_B_N, pose_->v_B_N};
 }
 
@@ -131,7 +137,7 @@ std::optional<NeighborPose> PosePublisher::published() const {
   // One of the two is wrong, and nothing shows which.
   NeighborPose doubtful = *pose_;
   doubtful.T_B_N.covariance += d * d.transpose();
-  return doubtful;
+  return is_certain(doubtful.T_B_N.covariance) ? std::optional(doubtful) : std::nullopt;
 }
 
 }  // namespace crepes

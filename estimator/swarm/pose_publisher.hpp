@@ -44,10 +44,14 @@ class PosePublisher {
 
   /// The filter's pose at the last tick. Empty while unknown or too uncertain.
   [[nodiscard]] const std::optional<NeighborPose>& pose() const { return pose_; }
-  /// The graph's edge: a certain pose with a recent sighting.
+  /// The graph's edge: a certain pose with a recent sighting. Right after its start a filter
+  /// does not know how the neighbor moves, and may follow a false hypothesis: it waits half a
+  /// second and until the velocity is certain.
   [[nodiscard]] std::optional<NeighborEstimate> estimate() const;
-  /// The team's pose if there is one and it agrees with the filter's. Otherwise the filter's, with
-  /// the paper's graph's correction, if a recent one exists.
+  /// The team's pose if there is one and it agrees with the filter's. If they contradict each
+  /// other, the filter's, with a covariance that contains the difference; none if that is too
+  /// uncertain. Without a team's pose the filter's, with the paper's graph's correction, if a
+  /// recent one exists.
   [[nodiscard]] std::optional<NeighborPose> published() const;
 
  private:
@@ -66,7 +70,9 @@ class PosePublisher {
   OutputPredictor predictor_;
   std::uint32_t generation_ = 0;  ///< of the hypothesis published last
   std::uint32_t starts_ = 0;
+  Timestamp started_ = kNever;  ///< the latest of these
   std::optional<NeighborPose> pose_;
+  double speed_sigma_ = 0.0;  ///< of `pose_` [m/s]
   std::optional<Correction> correction_;
   ProcessNoise noise_;
   double pose_gate_ = 0.0;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <tuple>
 
@@ -72,6 +73,13 @@ bool has_own_edge(const TeamInterval& interval, RobotId id) {
   return std::ranges::any_of(interval.edges, [&](const RelativePoseEdge& edge) {
     return ordered(edge.from, edge.to) == ordered(interval.self, id);
   });
+}
+
+Matrix6d start_floor() {
+  Vector6d variance;
+  variance << Eigen::Vector3d::Constant(kStartPosition * kStartPosition),
+      Eigen::Vector3d::Constant(kStartAttitude * kStartAttitude);
+  return variance.asDiagonal();
 }
 
 bool is_usable(const RelativePoseEdge& edge) {
@@ -416,6 +424,26 @@ Eigen::Matrix3d TeamFilter::position_covariance(RobotId from, RobotId to) const 
   return covariance;
 }
 
+namespace {
+
+/// The mean of what a pair measured may be false, although its gate accepts it: then nothing in it
+/// is information. Mean and variance become those of the mixture (probabilistic data association,
+/// Bar-Shalom and Tse 1975). `S` is the innovation's variance. False if it is more likely false.
+bool associate(double S, TeamRow& row) {
+  constexpr double kFalseRanges = 0.05;  // 1/m, as for the pairs' filters
+  const double residual = row.residual.x();
+  const double nis = residual * residual / S;
+  const double density = std::exp(-0.5 * nis) / std::sqrt(2.0 * std::numbers::pi * S);
+  const double is_true = density / (density + kFalseRanges);
+  const double weight = is_true * (1.0 - (1.0 - is_true) * nis);
+  if (is_true < 0.5 || weight <= 0.0) return false;
+  row.variance += S / weight - S;
+  row.residual.x() *= is_true / weight;
+  return true;
+}
+
+}  // namespace
+
 /// Drops readings that are too unlikely, and counts how each camera and pair agrees.
 void TeamFilter::gate(const TeamInterval& interval, const Trajectories& paths, Readings& readings) {
   for (Sight& sight : readings.sights) {
@@ -503,7 +531,7 @@ std::vector<TeamRow> TeamFilter::rows(const TeamInterval& interval, const Trajec
     }
     if (!mean) continue;
     mean->residual.x() = sum_m / count;
-    rows.push_back(*mean);
+    if (associate(mean->covariance(P_)(0, 0), *mean)) rows.push_back(*mean);
   }
   return rows;
 }
@@ -764,7 +792,9 @@ void TeamFilter::add_members(const TeamInterval& interval, TeamSolution& solutio
       if ((!forward && edge.to != known) || places.contains(id) ||
           member_of(interval, id) == nullptr || !is_usable(edge))
         continue;
-      const GaussianPose step = forward ? edge.T_from_to : inverse(edge.T_from_to);
+      GaussianPose step = forward ? edge.T_from_to : inverse(edge.T_from_to);
+      // What a peer estimated is not believed to be better, whatever it claims.
+      if (edge.from != self_) step.covariance += start_floor();
       const Eigen::Vector3d v =
           forward ? edge.v_from_to
                   : Eigen::Vector3d(-(edge.T_from_to.pose.R().transpose() * edge.v_from_to));

@@ -34,7 +34,8 @@ struct PendingImage {
   std::uint8_t camera = 0;
   RecordedImage image;
 };
-using Input = std::variant<Event, Datagram, PendingImage>;
+struct Restart {};
+using Input = std::variant<Event, Datagram, PendingImage, Restart>;
 
 /// An input that reaches a robot at an instant of true time.
 struct Arrival {
@@ -92,6 +93,12 @@ struct Robot {
         detector(recording.config.vision),
         period(from_seconds(1.0 / recording.config.estimator.output_rate_hz)) {}
 
+  void restart() {
+    estimator = Estimator(estimator_settings(recording.config));
+    team = TeamSolver();
+    link = PeerLink(recording.robot.id, member_ids(recording.config));
+  }
+
   RobotRecording recording;
   Estimator estimator;
   TeamSolver team;
@@ -116,7 +123,8 @@ class SwarmReplay {
         truth_(truth),
         sinks_(sinks),
         faults_(std::move(dataset.faults)),
-        network_(manifest_.network, options.seed.value_or(manifest_.network.seed)) {
+        network_(manifest_.network, options.seed.value_or(manifest_.network.seed)),
+        outages_(options.outages) {
     for (RobotRecording& recording : dataset.robots) {
       recording.config.graph.enabled &= options.graph;
       if (options.profile) recording.config.estimator.profile = *options.profile;
@@ -124,6 +132,10 @@ class SwarmReplay {
       if (sinks.on_records) robots_.back().estimator.keep_records();
     }
     for (std::size_t i = 0; i < robots_.size(); ++i) schedule_recording(i);
+    for (const Outage& outage : outages_) {
+      for (std::size_t i = 0; i < robots_.size(); ++i)
+        if (outage.restarts && robots_[i].id() == outage.robot) schedule(outage.to_s, i, Restart{});
+    }
   }
 
   [[nodiscard]] Result<void> run(const std::function<void(double)>& on_progress);
@@ -138,6 +150,7 @@ class SwarmReplay {
   }
   void schedule_recording(std::size_t index);
   [[nodiscard]] Result<void> deliver(const Arrival& arrival);
+  [[nodiscard]] bool is_held(const Arrival& arrival);
   void step(const Arrival& arrival, const Event& event);
   void handle_outputs(const Arrival& arrival, const Outputs& outputs);
   void broadcast(const Arrival& arrival, const Report& report);
@@ -149,6 +162,7 @@ class SwarmReplay {
   const ReplaySinks& sinks_;
   DatasetFaults faults_;
   SimulatedNetwork network_;
+  std::vector<Outage> outages_;
   std::deque<Robot> robots_;
   std::priority_queue<Arrival, std::vector<Arrival>, Later> queue_;
   std::uint64_t next_order_ = 0;
@@ -190,8 +204,26 @@ Result<void> SwarmReplay::run(const std::function<void(double)>& on_progress) {
   return {};
 }
 
+/// Whether the robot stands still. What can wait for it does.
+bool SwarmReplay::is_held(const Arrival& arrival) {
+  const RobotId robot = robots_[arrival.robot].id();
+  const auto outage = std::ranges::find_if(outages_, [&](const Outage& o) {
+    return o.robot == robot && arrival.true_s >= o.from_s && arrival.true_s < o.to_s;
+  });
+  if (outage == outages_.end()) return false;
+  const auto* const event = std::get_if<Event>(&arrival.what);
+  const bool is_tick = event != nullptr && std::holds_alternative<Tick>(*event);
+  if (!outage->restarts && !is_tick) schedule(outage->to_s, arrival.robot, arrival.what);
+  return true;
+}
+
 Result<void> SwarmReplay::deliver(const Arrival& arrival) {
+  if (is_held(arrival)) return {};
   Robot& robot = robots_[arrival.robot];
+  if (std::holds_alternative<Restart>(arrival.what)) {
+    robot.restart();
+    return {};
+  }
   if (const auto* event = std::get_if<Event>(&arrival.what)) {
     step(arrival, *event);
   } else if (const auto* datagram = std::get_if<Datagram>(&arrival.what)) {
@@ -259,7 +291,13 @@ void SwarmReplay::broadcast(const Arrival& arrival, const Report& report) {
   robot.bytes_sent += datagram.size();
   for (std::size_t i = 0; i < robots_.size(); ++i) {
     if (i == arrival.robot) continue;
-    if (const auto delay_s = network_.delay_s()) schedule(arrival.true_s + *delay_s, i, datagram);
+    std::vector<Delivery> deliveries;
+    if (const auto delay_s = network_.delay_s())
+      deliveries.push_back({arrival.true_s + *delay_s, datagram});
+    if (sinks_.on_delivery)
+      sinks_.on_delivery(robot.id(), robots_[i].id(), arrival.true_s, deliveries);
+    for (Delivery& delivery : deliveries)
+      schedule(std::max(arrival.true_s, delivery.arrives_s), i, std::move(delivery.bytes));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "config/schema/config.hpp"
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
@@ -15,6 +16,14 @@
 
 namespace crepes {
 
+/// A robot that stands still: between these instants it neither measures, sends nor receives.
+struct Outage {
+  RobotId robot{};
+  double from_s = 0.0;  ///< true time
+  double to_s = 0.0;
+  bool restarts = false;  ///< then it begins anew; otherwise it gets what has waited
+};
+
 struct ReplayOptions {
   std::filesystem::path swarm_dir;
   std::filesystem::path out_dir;
@@ -22,7 +31,14 @@ struct ReplayOptions {
   bool graph = true;                  ///< false: no pose graph, even if the files enable it
   bool records = false;               ///< also writes the residual and verdict of every measurement
   std::optional<std::uint64_t> seed;  ///< seed of the network; overrides swarm.yaml
+  std::vector<Outage> outages;
   std::function<void(double)> on_progress;  ///< progress, 0..1, called regularly
+};
+
+/// A datagram on its way to one receiver.
+struct Delivery {
+  double arrives_s = 0.0;  ///< true time
+  std::vector<std::uint8_t> bytes;
 };
 
 struct ReplaySummary {
@@ -40,6 +56,8 @@ struct ReplaySummary {
 struct ReplaySinks {
   std::function<void(RobotId observer, const NeighborPose&)> on_pose;
   std::function<void(RobotId observer, const Records&)> on_records;  ///< empty: none are kept
+  /// May change, add or remove deliveries of a datagram, for studies of bad networks; may be empty.
+  std::function<void(RobotId from, RobotId to, double sent_s, std::vector<Delivery>&)> on_delivery;
   /// May change a report before it is sent, for studies of faulty members; may be empty.
   std::function<void(Report&)> on_report;
 };
