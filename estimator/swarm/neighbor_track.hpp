@@ -58,8 +58,7 @@ class NeighborTrack {
 
   [[nodiscard]] RelativeMotion motion() const;
   [[nodiscard]] GaussianPose pose() const;
-  /// Of the velocity, the largest of the axes [m/s]; zero for the paper's filter, which is not
-  /// asked.
+  /// Of the velocity, the largest of the axes [m/s]; zero for the paper's filter.
   [[nodiscard]] double speed_sigma() const;
   [[nodiscard]] bool is_certain() const { return crepes::is_certain(pose().covariance); }
   /// The sensor calibration that the tight filter estimates; empty for the paper's filter.

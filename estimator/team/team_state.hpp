@@ -31,7 +31,6 @@ struct TeamCamera {
   Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< u_measured = Exp(m) u
   int index = 0;
   std::map<RobotId, Agreement> agreement{};  ///< of its bearings, by the robot that it sees
-  std::optional<Timestamp> reopened{};       ///< when its misalignment was declared unknown
   bool is_refused = false;                   ///< it contradicted the others after that, too
 };
 
