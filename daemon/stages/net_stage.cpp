@@ -30,6 +30,11 @@ std::vector<RobotId> ids_of(const NetSettings& settings) {
   return ids;
 }
 
+SendSettings salted(SendSettings settings) {
+  settings.session_salt = random_salt();
+  return settings;
+}
+
 /// The net thread's state.
 class NetLoop {
  public:
@@ -38,7 +43,7 @@ class NetLoop {
         clock_(clock),
         settings_(stage.settings.receive().value()),
         start_(clock.now()),
-        link_(settings_.self, ids_of(settings_)),
+        link_(settings_.self, ids_of(settings_), salted(settings_.send)),
         mesh_(settings_.net) {
     config_status_.since = start_;
     open_server();
@@ -47,6 +52,7 @@ class NetLoop {
   void reconfigure(const NetSettings& settings) {
     const NetSettings before = std::exchange(settings_, settings);
     link_.set_members(ids_of(settings_));
+    link_.set_pacing(settings_.send);
     if (before.net.interface != settings_.net.interface || before.net.port != settings_.net.port ||
         before.net.key_file != settings_.net.key_file ||
         before.key_identity != settings_.key_identity) {
@@ -189,6 +195,7 @@ NetSettings net_settings(const Config& config) {
   NetSettings settings{.self = config.robot.id,
                        .members = {},
                        .net = config.net,
+                       .send = send_settings(config),
                        .subscription = config.subscription,
                        .key_identity = {}};
   for (const MemberConfig& member : config.swarm.members) settings.members[member.id] = member.name;

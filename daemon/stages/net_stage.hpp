@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "config/schema/config.hpp"
+#include "config/schema/mesh_slice.hpp"
 #include "daemon/stages/bounded_queue.hpp"
 #include "daemon/stages/live_settings.hpp"
 #include "daemon/stages/stage_context.hpp"
@@ -48,6 +49,7 @@ struct NetSettings {
   RobotId self{};
   std::map<RobotId, std::string> members;  ///< names, this robot's included
   NetConfig net;
+  SendSettings send;
   SubscriptionConfig subscription;
   std::string key_identity;  ///< fingerprint of the key in `net.key_file`: the same file may hold
                              ///< another key later

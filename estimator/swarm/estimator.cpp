@@ -22,9 +22,6 @@
 namespace crepes {
 namespace {
 
-// The graph needs no higher rate of estimates in the reports.
-constexpr Duration kEstimatePeriod = std::chrono::milliseconds{100};
-
 const MemberConfig& member_of(const SwarmConfig& swarm, RobotId id) {
   const auto found = std::find_if(swarm.members.begin(), swarm.members.end(),
                                   [id](const MemberConfig& member) { return member.id == id; });
@@ -88,7 +85,6 @@ struct Estimator::State {
         uses_team_filter(settings.uses_team_filter),
         team_size(settings.team_size),
         report_timer(period_of(settings.report_rate_hz)),
-        estimate_timer(kEstimatePeriod),
         graph_timer(period_of(settings.graph_rate_hz)),
         swarm(settings.swarm),
         filters(filter_settings(settings.filters, settings.imu, settings.range)),
@@ -127,7 +123,6 @@ struct Estimator::State {
   bool uses_team_filter;
   std::size_t team_size;
   PeriodicTimer report_timer;
-  PeriodicTimer estimate_timer;
   PeriodicTimer graph_timer;
   Timestamp last_tick = kNever;
   SwarmConfig swarm;
@@ -290,9 +285,7 @@ Outputs Estimator::State::handle(const Tick& tick) {
     if (auto pose = neighbor.output().published()) outputs.poses.push_back(std::move(*pose));
   }
   if (report_timer.is_due(tick.stamp)) {
-    const bool with_estimates = estimate_timer.is_due(tick.stamp);
-    outputs.report = composer.compose(tick.stamp, self,
-                                      with_estimates ? estimates : std::vector<NeighborEstimate>{});
+    outputs.report = composer.compose(tick.stamp, self, estimates);
   }
   if (outputs.report && runs_team_filter()) {
     graph_builder.add_report(*outputs.report);

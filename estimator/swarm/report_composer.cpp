@@ -3,7 +3,7 @@
 namespace crepes {
 namespace {
 
-constexpr Duration kRepeated = std::chrono::milliseconds{160};
+constexpr Duration kRepeated = std::chrono::milliseconds{260};
 
 }  // namespace
 

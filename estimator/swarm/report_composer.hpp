@@ -11,9 +11,9 @@
 
 namespace crepes {
 
-/// Every report repeats the last 160 ms: a datagram in three may be lost. Bearings are thinned to
-/// one a neighbor and report; the filter at the other end gains nothing from a camera's every
-/// frame.
+/// Every report has the measurements of the last 260 ms; the mesh decides how often each is
+/// repeated. Bearings are thinned to one a neighbor and report; the filter at the other end gains
+/// nothing from a camera's every frame.
 class ReportComposer {
  public:
   explicit ReportComposer(RobotId self) : self_(self) {}

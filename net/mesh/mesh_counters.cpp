@@ -21,7 +21,6 @@ constexpr auto kNames = std::to_array<std::string_view>({"held_clock_unknown",
                                                          "refused_duplicate",
                                                          "refused_echo",
                                                          "refused_foreign",
-                                                         "refused_not_finite",
                                                          "refused_not_unit",
                                                          "refused_old_session",
                                                          "refused_other_version",
@@ -48,10 +47,10 @@ static_assert(kNames.size() == kMeshCounterCount &&
 
 // In the order of PeerMessageError and of UnsealError.
 constexpr std::array<MeshCounter, kPeerMessageErrorCount> kOfMessageErrors{
-    kRefusedTooShort, kRefusedTooLong,      kRefusedForeign,  kRefusedOtherVersion,
-    kRefusedDamaged,  kRefusedTruncated,    kRefusedTrailing, kRefusedNotFinite,
-    kRefusedBadId,    kRefusedBadStamp,     kRefusedBadIndex, kRefusedOutOfRange,
-    kRefusedNotUnit,  kRefusedBadCovariance};
+    kRefusedTooShort,     kRefusedTooLong,   kRefusedForeign,    kRefusedOtherVersion,
+    kRefusedDamaged,      kRefusedTruncated, kRefusedTrailing,   kRefusedBadId,
+    kRefusedBadStamp,     kRefusedBadIndex,  kRefusedOutOfRange, kRefusedNotUnit,
+    kRefusedBadCovariance};
 constexpr std::array<MeshCounter, 3> kOfUnsealErrors{kRefusedSealMissing, kRefusedSealVersion,
                                                      kRefusedSealBroken};
 

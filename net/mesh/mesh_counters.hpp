@@ -29,7 +29,6 @@ enum class MeshCounter : std::uint8_t {
   kRefusedDuplicate,
   kRefusedEcho,  ///< echoes, not datagrams: of a datagram that we never sent
   kRefusedForeign,
-  kRefusedNotFinite,
   kRefusedNotUnit,
   kRefusedOldSession,  ///< of a session that a newer one has replaced
   kRefusedOtherVersion,
@@ -50,7 +49,7 @@ enum class MeshCounter : std::uint8_t {
   kSent,       ///< datagrams
   kSentBytes,  ///< of those
 };
-inline constexpr std::size_t kMeshCounterCount = 34;
+inline constexpr std::size_t kMeshCounterCount = 33;
 
 /// As STATUS and report.json call it.
 [[nodiscard]] std::string_view name_of(MeshCounter counter);

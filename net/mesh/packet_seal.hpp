@@ -1,10 +1,12 @@
 /// Authenticated encryption of datagrams with the swarm's key. A seal is the encrypted form.
 ///
-///   "CRS", version u8 | nonce 24 bytes | XChaCha20-Poly1305 of the datagram, its tag 16 bytes
+/// The first 18 bytes of a datagram (`peer_message.hpp`) remain readable, with "CRS" for "CRP".
+/// What follows is encrypted by XChaCha20-Poly1305, with a tag of 16 bytes. The nonce is sender,
+/// session and sequence number, filled with zeros: no two datagrams of a swarm share it, because
+/// sessions are random. The 18 bytes are authenticated with the rest.
 ///
-/// The first four bytes are authenticated with the rest. All robots share one key: a valid seal
-/// proves that the sender belongs to the swarm, but not which robot it is. Replays are detected by
-/// `PeerLink`.
+/// All robots share one key: a valid seal proves that the sender belongs to the swarm, but not
+/// which robot it is. Replays are detected by `PeerLink`.
 #pragma once
 
 #include <array>
@@ -34,13 +36,17 @@ enum class UnsealError : std::uint8_t {
   kNotAuthentic,  ///< sealed with another key, or modified on the way
 };
 
+/// A random number for `SendSettings::session_salt`.
+[[nodiscard]] std::uint64_t random_salt();
+
 class PacketSeal {
  public:
-  static constexpr std::size_t kOverhead = 4 + 24 + 16;  ///< bytes that sealing adds
+  static constexpr std::size_t kOverhead = 16;  ///< bytes that sealing adds
 
   explicit PacketSeal(const MeshKey& key);
 
-  /// Encrypts with a random nonce: equal datagrams differ when sealed.
+  /// Seals a datagram of `encode_peer_message`. Of those with equal first 18 bytes, only one may
+  /// ever be sealed: two would reveal each other.
   [[nodiscard]] std::vector<std::uint8_t> seal(std::span<const std::uint8_t> plain) const;
   [[nodiscard]] tl::expected<std::vector<std::uint8_t>, UnsealError> open(
       std::span<const std::uint8_t> sealed) const;

@@ -51,8 +51,15 @@ tl::expected<PeerMessage, MeshCounter> decode(std::span<const std::uint8_t> data
 
 }  // namespace
 
-PeerLink::PeerLink(RobotId self, const std::vector<RobotId>& members) : self_(self) {
+PeerLink::PeerLink(RobotId self, const std::vector<RobotId>& members, const SendSettings& settings)
+    : self_(self), settings_(settings) {
   set_members(members);
+}
+
+void PeerLink::set_pacing(const SendSettings& settings) {
+  const std::uint64_t salt = settings_.session_salt;
+  settings_ = settings;
+  settings_.session_salt = salt;
 }
 
 void PeerLink::set_members(const std::vector<RobotId>& members) {
@@ -128,6 +135,7 @@ PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message, Times
   Session& session = is_it(peer.live) ? *peer.live : *peer.candidate;
   switch (session.sequence.accept(message.sequence, max_ahead(arrival - session.last_arrival))) {
     case SequenceWindow::Verdict::kNew:
+      update_loss(session);
       return &session;
     case SequenceWindow::Verdict::kDuplicate:
       counters_.add(MeshCounter::kRefusedDuplicate);
@@ -148,8 +156,8 @@ bool PeerLink::readmit(Peer& peer, const PeerMessage& message, Timestamp arrival
   const auto ended = std::ranges::find(peer.ended, message.session, &EndedSession::id);
   if (ended == peer.ended.end()) return true;
   const bool is_alive = std::ranges::any_of(message.echoes, [&](const ClockEcho& echo) {
-    const Timestamp sent{Duration{echo.sent_ns}};
-    return echo.peer == self_ && sent > ended->at && was_sent_by_us(sent, arrival);
+    const auto sent = sent_by_us(echo.sent_code, arrival);
+    return echo.peer == self_ && sent && *sent > ended->at;
   });
   if (!is_alive) {
     counters_.add(MeshCounter::kRefusedOldSession);  // delayed or replayed
@@ -173,14 +181,15 @@ bool PeerLink::update_clock(Session& session, const PeerMessage& message, Timest
   }
   for (const ClockEcho& echo : message.echoes) {
     if (echo.peer != self_) continue;
-    const Timestamp sent{Duration{echo.sent_ns}};
-    if (!was_sent_by_us(sent, arrival)) {
+    const auto sent = sent_by_us(echo.sent_code, arrival);
+    if (!sent) {
       counters_.add(MeshCounter::kRefusedEcho);
       continue;
     }
     session.has_echoed_us = true;
+    session.loss.of_ours = echo.loss;
     const PeerTimestamp reached{Duration{echo.received_ns}};
-    switch (session.clock.add_echo(sent, reached, arrival)) {
+    switch (session.clock.add_echo(*sent, reached, arrival)) {
       case ClockOffset::Verdict::kUsed:
         break;
       case ClockOffset::Verdict::kRestarted:
@@ -209,14 +218,49 @@ void PeerLink::replace_session(Peer& peer, Timestamp now) {
   peer.live = std::move(next);
 }
 
-bool PeerLink::was_sent_by_us(Timestamp sent, Timestamp now) const {
-  return sent > now - kMaxEchoAge && std::ranges::binary_search(sent_, sent);
+/// Updates the share of the peer's datagrams that do not arrive.
+void PeerLink::update_loss(Session& session) {
+  constexpr double kMemory = 0.98;  // two seconds of 25 datagrams each
+  Loss& loss = session.loss;
+  const std::uint64_t lost = session.sequence.lost();
+  loss.received = kMemory * loss.received + 1;
+  // One that arrives late is no longer lost.
+  loss.lost = std::max(
+      0.0, kMemory * loss.lost + static_cast<double>(lost) - static_cast<double>(loss.lost_before));
+  loss.lost_before = lost;
+  loss.of_theirs = loss.lost / (loss.lost + loss.received);
 }
 
-/// Differs from start to start, because the clock has advanced or the machine has restarted.
-std::uint32_t PeerLink::own_session() const {
-  const auto ns = static_cast<std::uint64_t>(to_ns(*first_sent_));
-  return static_cast<std::uint32_t>(ns ^ (ns >> 32U));
+/// When we sent the datagram that an echo names, if that was a moment ago.
+std::optional<Timestamp> PeerLink::sent_by_us(std::uint32_t code, Timestamp now) const {
+  const auto found = std::find_if(sent_.rbegin(), sent_.rend(), [code](Timestamp sent) {
+    return echo_code(to_ns(sent)) == code;
+  });
+  return found != sent_.rend() && *found > now - kMaxEchoAge ? std::optional(*found) : std::nullopt;
+}
+
+/// Differs from start to start, because the clock has advanced or the machine has restarted, and
+/// with the salt.
+std::uint64_t PeerLink::own_session() const {
+  return settings_.session_salt ^ static_cast<std::uint64_t>(to_ns(*first_sent_));
+}
+
+/// Copies for the peer that loses the most of ours; room for those that are heard.
+WireLimits PeerLink::limits(Timestamp now, std::size_t overhead) const {
+  constexpr double kUnknownLoss = 0.2;
+  double loss = 0.0;
+  std::size_t heard = 0;
+  for (const auto& [id, peer] : peers_) {
+    if (!peer.live || now - peer.live->last_arrival > kEchoAge) continue;
+    ++heard;
+    loss = std::max(loss, peer.live->loss.of_ours.value_or(kUnknownLoss));
+  }
+  return {
+      .bytes = std::max(datagram_bytes(settings_, heard), kMinPeerMessage + overhead) - overhead,
+      .copies = copies_for(heard > 0 ? loss : kUnknownLoss),
+      .period = from_seconds(1 / settings_.rate_hz),
+      .gyro_step_radps = settings_.gyro_step_radps,
+      .accel_step_mps2 = settings_.accel_step_mps2};
 }
 
 std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,
@@ -234,11 +278,12 @@ std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,
     for (const std::optional<Session>* known : {&peer.live, &peer.candidate}) {
       const auto packet = *known ? (*known)->clock.fastest_recent_packet() : std::nullopt;
       if (packet && packet->arrival <= now && packet->arrival > now - kEchoAge)
-        message.echoes.push_back({id, to_ns(packet->sent), to_ns(packet->arrival)});
+        message.echoes.push_back(
+            {id, echo_code(to_ns(packet->sent)), to_ns(packet->arrival), (*known)->loss.of_theirs});
     }
   }
   EncodedPeerMessage encoded =
-      encode_peer_message(message, kMaxPeerMessage - (seal ? PacketSeal::kOverhead : 0));
+      encode_peer_message(message, limits(now, seal ? PacketSeal::kOverhead : 0));
   if (seal) encoded.bytes = seal->seal(encoded.bytes);
   counters_.add(MeshCounter::kSent);
   counters_.add(MeshCounter::kSentBytes, encoded.bytes.size());
@@ -266,6 +311,7 @@ std::vector<PeerTraffic> PeerLink::traffic(Timestamp now) const {
     heard.back().received += session->sequence.received();
     heard.back().lost += session->sequence.lost();
     heard.back().age_s = to_seconds(now - session->last_arrival);
+    heard.back().loss = session->loss.of_theirs;
   }
   return heard;
 }

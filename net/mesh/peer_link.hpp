@@ -20,6 +20,7 @@
 #include "net/mesh/peer_message.hpp"
 #include "net/mesh/peer_status.hpp"
 #include "net/mesh/redundancy_filter.hpp"
+#include "net/mesh/send_pacing.hpp"
 #include "net/mesh/sequence_window.hpp"
 
 namespace crepes {
@@ -27,10 +28,12 @@ namespace crepes {
 class PeerLink {
  public:
   /// `members` are all robots of the swarm; `self` may be among them.
-  PeerLink(RobotId self, const std::vector<RobotId>& members);
+  PeerLink(RobotId self, const std::vector<RobotId>& members, const SendSettings& settings = {});
 
   /// Removes peers that are no longer members; adds the new ones.
   void set_members(const std::vector<RobotId>& members);
+  /// The session remains.
+  void set_pacing(const SendSettings& settings);
 
   /// The report of a peer. Measurements that it repeats are returned once. Empty when the datagram
   /// is refused (see `counters`), is our own, or the peer's clock is not known yet. With `seal`,
@@ -53,8 +56,17 @@ class PeerLink {
   [[nodiscard]] const MeshCounters& counters() const { return counters_; }
 
  private:
+  /// Shares of lost datagrams, the recent ones with the greater weight.
+  struct Loss {
+    double of_theirs = 0.0;           ///< of the peer's, at us
+    std::optional<double> of_ours{};  ///< of ours, at the peer
+    double received = 0.0;            ///< weights
+    double lost = 0.0;
+    std::uint64_t lost_before = 0;
+  };
   struct Session {
-    std::uint32_t id = 0;
+    std::uint64_t id = 0;
+    Loss loss;
     ClockOffset clock;
     SequenceWindow sequence;
     RedundancyFilter redundancy;
@@ -63,7 +75,7 @@ class PeerLink {
     bool has_echoed_us = false;  ///< a recent datagram of ours
   };
   struct EndedSession {
-    std::uint32_t id = 0;
+    std::uint64_t id = 0;
     Timestamp at{};
   };
   struct Peer {
@@ -81,10 +93,13 @@ class PeerLink {
   [[nodiscard]] bool update_clock(Session& session, const PeerMessage& message, Timestamp arrival);
   void count_doubled(MeshCounter counter, RobotId robot, Timestamp now);
   static void replace_session(Peer& peer, Timestamp now);
-  [[nodiscard]] bool was_sent_by_us(Timestamp sent, Timestamp now) const;
-  [[nodiscard]] std::uint32_t own_session() const;
+  static void update_loss(Session& session);
+  [[nodiscard]] std::optional<Timestamp> sent_by_us(std::uint32_t code, Timestamp now) const;
+  [[nodiscard]] std::uint64_t own_session() const;
+  [[nodiscard]] WireLimits limits(Timestamp now, std::size_t overhead) const;
 
   RobotId self_;
+  SendSettings settings_;
   std::map<RobotId, Peer> peers_;  ///< all members except us
   MeshCounters counters_;
   std::optional<DoubledId> doubled_;

@@ -1,23 +1,12 @@
-/// The broadcast datagram of a robot: versioned, with a checksum, at most 1400 bytes.
+/// The broadcast datagram of a robot, version 2: at most 1400 bytes, a few hundred as a rule.
 ///
-/// All numbers are little endian. A tick is 10 us of the sender's clock. Measurements carry their
-/// stamp as a signed 16-bit number of ticks from the datagram's stamp. Every copy of a measurement
-/// decodes to the same stamp.
-///   header     "CRP", version u8, sender u16, session u32, sequence u32, sent i64 [ns],
-///              report's stamp i32 [ticks from sent]
-///   tilt       stamp i32 [ticks], direction, sigma f32
-///   echoes     count u8; peer u16, sent i64 [ns, peer's clock], age u32 [us before sent]
-///   imu        count u8, exponents i8 i8; stamp, gyro 3 x i16 * 2^e, acceleration 3 x i16 * 2^e;
-///              the oldest first
-///   cameras    count u8; optical center 3 x f32
-///   sources    count u8; neighbor u16, camera u8
-///   bearings   count u8; stamp, source u8, direction, sigma u8 (logarithmic)
-///   ranges     count u8; neighbor u16, stamp, range f32, powers 2 x u8 [-0.5 dBm]
-///   estimates  count u8; neighbor u16, stamp, p 3 x f32, q wxyz 4 x i16, v 3 x f32, sigmas 6 x u16
-///              (logarithmic), rows of the correlations' Cholesky factor left of its diagonal 15 x
-///              i16
-///   crc32      u32 over all preceding bytes
-/// A direction is 2 x i16, the octahedral map of a unit vector (error below 5e-5 rad).
+/// It begins with 18 bytes in the clear, little endian:
+///   "CRP", version u8, sender u16, session u64, sequence u32
+/// Then follow bits (`peer_message_code.hpp`) and, last, the CRC-32 of all bytes before.
+///
+/// A tick is 10 us of the sender's clock. Measurements carry their age in ticks before the
+/// datagram's own, so every copy of a measurement decodes to the same stamp. Directions are rounded
+/// by at most 1e-4 rad, ranges to a millimetre, inertial samples to a fraction of their noise.
 #pragma once
 
 #include <array>
@@ -31,21 +20,30 @@
 namespace crepes {
 
 inline constexpr std::size_t kMaxPeerMessage = 1400;  ///< bytes of a datagram, sealed or plain
+inline constexpr std::size_t kMinPeerMessage = 320;   ///< the least that a sender may be limited to
+inline constexpr std::size_t kClearHeader = 18;       ///< bytes that a seal does not hide
 
-/// "I received at `received` the datagram that you sent at `sent`": half of a clock comparison.
+/// "I received at `received` the datagram that you sent": half of a clock comparison.
 struct ClockEcho {
   RobotId peer{};                ///< whose datagram it was
-  std::int64_t sent_ns = 0;      ///< clock of `peer`
+  std::uint32_t sent_code = 0;   ///< `echo_code` of the datagram
   std::int64_t received_ns = 0;  ///< clock of the echo's sender
+  double loss = 0.0;             ///< recent share of the peer's datagrams that did not arrive
   bool operator==(const ClockEcho&) const = default;
 };
+
+/// Stands for the time of sending in an echo. Differs between datagrams of the last seconds, and
+/// cannot be known to somebody who received none of them.
+[[nodiscard]] constexpr std::uint32_t echo_code(std::int64_t sent_ns) {
+  return static_cast<std::uint32_t>(sent_ns);
+}
 
 /// A report with the identity of its datagram. `Time` is a time point of the sender's clock.
 template <class Time>
 struct BasicPeerMessage {
   BasicReport<Time> report;
   Time sent{};                 ///< when the datagram left
-  std::uint32_t session = 0;   ///< changes when the sender restarts
+  std::uint64_t session = 0;   ///< changes when the sender restarts
   std::uint32_t sequence = 0;  ///< counts the session's datagrams
   std::vector<ClockEcho> echoes;
 };
@@ -53,16 +51,26 @@ struct BasicPeerMessage {
 using OutgoingPeerMessage = BasicPeerMessage<Timestamp>;
 using PeerMessage = BasicPeerMessage<PeerTimestamp>;
 
+/// How much of a report travels.
+struct WireLimits {
+  std::size_t bytes = kMaxPeerMessage;  ///< of the datagram, at least kMinPeerMessage
+  std::size_t copies = 6;               ///< datagrams that carry a measurement
+  Duration period{40'000'000};          ///< between datagrams
+  double gyro_step_radps = 1e-3;        ///< coarsest rounding of angular rates
+  double accel_step_mps2 = 1e-2;        ///< coarsest rounding of specific forces
+};
+
 struct EncodedPeerMessage {
   std::vector<std::uint8_t> bytes;
-  std::size_t left_out = 0;  ///< measurements without room, or too old for the stamp's range
+  std::size_t left_out = 0;  ///< neighbors whose newest measurements had no room
   std::size_t refused = 0;   ///< measurements that are not finite or cannot be encoded
 };
 
-/// Encodes by priority into at most `max_bytes` (900 or more): tilt, echoes, the newest IMU
-/// samples, estimates in turn, then bearings and ranges from the newest to the oldest.
+/// Encodes what fits. What must give, in this order: the older copies of bearings and ranges, those
+/// of inertial samples, one neighbor in two, in three and so on, by turns. Each datagram carries
+/// the next one of the estimates and the next three of the echoes.
 [[nodiscard]] EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
-                                                     std::size_t max_bytes = kMaxPeerMessage);
+                                                     const WireLimits& limits = {});
 
 /// Why bytes cannot be decoded.
 enum class PeerMessageError : std::uint8_t {
@@ -73,15 +81,14 @@ enum class PeerMessageError : std::uint8_t {
   kDamaged,       ///< checksum
   kTruncated,     ///< counts exceed the bytes that follow
   kTrailingBytes,
-  kNotFinite,
   kBadId,
   kBadStamp,
-  kBadIndex,       ///< of a source or camera that the message does not list
+  kBadIndex,       ///< of a camera that the message does not list
   kOutOfRange,     ///< a value that the encoder never writes
   kNotUnit,        ///< direction or quaternion
   kBadCovariance,  ///< not positive definite
 };
-inline constexpr std::size_t kPeerMessageErrorCount = 14;
+inline constexpr std::size_t kPeerMessageErrorCount = 13;
 
 /// The message, with finite values only, or the first error.
 [[nodiscard]] tl::expected<PeerMessage, PeerMessageError> decode_peer_message(

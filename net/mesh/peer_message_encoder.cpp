@@ -1,351 +1,351 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <optional>
 
 #include "estimator/core/contract.hpp"
-#include "net/mesh/byte_writer.hpp"
 #include "net/mesh/crc32.hpp"
 #include "net/mesh/peer_message.hpp"
-#include "net/mesh/peer_message_layout.hpp"
+#include "net/mesh/peer_message_code.hpp"
 
 namespace crepes {
 namespace wire {
 namespace {
 
-constexpr std::size_t kHeader = 26;
-constexpr std::size_t kMaxEchoes = 10;
-constexpr std::size_t kMaxImu =
-    16;  // 160 ms at 100 Hz: tolerates the loss of one datagram in three
-constexpr std::size_t kEstimateBudget = 450;
-constexpr std::size_t kMaxCount = 255;
-constexpr std::size_t kTilt = 12;
-constexpr std::size_t kCounts = 7 + 2;  // of the lists, and the IMU's exponents
-constexpr std::size_t kAlways = kHeader + kTilt + kCounts + kChecksum;
-constexpr std::size_t kFirst =
-    kAlways + kMaxEchoes * kEchoSize + kMaxImu * kImuSize + kEstimateBudget;
+constexpr std::size_t kMaxEchoes = 3;
+constexpr std::size_t kMaxCameras = 8;
+constexpr std::size_t kMaxItems = BodyReader::kMaxItems;
 
-std::int64_t round_to_ticks(std::int64_t ns) { return floor_to_ticks(ns + kTick / 2); }
+std::int64_t tick_of(Timestamp stamp) { return floor_to_ticks(to_ns(stamp) + kTick / 2); }
 
-/// Ticks from the datagram's stamp, if they fit the integer of the format.
-template <class Integer>
-std::optional<Integer> ticks_from(std::int64_t base_tick, Timestamp stamp) {
-  const std::int64_t ticks = round_to_ticks(to_ns(stamp)) - base_tick;
-  if (!std::in_range<Integer>(ticks)) return std::nullopt;
-  return static_cast<Integer>(ticks);
-}
-
-bool is_writable(const ImuSample& sample) {
-  const double limit = std::ldexp(kMaxCode, kMaxExponent);
-  return sample.gyro_radps.cwiseAbs().maxCoeff() < limit &&
-         sample.accel_mps2.cwiseAbs().maxCoeff() < limit && sample.gyro_radps.allFinite() &&
-         sample.accel_mps2.allFinite();
+std::int64_t rounded(double value, double step) {
+  return static_cast<std::int64_t>(std::llround(value / step));
 }
 
 bool is_unit(const Eigen::Vector3d& u) { return std::abs(u.norm() - 1) < 1e-3; }
 
+bool is_coordinate(const Eigen::Vector3d& p) {
+  return p.allFinite() && p.cwiseAbs().maxCoeff() < kMaxCoordinate;
+}
+
+bool is_writable(const ImuSample& sample) {
+  const double limit = std::ldexp(static_cast<double>(kMaxImuCode), kMaxExponent - 1);
+  return sample.gyro_radps.allFinite() && sample.accel_mps2.allFinite() &&
+         sample.gyro_radps.cwiseAbs().maxCoeff() < limit &&
+         sample.accel_mps2.cwiseAbs().maxCoeff() < limit;
+}
+
 bool is_writable(const Bearing& bearing) {
-  return is_robot(bearing.neighbor) && is_unit(bearing.u_B) && bearing.p_B_C.allFinite() &&
-         bearing.p_B_C.cwiseAbs().maxCoeff() < kMaxCoordinate && bearing.sigma_rad > 0 &&
-         std::isfinite(bearing.sigma_rad);
+  return is_robot(bearing.neighbor) && is_unit(bearing.u_B) && is_coordinate(bearing.p_B_C) &&
+         bearing.sigma_rad > 0 && std::isfinite(bearing.sigma_rad);
 }
 
 bool is_writable(const UwbRange& range) {
-  return is_robot(range.neighbor) && range.range_m > 0 && range.range_m < kMaxRange &&
+  return is_robot(range.neighbor) && range.range_m >= 1e-3 && range.range_m < kMaxRange &&
          std::isfinite(range.first_path_dbm) && std::isfinite(range.received_dbm);
 }
 
 bool is_writable(const NeighborEstimate& estimate) {
   const Pose& pose = estimate.T_B_N.pose;
-  return is_robot(estimate.neighbor) && pose.p.allFinite() && estimate.v_B_N.allFinite() &&
-         pose.p.cwiseAbs().maxCoeff() < kMaxCoordinate &&
-         estimate.v_B_N.cwiseAbs().maxCoeff() < kMaxCoordinate &&
+  return is_robot(estimate.neighbor) && is_coordinate(pose.p) && is_coordinate(estimate.v_B_N) &&
          std::abs(pose.q.norm() - 1) < 1e-3 &&
          encode_covariance(estimate.T_B_N.covariance).has_value();
 }
 
-/// A bearing with its index in the table of sources.
-struct SourcedBearing {
-  const Bearing* bearing;
-  std::uint8_t source;
-};
-
-/// Index of `item`; appends it if it is new and adds `size` to `cost`. Empty when the table is
-/// full.
-template <class Item>
-std::optional<std::uint8_t> index_in(std::vector<Item>& table, const Item& item, std::size_t size,
-                                     std::size_t& cost) {
-  const auto found = std::find(table.begin(), table.end(), item);
-  const auto index = static_cast<std::size_t>(found - table.begin());
-  if (index >= kMaxCount) return std::nullopt;
-  if (found == table.end()) {
-    table.push_back(item);
-    cost += size;
-  }
-  return static_cast<std::uint8_t>(index);
+/// The exponent of the step: as coarse as allowed, coarser only where a value would not fit.
+template <class Member>
+int exponent_for(const std::vector<const ImuSample*>& samples, Member member, double coarsest) {
+  double largest = 0.0;
+  for (const ImuSample* sample : samples)
+    largest = std::max(largest, (sample->*member).cwiseAbs().maxCoeff());
+  int exponent = std::clamp(std::ilogb(coarsest), kMinExponent, kMaxExponent);
+  while (std::ldexp(static_cast<double>(kMaxImuCode), exponent) < largest) ++exponent;
+  return exponent;
 }
 
-/// The contents of one datagram, selected before encoding.
-class Selection {
+/// Bits of the samples' values of three axes.
+std::size_t bits_of(const std::vector<CodedImuSample>& samples, std::size_t first_axis,
+                    const Prediction& prediction) {
+  std::size_t bits = 0;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    for (std::size_t axis = first_axis; axis < first_axis + 3; ++axis)
+      bits += BitWriter::width_of(
+          samples[i].values.at(axis) - predicted_value(samples, i, axis, prediction.is_linear),
+          prediction.order);
+  }
+  return bits;
+}
+
+Prediction shortest(const std::vector<CodedImuSample>& samples, std::size_t first_axis) {
+  constexpr unsigned kMaxOrder = 15;
+  Prediction best;
+  std::size_t least = bits_of(samples, first_axis, best);
+  for (const bool is_linear : {false, true}) {
+    for (unsigned order = 0; order <= kMaxOrder; ++order) {
+      const std::size_t bits = bits_of(samples, first_axis, {is_linear, order});
+      if (bits < least) {
+        least = bits;
+        best = {is_linear, order};
+      }
+    }
+  }
+  return best;
+}
+
+CodedTilt coded_tilt(const Tilt& tilt, std::int64_t age) {
+  return {age, encode_direction(tilt.up_B), kTiltSigma.encode(tilt.sigma_rad)};
+}
+
+CodedRange coded(const UwbRange& range, std::int64_t age) {
+  const auto power = [](double dbm) {
+    return std::clamp<std::int64_t>(rounded(dbm, -0.5), 0, kMaxPower);
+  };
+  return {age, rounded(range.range_m, 1e-3), power(range.received_dbm),
+          power(range.first_path_dbm)};
+}
+
+CodedEstimate coded(const NeighborEstimate& estimate, std::int64_t age) {
+  CodedEstimate code{.neighbor = estimate.neighbor.value, .age = age};
+  Eigen::Vector4d q = estimate.T_B_N.pose.q.normalized().coeffs();  // x y z w
+  Eigen::Index largest = 0;
+  q.cwiseAbs().maxCoeff(&largest);
+  if (q[largest] < 0) q = -q;
+  code.largest = static_cast<unsigned>(largest);
+  std::size_t next = 0;
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    if (i != largest)
+      code.q.at(next++) =
+          rounded(q[i], 1.0 / (std::numbers::sqrt2 * static_cast<double>(kQuaternionUnit)));
+  }
+  for (int i = 0; i < 3; ++i) {
+    code.p.at(static_cast<std::size_t>(i)) = rounded(estimate.T_B_N.pose.p[i], kPlaceStep);
+    code.v.at(static_cast<std::size_t>(i)) = rounded(estimate.v_B_N[i], kSpeedStep);
+  }
+  const auto covariance = encode_covariance(estimate.T_B_N.covariance);
+  code.sigmas = covariance->sigmas;
+  code.factor = covariance->factor;
+  return code;
+}
+
+/// All that a datagram might carry, as integers.
+class Quantizer {
  public:
-  Selection(const OutgoingPeerMessage& message, std::size_t max_bytes)
-      : base_tick_(floor_to_ticks(to_ns(message.sent))), room_(max_bytes - kAlways) {
-    choose_echoes(message);
-    choose_imu(message.report.imu);
-    choose_estimates(message.report.estimates, message.sequence);
-    choose_bearings_and_ranges(message.report);
+  Quantizer(const OutgoingPeerMessage& message, const WireLimits& limits)
+      : limits_(limits), base_tick_(floor_to_ticks(to_ns(message.sent))) {
+    const Report& report = message.report;
+    body_.sent_ns = static_cast<std::uint64_t>(to_ns(message.sent));
+    body_.report_age = age_of(report.stamp);
+    CREPES_EXPECT(std::abs(body_.report_age) <= kMaxTiltAge,
+                  "a report leaves within hours of its stamp");
+    add_tilt(report.tilt);
+    add_echoes(message);
+    add_imu(report.imu);
+    for (const Bearing* bearing : newest_first(report.bearings)) add(*bearing);
+    for (const UwbRange* range : newest_first(report.ranges)) add(*range);
+    std::ranges::sort(body_.sources, {}, &CodedSource::neighbor);
+    add_estimate(report.estimates, message.sequence);
   }
 
-  std::vector<ClockEcho> echoes;
-  std::vector<const ImuSample*> imu;
-  std::vector<Eigen::Vector3d> cameras;
-  std::vector<Source> sources;
-  std::vector<SourcedBearing> bearings;
-  std::vector<const UwbRange*> ranges;
-  std::vector<const NeighborEstimate*> estimates;
-  std::size_t left_out = 0;
-  std::size_t refused = 0;
+  [[nodiscard]] CodedBody body() && { return std::move(body_); }
+  [[nodiscard]] std::size_t refused() const { return refused_; }
 
  private:
+  [[nodiscard]] std::int64_t age_of(Timestamp stamp) const { return base_tick_ - tick_of(stamp); }
+
+  /// What can be written and is not older than its last copy.
   template <class Item>
   std::vector<const Item*> newest_first(const std::vector<Item>& items) {
     std::vector<const Item*> chosen;
     for (const Item& item : items) {
       if (!is_writable(item)) {
-        ++refused;
-      } else if (!ticks_from<std::int16_t>(base_tick_, item.stamp)) {
-        ++left_out;
-      } else {
+        ++refused_;
+      } else if (std::abs(age_of(item.stamp)) <= kMaxAge) {
         chosen.push_back(&item);
       }
     }
-    std::stable_sort(chosen.begin(), chosen.end(),
-                     [](const Item* a, const Item* b) { return a->stamp > b->stamp; });
+    std::ranges::stable_sort(chosen, std::ranges::greater{},
+                             [](const Item* item) { return item->stamp; });
     return chosen;
   }
 
-  [[nodiscard]] bool reserve_bytes(std::size_t bytes) {
-    if (bytes > room_) return false;
-    room_ -= bytes;
-    return true;
+  void add_tilt(const Tilt& tilt) {
+    const bool is_known = is_unit(tilt.up_B) && tilt.sigma_rad > 0 &&
+                          tilt.sigma_rad < kUnknownTiltSigma && age_of(tilt.stamp) <= kMaxTiltAge &&
+                          age_of(tilt.stamp) >= body_.report_age - kMaxAhead;
+    if (is_known) body_.tilt = coded_tilt(tilt, age_of(tilt.stamp));
   }
 
-  /// Round-robin if there are more peers than room.
-  void choose_echoes(const OutgoingPeerMessage& message) {
+  /// By turns if there are more peers than room.
+  void add_echoes(const OutgoingPeerMessage& message) {
     const std::size_t count = std::min(message.echoes.size(), kMaxEchoes);
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t turn = std::size_t{message.sequence} * kMaxEchoes + i;
-      echoes.push_back(message.echoes[turn % message.echoes.size()]);
-      room_ -= kEchoSize;
+      const ClockEcho& echo = message.echoes[turn % message.echoes.size()];
+      const std::int64_t age_us = (to_ns(message.sent) - echo.received_ns + 500) / 1000;
+      CREPES_EXPECT(std::in_range<std::uint32_t>(age_us), "an echo is of the recent past");
+      constexpr auto kMaxLoss = static_cast<double>((1U << kLossBits) - 1);
+      const double loss = std::clamp(std::round(echo.loss * kLossSteps), 0.0, kMaxLoss);
+      body_.echoes.push_back({echo.peer.value, echo.sent_code, static_cast<std::uint64_t>(age_us),
+                              static_cast<unsigned>(loss)});
     }
   }
 
-  void choose_imu(const std::vector<ImuSample>& samples) {
-    imu = newest_first(samples);
-    if (imu.size() > kMaxImu) {
-      left_out += imu.size() - kMaxImu;
-      imu.resize(kMaxImu);
+  void add_imu(const std::vector<ImuSample>& all) {
+    auto samples = newest_first(all);
+    const auto copies = static_cast<std::int64_t>(limits_.copies);
+    std::erase_if(samples, [&](const ImuSample* sample) {
+      return samples.front()->stamp - sample->stamp >= copies * limits_.period;
+    });
+    if (samples.size() > kMaxItems) samples.resize(kMaxItems);
+    if (samples.empty()) return;
+    CodedImu& imu = body_.imu;
+    imu.gyro_exponent = exponent_for(samples, &ImuSample::gyro_radps, limits_.gyro_step_radps);
+    imu.accel_exponent = exponent_for(samples, &ImuSample::accel_mps2, limits_.accel_step_mps2);
+    for (const ImuSample* sample : samples) {
+      CodedImuSample& code = imu.samples.emplace_back();
+      code.age = age_of(sample->stamp);
+      for (int i = 0; i < 3; ++i) {
+        const auto axis = static_cast<std::size_t>(i);
+        code.values.at(axis) = rounded(sample->gyro_radps[i], std::ldexp(1.0, imu.gyro_exponent));
+        code.values.at(axis + 3) =
+            rounded(sample->accel_mps2[i], std::ldexp(1.0, imu.accel_exponent));
+      }
     }
-    std::reverse(imu.begin(), imu.end());  // oldest first
-    room_ -= imu.size() * kImuSize;
+    imu.predictions = {shortest(imu.samples, 0), shortest(imu.samples, 3)};
   }
 
-  void choose_estimates(const std::vector<NeighborEstimate>& all, std::uint32_t sequence) {
-    estimates = newest_first(all);
-    constexpr std::size_t kAtOnce = kEstimateBudget / kEstimateSize;
-    if (estimates.size() > kAtOnce) {
-      left_out += estimates.size() - kAtOnce;
-      std::sort(estimates.begin(), estimates.end(),
-                [](const auto* a, const auto* b) { return a->neighbor < b->neighbor; });
-      std::rotate(estimates.begin(),
-                  estimates.begin() + static_cast<std::ptrdiff_t>(std::size_t{sequence} * kAtOnce %
-                                                                  estimates.size()),
-                  estimates.end());
-      estimates.resize(kAtOnce);
+  CodedSource& source_of(RobotId neighbor) {
+    const auto found = std::ranges::find(body_.sources, neighbor.value, &CodedSource::neighbor);
+    return found != body_.sources.end()
+               ? *found
+               : body_.sources.emplace_back(CodedSource{neighbor.value, {}, {}});
+  }
+
+  void add(const Bearing& bearing) {
+    std::array<std::int64_t, 3> place{};
+    for (int i = 0; i < 3; ++i)
+      place.at(static_cast<std::size_t>(i)) = rounded(bearing.p_B_C[i], kCameraStep);
+    auto camera = std::ranges::find(body_.cameras, place);
+    if (camera == body_.cameras.end()) {
+      if (body_.cameras.size() == kMaxCameras) return;
+      camera = body_.cameras.insert(camera, place);
     }
-    room_ -= estimates.size() * kEstimateSize;
+    CodedSource& source = source_of(bearing.neighbor);
+    if (is_full(source.bearings, bearing)) return;
+    source.bearings.push_back({.age = age_of(bearing.stamp),
+                               .camera = static_cast<std::uint64_t>(camera - body_.cameras.begin()),
+                               .u = encode_direction(bearing.u_B),
+                               .sigma = kBearingSigma.encode(bearing.sigma_rad)});
   }
 
-  /// Bearings and ranges together, from the newest to the oldest.
-  void choose_bearings_and_ranges(const Report& report) {
-    const auto all_bearings = newest_first(report.bearings);
-    const auto all_ranges = newest_first(report.ranges);
-    auto bearing = all_bearings.begin();
-    auto range = all_ranges.begin();
-    while (bearing != all_bearings.end() || range != all_ranges.end()) {
-      const bool take_range = range != all_ranges.end() && (bearing == all_bearings.end() ||
-                                                            (*range)->stamp >= (*bearing)->stamp);
-      if (!(take_range ? choose(**range++) : choose(**bearing++))) ++left_out;
-    }
+  void add(const UwbRange& range) {
+    CodedSource& source = source_of(range.neighbor);
+    if (!is_full(source.ranges, range)) source.ranges.push_back(coded(range, age_of(range.stamp)));
   }
 
-  bool choose(const UwbRange& range) {
-    if (ranges.size() >= kMaxCount || !reserve_bytes(kRangeSize)) return false;
-    ranges.push_back(&range);
-    return true;
+  /// Whether the list has all copies that are due. A mirror image has the stamp of its board.
+  template <class Code, class Item>
+  [[nodiscard]] bool is_full(const std::vector<Code>& codes, const Item& item) const {
+    if (codes.empty()) return false;
+    const auto window = static_cast<std::int64_t>(limits_.copies) * limits_.period;
+    return codes.size() == kMaxItems ||
+           (age_of(item.stamp) - codes.front().age) * kTick >= window.count();
   }
 
-  bool choose(const Bearing& bearing) {
-    if (bearings.size() >= kMaxCount || room_ < kBearingSize + kSourceSize + kCameraSize)
-      return false;
-    std::size_t cost = kBearingSize;
-    const auto camera = index_in(cameras, bearing.p_B_C, kCameraSize, cost);
-    if (!camera) return false;
-    const auto source = index_in(sources, Source{bearing.neighbor, *camera}, kSourceSize, cost);
-    if (!source) return false;
-    bearings.push_back({&bearing, *source});
-    return reserve_bytes(cost);
+  void add_estimate(const std::vector<NeighborEstimate>& all, std::uint32_t sequence) {
+    std::vector<const NeighborEstimate*> estimates = newest_first(all);
+    if (estimates.empty()) return;
+    std::ranges::sort(estimates, {}, [](const auto* estimate) { return estimate->neighbor; });
+    const NeighborEstimate& next = *estimates[sequence % estimates.size()];
+    body_.estimates.push_back(coded(next, age_of(next.stamp)));
   }
 
+  const WireLimits& limits_;
   std::int64_t base_tick_;
-  std::size_t room_;
+  CodedBody body_;
+  std::size_t refused_ = 0;
 };
 
-/// The least e such that |v| <= 32767 * 2^e for all v.
-template <class Member>
-int exponent_for(const std::vector<const ImuSample*>& samples, Member member) {
-  double largest = 0.0;
-  for (const ImuSample* sample : samples)
-    largest = std::max(largest, (sample->*member).cwiseAbs().maxCoeff());
-  int exponent = kMinExponent;
-  while (std::ldexp(kMaxCode, exponent) < largest) ++exponent;
-  return exponent;
+/// What a datagram leaves out so that it fits.
+struct Omission {
+  std::size_t copies;   ///< of bearings and ranges that remain
+  std::size_t samples;  ///< of the IMU that remain
+  std::size_t stride;   ///< one neighbor in so many remains
+};
+
+/// The omissions in the order in which they are tried.
+std::vector<Omission> omissions(const CodedBody& body, std::size_t copies) {
+  constexpr std::size_t kNewestSamples = 6;
+  std::vector<Omission> all;
+  const std::size_t samples = body.imu.samples.size();
+  for (std::size_t n = copies; n > 0; --n) all.push_back({n, samples, 1});
+  for (std::size_t n = samples; n > kNewestSamples; n -= std::min<std::size_t>(4, n))
+    all.push_back({1, n, 1});
+  for (std::size_t stride = 1; stride <= std::max<std::size_t>(body.sources.size(), 1); ++stride)
+    all.push_back({1, kNewestSamples, stride});
+  return all;
 }
 
-class Encoder {
- public:
-  Encoder(std::int64_t base_tick, std::size_t max_bytes) : base_tick_(base_tick), out_(max_bytes) {}
+CodedBody without(CodedBody body, const Omission& omission, std::uint32_t sequence) {
+  const auto shorten = [](auto& items, std::size_t n) { items.resize(std::min(items.size(), n)); };
+  shorten(body.imu.samples, omission.samples);
+  std::vector<CodedSource> remaining;
+  for (std::size_t i = 0; i < body.sources.size(); ++i) {
+    if ((i + sequence) % omission.stride != 0 || remaining.size() == kMaxItems) continue;
+    CodedSource& source = remaining.emplace_back(std::move(body.sources[i]));
+    shorten(source.ranges, omission.copies);
+    // Two of one stamp are a board and its mirror image, or two cameras: they stay together.
+    std::size_t kept = std::min(source.bearings.size(), omission.copies);
+    while (kept > 0 && kept < source.bearings.size() &&
+           source.bearings[kept].age == source.bearings[kept - 1].age)
+      ++kept;
+    shorten(source.bearings, kept);
+  }
+  body.sources = std::move(remaining);
+  return body;
+}
 
-  void header(const OutgoingPeerMessage& message) {
-    for (const std::uint8_t byte : kMagic) out_.write<std::uint8_t>(byte);
-    out_.write<std::uint8_t>(kVersion);
-    out_.write<std::uint16_t>(message.report.sender.value);
-    out_.write<std::uint32_t>(message.session);
-    out_.write<std::uint32_t>(message.sequence);
-    out_.write<std::int64_t>(to_ns(message.sent));
-    const auto age = ticks_from<std::int32_t>(base_tick_, message.report.stamp);
-    CREPES_EXPECT(age, "a report leaves within hours of its stamp");
-    out_.write<std::int32_t>(*age);
-  }
-
-  void tilt(const Tilt& tilt) {
-    const auto age = ticks_from<std::int32_t>(base_tick_, tilt.stamp);
-    const bool known =
-        age && is_unit(tilt.up_B) && tilt.sigma_rad > 0 && tilt.sigma_rad < kUnknownTiltSigma;
-    out_.write<std::int32_t>(age.value_or(0));
-    direction(known ? tilt.up_B : Eigen::Vector3d::UnitZ());
-    out_.write_float(known ? tilt.sigma_rad : kUnknownTiltSigma);
-  }
-
-  void echoes(const std::vector<ClockEcho>& echoes, Timestamp sent) {
-    count(echoes.size());
-    for (const ClockEcho& echo : echoes) {
-      out_.write<std::uint16_t>(echo.peer.value);
-      out_.write<std::int64_t>(echo.sent_ns);
-      const std::int64_t age_us = (to_ns(sent) - echo.received_ns + 500) / 1000;
-      CREPES_EXPECT(std::in_range<std::uint32_t>(age_us), "an echo is of the recent past");
-      out_.write<std::uint32_t>(static_cast<std::uint32_t>(age_us));
-    }
-  }
-
-  void imu(const std::vector<const ImuSample*>& samples) {
-    const int gyro = exponent_for(samples, &ImuSample::gyro_radps);
-    const int accel = exponent_for(samples, &ImuSample::accel_mps2);
-    count(samples.size());
-    out_.write<std::int8_t>(static_cast<std::int8_t>(gyro));
-    out_.write<std::int8_t>(static_cast<std::int8_t>(accel));
-    for (const ImuSample* sample : samples) {
-      stamp(sample->stamp);
-      for (const double v : sample->gyro_radps) code16(std::ldexp(v, -gyro));
-      for (const double v : sample->accel_mps2) code16(std::ldexp(v, -accel));
-    }
-  }
-
-  void bearings(const Selection& selection) {
-    count(selection.cameras.size());
-    for (const Eigen::Vector3d& camera : selection.cameras) vector(camera);
-    count(selection.sources.size());
-    for (const Source& source : selection.sources) {
-      out_.write<std::uint16_t>(source.neighbor.value);
-      out_.write<std::uint8_t>(source.camera);
-    }
-    count(selection.bearings.size());
-    for (const auto& [bearing, source] : selection.bearings) {
-      stamp(bearing->stamp);
-      out_.write<std::uint8_t>(source);
-      direction(bearing->u_B);
-      out_.write<std::uint8_t>(static_cast<std::uint8_t>(kBearingSigma.encode(bearing->sigma_rad)));
-    }
-  }
-
-  void ranges(const std::vector<const UwbRange*>& ranges) {
-    count(ranges.size());
-    for (const UwbRange* range : ranges) {
-      out_.write<std::uint16_t>(range->neighbor.value);
-      stamp(range->stamp);
-      out_.write_float(range->range_m);
-      power(range->first_path_dbm);
-      power(range->received_dbm);
-    }
-  }
-
-  void estimates(const std::vector<const NeighborEstimate*>& estimates) {
-    count(estimates.size());
-    for (const NeighborEstimate* estimate : estimates) {
-      const Eigen::Quaterniond q = estimate->T_B_N.pose.q.normalized();
-      const auto covariance = encode_covariance(estimate->T_B_N.covariance);
-      out_.write<std::uint16_t>(estimate->neighbor.value);
-      stamp(estimate->stamp);
-      vector(estimate->T_B_N.pose.p);
-      for (const double v : {q.w(), q.x(), q.y(), q.z()}) code16(v * kMaxCode);
-      vector(estimate->v_B_N);
-      for (const std::uint16_t sigma : covariance->sigmas) out_.write<std::uint16_t>(sigma);
-      for (const std::int16_t entry : covariance->factor) out_.write<std::int16_t>(entry);
-    }
-  }
-
-  [[nodiscard]] std::vector<std::uint8_t> finished() && {
-    out_.write<std::uint32_t>(crc32(out_.bytes()));
-    CREPES_EXPECT(out_.ok(), "the selection fits");
-    return std::move(out_).release();
-  }
-
- private:
-  void count(std::size_t n) { out_.write<std::uint8_t>(static_cast<std::uint8_t>(n)); }
-  void stamp(Timestamp t) { out_.write<std::int16_t>(*ticks_from<std::int16_t>(base_tick_, t)); }
-  void code16(double v) { out_.write<std::int16_t>(static_cast<std::int16_t>(std::lround(v))); }
-  void vector(const Eigen::Vector3d& v) {
-    for (const double x : v) out_.write_float(x);
-  }
-  void direction(const Eigen::Vector3d& u) {
-    for (const std::int16_t code : encode_direction(u)) out_.write<std::int16_t>(code);
-  }
-  void power(double dbm) {
-    const double code = std::clamp(-2 * dbm, 0.0, 255.0);
-    out_.write<std::uint8_t>(static_cast<std::uint8_t>(std::lround(code)));
-  }
-
-  std::int64_t base_tick_;
-  ByteWriter out_;
-};
+std::vector<std::uint8_t> written(const OutgoingPeerMessage& message, CodedBody& body) {
+  BitWriter header;
+  for (const std::uint8_t byte : kMagic) header.bits(byte, 8);
+  header.bits(kVersion, 8);
+  header.bits(message.report.sender.value, 16);
+  header.wide_bits(message.session, 64);
+  header.bits(message.sequence, 32);
+  std::vector<std::uint8_t> bytes = std::move(header).finished();
+  BodyWriter writer;
+  code_body(writer, body);
+  const std::vector<std::uint8_t> code = std::move(writer).finished();
+  bytes.insert(bytes.end(), code.begin(), code.end());
+  BitWriter checksum;
+  checksum.bits(crc32(bytes), 32);
+  const std::vector<std::uint8_t> sum = std::move(checksum).finished();
+  bytes.insert(bytes.end(), sum.begin(), sum.end());
+  return bytes;
+}
 
 }  // namespace
 }  // namespace wire
 
-EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message, std::size_t max_bytes) {
-  CREPES_EXPECT(max_bytes >= wire::kFirst, "what comes before bearings and ranges has room");
+EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
+                                       const WireLimits& limits) {
+  CREPES_EXPECT(limits.bytes >= kMinPeerMessage && limits.bytes <= kMaxPeerMessage,
+                "what a datagram cannot do without has room");
+  CREPES_EXPECT(limits.copies > 0, "every measurement is sent");
   CREPES_EXPECT(wire::is_robot(message.report.sender), "a sender has an id");
   CREPES_EXPECT(std::abs(to_ns(message.sent)) <= wire::kMaxStamp, "a clock counts from its epoch");
-  const wire::Selection selection(message, max_bytes);
-  wire::Encoder encoder(wire::floor_to_ticks(to_ns(message.sent)), max_bytes);
-  encoder.header(message);
-  encoder.tilt(message.report.tilt);
-  encoder.echoes(selection.echoes, message.sent);
-  encoder.imu(selection.imu);
-  encoder.bearings(selection);
-  encoder.ranges(selection.ranges);
-  encoder.estimates(selection.estimates);
-  return {std::move(encoder).finished(), selection.left_out, selection.refused};
+  wire::Quantizer quantizer(message, limits);
+  const std::size_t refused = quantizer.refused();
+  const wire::CodedBody whole = std::move(quantizer).body();
+  EncodedPeerMessage encoded;
+  for (const wire::Omission& omission : wire::omissions(whole, limits.copies)) {
+    wire::CodedBody body = wire::without(whole, omission, message.sequence);
+    encoded = {wire::written(message, body), whole.sources.size() - body.sources.size(), refused};
+    if (encoded.bytes.size() <= limits.bytes) break;
+  }
+  CREPES_EXPECT(encoded.bytes.size() <= kMaxPeerMessage, "the least fits into a datagram");
+  return encoded;
 }
 
 }  // namespace crepes

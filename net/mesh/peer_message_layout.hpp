@@ -11,38 +11,50 @@
 namespace crepes::wire {
 
 inline constexpr std::array<std::uint8_t, 3> kMagic{'C', 'R', 'P'};
-inline constexpr std::uint8_t kVersion = 1;
+inline constexpr std::uint8_t kVersion = 2;
 inline constexpr std::size_t kChecksum = 4;
 inline constexpr std::int64_t kTick = 10'000;  // ns
 inline constexpr std::int64_t kMaxStamp = 4'000'000'000'000'000'000;
 
-inline constexpr std::size_t kEchoSize = 14;
-inline constexpr std::size_t kImuSize = 14;
-inline constexpr std::size_t kCameraSize = 12;
-inline constexpr std::size_t kSourceSize = 3;
-inline constexpr std::size_t kBearingSize = 8;
-inline constexpr std::size_t kRangeSize = 10;
-inline constexpr std::size_t kEstimateSize = 78;
+// Ages are in ticks.
+inline constexpr std::int64_t kMaxAge = 100'000;        // of measurements
+inline constexpr std::int64_t kMaxReportAge = 200'000;  // of a report when it leaves
+inline constexpr std::int64_t kMaxTiltAge = 1'000'000'000;
+inline constexpr std::int64_t kMaxAhead = 10'000;  // of stamps, whose clock is one
 
-inline constexpr LogScale kBearingSigma{1e-5, 1.0, 255};
-inline constexpr double kMaxRange = 1e4;          // m
-inline constexpr double kMaxCoordinate = 1e6;     // m, m/s
+inline constexpr unsigned kDirectionBits = 15;
+inline constexpr unsigned kBearingSigmaBits = 7;
+inline constexpr LogScale kBearingSigma{1e-5, 1.0, 127};
+inline constexpr unsigned kTiltSigmaBits = 6;
+inline constexpr LogScale kTiltSigma{1e-5, 3.2, 63};
 inline constexpr double kUnknownTiltSigma = 3.2;  // rad: half a turn, tilt unknown
-inline constexpr int kMinExponent = -30;
-inline constexpr int kMaxExponent = 20;
-inline constexpr double kMaxCode = 32767.0;
 
-/// The neighbor that was seen, and the sender's camera that saw it.
-struct Source {
-  RobotId neighbor;
-  std::uint8_t camera;
-  bool operator==(const Source&) const = default;
-};
+inline constexpr double kMaxRange = 1e4;  // m
+inline constexpr std::int64_t kMaxRangeMm = 10'000'000;
+inline constexpr std::int64_t kMaxPower = 255;      // -0.5 dBm
+inline constexpr double kMaxCoordinate = 1e5;       // m, m/s
+inline constexpr double kCameraStep = 1.0 / 32768;  // m
+inline constexpr double kPlaceStep = 1e-4;          // m
+inline constexpr double kSpeedStep = 1e-3;          // m/s
+inline constexpr std::int64_t kMaxCoordinateCode = 4'000'000'000;
+
+inline constexpr int kMinExponent = -30;  // of the steps of inertial samples, powers of two
+inline constexpr int kMaxExponent = 20;
+inline constexpr std::int64_t kMaxImuCode = 1 << 22;
+
+inline constexpr unsigned kQuaternionBits = 15;
+inline constexpr std::int64_t kQuaternionUnit = 16383;  // of 1/sqrt(2)
+inline constexpr unsigned kSigmaBits = 12;
+inline constexpr unsigned kFactorBits = 12;
+inline constexpr std::uint64_t kMaxEchoAgeUs = 0xFFFF'FFFF;
+inline constexpr unsigned kLossBits = 4;
+inline constexpr double kLossSteps = 30.0;  // of a loss of 1
+inline constexpr std::uint64_t kMaxId = 65534;
 
 [[nodiscard]] inline std::int64_t floor_to_ticks(std::int64_t ns) {
   return ns / kTick - (ns % kTick < 0 ? 1 : 0);
 }
 
-[[nodiscard]] inline bool is_robot(RobotId id) { return id.value >= 1 && id.value <= 65534; }
+[[nodiscard]] inline bool is_robot(RobotId id) { return id.value >= 1 && id.value <= kMaxId; }
 
 }  // namespace crepes::wire

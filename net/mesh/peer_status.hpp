@@ -28,6 +28,7 @@ struct PeerTraffic {
   std::uint64_t lost = 0;      ///< gaps in the peer's sequence
   std::uint64_t restarts = 0;  ///< of the peer or of its clock
   double age_s = 0.0;          ///< since the last datagram
+  double loss = 0.0;           ///< share of the recent datagrams
 };
 
 }  // namespace crepes

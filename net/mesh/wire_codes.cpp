@@ -8,16 +8,17 @@
 namespace crepes {
 namespace {
 
-constexpr double kUnit = 32767.0;
-constexpr LogScale kSigmas{1e-6, 1e4, 65535};
+constexpr auto kUnit = static_cast<double>(kDirectionUnit);
+constexpr auto kFactor = static_cast<double>(kFactorUnit);
+constexpr LogScale kSigmas{1e-5, 1e3, 4095};
 
-std::int16_t to_code(double v) { return static_cast<std::int16_t>(std::clamp(v, -kUnit, kUnit)); }
+std::int64_t to_code(double v) { return static_cast<std::int64_t>(std::clamp(v, -kUnit, kUnit)); }
 
 double sign_of(double x) { return std::signbit(x) ? -1.0 : 1.0; }
 
 }  // namespace
 
-std::array<std::int16_t, 2> encode_direction(const Eigen::Vector3d& u) {
+std::array<std::int64_t, 2> encode_direction(const Eigen::Vector3d& u) {
   const Eigen::Vector3d n = u / u.lpNorm<1>();
   double a = n.x();
   double b = n.y();
@@ -27,12 +28,12 @@ std::array<std::int16_t, 2> encode_direction(const Eigen::Vector3d& u) {
   }
   // Of the four surrounding codes, the nearest on the sphere, which may differ from the nearest in
   // the plane.
-  std::array<std::int16_t, 2> best{};
+  std::array<std::int64_t, 2> best{};
   double least = std::numeric_limits<double>::infinity();
   for (const double column : {std::floor(a * kUnit), std::ceil(a * kUnit)}) {
     for (const double row : {std::floor(b * kUnit), std::ceil(b * kUnit)}) {
       const std::array code{to_code(column), to_code(row)};
-      const double error = (*decode_direction(code) - u).squaredNorm();
+      const double error = (decode_direction(code) - u).squaredNorm();
       if (error < least) {
         least = error;
         best = code;
@@ -42,11 +43,9 @@ std::array<std::int16_t, 2> encode_direction(const Eigen::Vector3d& u) {
   return best;
 }
 
-std::optional<Eigen::Vector3d> decode_direction(const std::array<std::int16_t, 2>& code) {
-  constexpr auto kNever = std::numeric_limits<std::int16_t>::min();
-  if (code[0] == kNever || code[1] == kNever) return std::nullopt;
-  const double a = code[0] / kUnit;
-  const double b = code[1] / kUnit;
+Eigen::Vector3d decode_direction(const std::array<std::int64_t, 2>& code) {
+  const double a = static_cast<double>(code[0]) / kUnit;
+  const double b = static_cast<double>(code[1]) / kUnit;
   Eigen::Vector3d n{a, b, 1 - std::abs(a) - std::abs(b)};
   if (n.z() < 0) {
     n.x() = (1 - std::abs(b)) * sign_of(a);
@@ -76,11 +75,10 @@ std::optional<CovarianceCode> encode_covariance(const Matrix6d& covariance) {
   CovarianceCode code;
   std::size_t next = 0;
   for (int row = 0; row < 6; ++row) {
-    code.sigmas.at(static_cast<std::size_t>(row)) =
-        static_cast<std::uint16_t>(kSigmas.encode(sigmas[row]));
+    code.sigmas.at(static_cast<std::size_t>(row)) = kSigmas.encode(sigmas[row]);
     // Rounds towards zero, so that the norm of the row stays below 1.
     for (int column = 0; column < row; ++column)
-      code.factor.at(next++) = static_cast<std::int16_t>(L(row, column) * kUnit);
+      code.factor.at(next++) = static_cast<std::int64_t>(L(row, column) * kFactor);
   }
   return decode_covariance(code) ? std::optional(code) : std::nullopt;
 }
@@ -90,7 +88,8 @@ std::optional<Matrix6d> decode_covariance(const CovarianceCode& code) {
   Matrix6d L = Matrix6d::Zero();
   std::size_t next = 0;
   for (int row = 0; row < 6; ++row) {
-    for (int column = 0; column < row; ++column) L(row, column) = code.factor.at(next++) / kUnit;
+    for (int column = 0; column < row; ++column)
+      L(row, column) = static_cast<double>(code.factor.at(next++)) / kFactor;
     const double own = 1 - L.row(row).squaredNorm();
     if (own < kLeast) return std::nullopt;
     L(row, row) = std::sqrt(own);

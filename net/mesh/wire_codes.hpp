@@ -10,12 +10,14 @@
 
 namespace crepes {
 
+inline constexpr std::int64_t kDirectionUnit = 16383;  ///< code of 1
+inline constexpr std::int64_t kFactorUnit = 2047;      ///< code of 1
+
 /// The octahedral map of a unit vector (Cigolle et al. 2014, "A survey of efficient representations
 /// for independent unit vectors").
-[[nodiscard]] std::array<std::int16_t, 2> encode_direction(const Eigen::Vector3d& u);
-/// Empty for the value -32768, which the encoder never writes.
-[[nodiscard]] std::optional<Eigen::Vector3d> decode_direction(
-    const std::array<std::int16_t, 2>& code);
+[[nodiscard]] std::array<std::int64_t, 2> encode_direction(const Eigen::Vector3d& u);
+/// Of components from -kDirectionUnit to kDirectionUnit.
+[[nodiscard]] Eigen::Vector3d decode_direction(const std::array<std::int64_t, 2>& code);
 
 /// Positive numbers from `min` to `max`, quantized to `steps` + 1 levels of equal ratio; numbers
 /// outside are clamped.
@@ -31,8 +33,8 @@ struct LogScale {
 /// A covariance as sigmas and the Cholesky factor of its correlations: remains positive definite
 /// when rounded.
 struct CovarianceCode {
-  std::array<std::uint16_t, 6> sigmas{};
-  std::array<std::int16_t, 15> factor{};  ///< rows 1..5 left of the diagonal
+  std::array<unsigned, 6> sigmas{};
+  std::array<std::int64_t, 15> factor{};  ///< rows 1..5 left of the diagonal
 };
 
 /// Empty when `covariance` is not finite and positive definite.

@@ -4,20 +4,21 @@
 
 #include <bit>
 
-#include "net/mesh/byte_writer.hpp"
+#include "net/mesh/bit_writer.hpp"
 
 namespace crepes {
 
 std::uint64_t keyed_hash(const HashKey& key, const Endpoint& endpoint, std::uint64_t number) {
   static_assert(crypto_shorthash_KEYBYTES == std::tuple_size_v<HashKey>);
   static_assert(crypto_shorthash_BYTES == sizeof(std::uint64_t));
-  ByteWriter bytes(64);
-  for (const std::uint8_t byte : endpoint.address) bytes.write<std::uint8_t>(byte);
-  bytes.write<std::uint32_t>(endpoint.scope);
-  bytes.write<std::uint16_t>(endpoint.port);
-  bytes.write<std::uint64_t>(number);
+  BitWriter writer;
+  for (const std::uint8_t byte : endpoint.address) writer.bits(byte, 8);
+  writer.bits(endpoint.scope, 32);
+  writer.bits(endpoint.port, 16);
+  writer.wide_bits(number, 64);
+  const std::vector<std::uint8_t> bytes = std::move(writer).finished();
   std::array<std::uint8_t, crypto_shorthash_BYTES> hash{};
-  crypto_shorthash(hash.data(), bytes.bytes().data(), bytes.bytes().size(), key.data());
+  crypto_shorthash(hash.data(), bytes.data(), bytes.size(), key.data());
   return std::bit_cast<std::uint64_t>(hash);
 }
 

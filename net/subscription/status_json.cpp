@@ -88,6 +88,7 @@ Json ages_json(const NeighborStatus& neighbor, Timestamp now) {
 Json traffic_json(const PeerTraffic& traffic) {
   Json json{{"received", traffic.received}, {"lost", traffic.lost}, {"restarts", traffic.restarts}};
   put(json, "age_s", traffic.age_s, 3);
+  put(json, "loss", traffic.loss, 2);
   return json;
 }
 

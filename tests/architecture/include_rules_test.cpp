@@ -32,7 +32,7 @@ TEST(IncludeRules, CatchArrowsThatAreNotInTheTable) {
            {"estimator/vision/id_library.cpp", "#include \"estimator/graph/pose_graph.hpp\""},
            {"estimator/graph/pose_graph.cpp", "#include \"estimator/swarm/estimator.hpp\""},
            {"estimator/swarm/estimator.cpp", "#include \"daemon/stages/counters.hpp\""},
-           {"drivers/uwb/nlink.cpp", "#include \"net/mesh/byte_reader.hpp\""},
+           {"drivers/uwb/nlink.cpp", "#include \"net/mesh/bit_reader.hpp\""},
            {"drivers/camera/camera.hpp", "#include \"estimator/vision/camera_model.hpp\""},
            {"drivers/sim/sim_camera.cpp", "#include \"estimator/vision/blink_tracker.hpp\""},
            {"net/mesh/peer_link.cpp", "#include \"drivers/uwb/nlink.hpp\""},

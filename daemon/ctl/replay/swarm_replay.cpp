@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "config/schema/estimator_slice.hpp"
+#include "config/schema/mesh_slice.hpp"
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
 #include "daemon/ctl/dataset/truth.hpp"
 #include "daemon/ctl/replay/replay_output.hpp"
@@ -89,14 +90,15 @@ struct Robot {
   explicit Robot(RobotRecording recorded)
       : recording(std::move(recorded)),
         estimator(estimator_settings(recording.config)),
-        link(recording.robot.id, member_ids(recording.config)),
+        link(recording.robot.id, member_ids(recording.config), send_settings(recording.config)),
         detector(recording.config.vision),
         period(from_seconds(1.0 / recording.config.estimator.output_rate_hz)) {}
 
   void restart() {
     estimator = Estimator(estimator_settings(recording.config));
     team = TeamSolver();
-    link = PeerLink(recording.robot.id, member_ids(recording.config));
+    link =
+        PeerLink(recording.robot.id, member_ids(recording.config), send_settings(recording.config));
   }
 
   RobotRecording recording;

@@ -243,17 +243,37 @@ TEST(PeerLink, RefusesOtherSealsAndCountsTheReason) {
 }
 
 TEST(PeerLink, SealedDatagramsAreNoLongerThanOthers) {
-  PeerLink link(RobotId{1}, {RobotId{1}, RobotId{2}});
+  const SendSettings settings;
+  PeerLink link(RobotId{1}, {RobotId{1}, RobotId{2}}, settings);
   Report report;
   report.sender = RobotId{1};
-  for (int i = 0; i < 300; ++i)
-    report.ranges.push_back({report.stamp - milliseconds{i}, RobotId{2}, 3.0, -80.0, -79.0});
+  for (int i = 0; i < 300; ++i) {
+    const RobotId neighbor{static_cast<std::uint16_t>(2 + i % 30)};
+    report.ranges.push_back({report.stamp - milliseconds{i}, neighbor, 3.0, -80.0, -79.0});
+  }
 
   for (const std::optional<PacketSeal>& seal : {std::optional<PacketSeal>{}, {kSeal}}) {
     const std::size_t size = link.compose(report, Timestamp{}, seal).size();
-    EXPECT_LE(size, kMaxPeerMessage);
-    EXPECT_GT(size, kMaxPeerMessage - 10);  // a range's
+    EXPECT_LE(size, datagram_bytes(settings, 0));
+    EXPECT_GT(size, datagram_bytes(settings, 0) - 90);  // another copy of all
   }
+}
+
+TEST(PeerLink, RepeatsMoreWhereMoreIsLost) {
+  Mesh lossless;
+  Mesh lossy(0.33);
+  lossless.run_until(106.0);
+  lossy.run_until(106.0);
+
+  const auto traffic = lossy.one.traffic(Timestamp{});
+  ASSERT_EQ(traffic.size(), 1U);
+  EXPECT_NEAR(traffic[0].loss, 0.33, 0.15);
+  EXPECT_LT(lossless.one.traffic(Timestamp{}).at(0).loss, 0.01);
+  const auto samples = [](const Mesh& mesh) {
+    return decode_peer_message(mesh.sent_by_two.back()).value().report.imu.size();
+  };
+  EXPECT_EQ(samples(lossy), 16U);    // all that robot 2 has
+  EXPECT_EQ(samples(lossless), 8U);  // two periods of 40 ms
 }
 
 TEST(PeerLink, IsNotMisledByAReplayedSession) {
@@ -359,8 +379,8 @@ TEST(PeerLink, RefusesAnEchoOfWhatItNeverSent) {
   message.report.sender = RobotId{2};
   message.report.stamp = message.sent = mesh.local_of_two();
   message.session = 77;
-  message.echoes = {{RobotId{1}, to_ns(mesh.local_of_one() - milliseconds{7}) + 13,
-                     to_ns(message.sent - milliseconds{5})}};
+  message.echoes = {{RobotId{1}, echo_code(to_ns(mesh.local_of_one() - milliseconds{7}) + 13),
+                     to_ns(message.sent - milliseconds{5}), 0.0}};
 
   EXPECT_FALSE(mesh.one.receive(encode_peer_message(message).bytes, mesh.local_of_one()));
 

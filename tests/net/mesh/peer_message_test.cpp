@@ -8,11 +8,14 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
+#include <ranges>
 #include <set>
 
 #include "net/mesh/crc32.hpp"
 #include "net/mesh/mesh_counters.hpp"
+#include "net/mesh/peer_message_code.hpp"
 #include "net/mesh/wire_codes.hpp"
 
 namespace crepes {
@@ -36,8 +39,8 @@ Matrix6d random_covariance(std::mt19937& random) {
          scale.asDiagonal();
 }
 
-/// The full report of a robot with `neighbors`: 160 ms of 100 Hz IMU and 50 Hz
-/// ranges, and bearings from a 200 Hz camera.
+/// The full report of a robot with `neighbors`: 200 ms of 100 Hz IMU, 160 ms of 50 Hz ranges, and
+/// bearings from a 200 Hz camera. All of it is noise, which no code shortens.
 OutgoingPeerMessage full_message(int neighbors, std::uint32_t seed = 1, int bearing_frames = 20) {
   std::mt19937 random(seed);
   OutgoingPeerMessage message;
@@ -53,7 +56,8 @@ OutgoingPeerMessage full_message(int neighbors, std::uint32_t seed = 1, int bear
                           Eigen::Vector3d(0, 0, 9.81) + random_vector(random, 2)});
   for (int n = 0; n < neighbors; ++n) {
     const RobotId neighbor{static_cast<std::uint16_t>(n + 2)};
-    message.echoes.push_back({neighbor, 1'000'000'000'000 + n, to_ns(kSent) - 40'000'000});
+    message.echoes.push_back(
+        {neighbor, 1'000'000U + static_cast<unsigned>(n), to_ns(kSent) - 40'000'000, 0.1});
     for (int i = 0; i < bearing_frames; ++i)
       report.bearings.push_back({kSent - milliseconds{5 * i},
                                  neighbor,
@@ -126,35 +130,83 @@ TEST(PeerMessage, CarriesTheReportsOfFourRobotsWithRedundancy) {
   EXPECT_EQ(decoded->session, 77U);
   EXPECT_EQ(to_ns(decoded->sent), to_ns(kSent));
   EXPECT_EQ(decoded->echoes.size(), 3U);
-  EXPECT_EQ(report.imu.size(), 16U);
-  EXPECT_EQ(report.estimates.size(), 3U);
-  ASSERT_GE(report.bearings.size(), 45U);
-  const auto oldest = std::min_element(report.bearings.begin(), report.bearings.end(),
-                                       [](auto& a, auto& b) { return a.stamp < b.stamp; });
-  EXPECT_LT(to_ns(oldest->stamp), to_ns(kSent - milliseconds{60}));  // three packets deep
+  EXPECT_EQ(report.imu.size(), 20U);
+  EXPECT_EQ(report.estimates.size(), 1U);
+  EXPECT_EQ(report.bearings.size(), 18U);  // six of each neighbor
+  EXPECT_EQ(report.ranges.size(), 18U);
 }
 
-TEST(PeerMessage, FitsWithTwentyNeighborsAndReportsThemInTurn) {
+TEST(PeerMessage, LeavesOutTheOldestCopiesFirst) {
+  const OutgoingPeerMessage message = full_message(3);
+  const auto decoded =
+      decode_peer_message(encode_peer_message(message, {.bytes = 500, .copies = 6}).bytes);
+
+  ASSERT_TRUE(decoded.has_value());
+  std::set<RobotId> seen;
+  std::size_t newest = 0;
+  for (const auto& bearing : decoded->report.bearings) {
+    seen.insert(bearing.neighbor);
+    newest += to_ns(bearing.stamp) > to_ns(kSent - milliseconds{1}) ? 1 : 0;
+  }
+  EXPECT_EQ(seen.size(), 3U);
+  EXPECT_EQ(newest, 3U);
+  EXPECT_LT(decoded->report.bearings.size(), 18U);
+}
+
+TEST(PeerMessage, KeepsToItsLimitWithFiftyNeighborsAndReportsThemInTurn) {
+  constexpr int kNeighbors = 50;
+  constexpr std::size_t kLimit = 500;
   std::set<RobotId> echoed;
   std::set<RobotId> estimated;
-  for (std::uint32_t sequence = 0; sequence < 8; ++sequence) {
-    OutgoingPeerMessage message = full_message(20);
+  std::map<RobotId, int> seen;
+  std::map<RobotId, int> ranged;
+  for (std::uint32_t sequence = 0; sequence < kNeighbors; ++sequence) {
+    OutgoingPeerMessage message = full_message(kNeighbors);
     message.sequence = sequence;
 
-    const auto encoded = encode_peer_message(message);
+    const auto encoded = encode_peer_message(message, {.bytes = kLimit, .copies = 3});
     const auto decoded = decode_peer_message(encoded.bytes);
 
     ASSERT_TRUE(decoded.has_value());
-    ASSERT_LE(encoded.bytes.size(), kMaxPeerMessage);
+    ASSERT_LE(encoded.bytes.size(), kLimit);
     EXPECT_GT(encoded.left_out, 0U);
-    EXPECT_EQ(decoded->report.imu.size(), 16U);
-    EXPECT_GE(decoded->report.bearings.size(), 20U);
+    EXPECT_GE(decoded->report.imu.size(), 4U);
     for (const auto& echo : decoded->echoes) echoed.insert(echo.peer);
     for (const auto& estimate : decoded->report.estimates) estimated.insert(estimate.neighbor);
+    for (const auto& bearing : decoded->report.bearings) ++seen[bearing.neighbor];
+    for (const auto& range : decoded->report.ranges) ++ranged[range.neighbor];
   }
 
-  EXPECT_EQ(echoed.size(), 20U);
-  EXPECT_EQ(estimated.size(), 20U);
+  EXPECT_EQ(echoed.size(), std::size_t{kNeighbors});
+  EXPECT_EQ(estimated.size(), std::size_t{kNeighbors});
+  for (const auto& counts : {seen, ranged}) {
+    ASSERT_EQ(counts.size(), std::size_t{kNeighbors});
+    const auto [least, most] = std::ranges::minmax(counts | std::views::values);
+    EXPECT_GE(2 * least, most) << "evenly";
+  }
+}
+
+TEST(PeerMessage, HasAFewHundredBytesForSmoothMotion) {
+  OutgoingPeerMessage message = full_message(4);
+  std::mt19937 random(5);
+  for (std::size_t i = 0; i < message.report.imu.size(); ++i) {
+    const double t = 0.01 * static_cast<double>(i);
+    message.report.imu[i].gyro_radps =
+        Eigen::Vector3d(std::sin(6 * t), std::cos(5 * t), 0.5) + random_vector(random, 2e-3);
+    message.report.imu[i].accel_mps2 =
+        Eigen::Vector3d(2 * std::sin(4 * t), 0, 9.8) + random_vector(random, 2e-2);
+  }
+  for (std::size_t i = 0; i < message.report.bearings.size(); ++i) {
+    const double t = 0.005 * static_cast<double>(i % 20);
+    message.report.bearings[i].u_B =
+        (Eigen::Vector3d(std::cos(2 * t), std::sin(2 * t), 0.2) + random_vector(random, 7e-4))
+            .normalized();
+  }
+  message.report.estimates.clear();
+
+  const std::size_t bytes = encode_peer_message(message, {.copies = 3}).bytes.size();
+
+  EXPECT_LT(bytes, 300U);  // version 1 had 880
 }
 
 TEST(PeerMessage, DecodesToWhatWasEncodedWithinItsResolution) {
@@ -167,12 +219,12 @@ TEST(PeerMessage, DecodesToWhatWasEncodedWithinItsResolution) {
     const PeerReport& out = decoded->report;
 
     RC_ASSERT(std::abs(to_ns(out.stamp) - to_ns(in.stamp)) <= 5'000);
-    RC_ASSERT((out.tilt.up_B - in.tilt.up_B).norm() < 5e-5);
+    RC_ASSERT((out.tilt.up_B - in.tilt.up_B).norm() < 1.5e-4);
     for (std::size_t i = 0; i < out.imu.size(); ++i) {
       const ImuSample& sent = in.imu[out.imu.size() - 1 - i];  // newest first
       RC_ASSERT(std::abs(to_ns(out.imu[i].stamp) - to_ns(sent.stamp)) <= 5'000);
-      RC_ASSERT((out.imu[i].gyro_radps - sent.gyro_radps).norm() < 4e-4);
-      RC_ASSERT((out.imu[i].accel_mps2 - sent.accel_mps2).norm() < 2e-3);
+      RC_ASSERT((out.imu[i].gyro_radps - sent.gyro_radps).norm() < 9e-4);
+      RC_ASSERT((out.imu[i].accel_mps2 - sent.accel_mps2).norm() < 7e-3);
     }
     for (const auto& b : out.bearings) {
       const auto original =
@@ -181,17 +233,19 @@ TEST(PeerMessage, DecodesToWhatWasEncodedWithinItsResolution) {
                    std::abs(to_ns(candidate.stamp) - to_ns(b.stamp)) <= 5'000;
           });
       RC_ASSERT(original != in.bearings.end());
-      RC_ASSERT((b.u_B - original->u_B).norm() < 5e-5);
-      RC_ASSERT((b.p_B_C - original->p_B_C).norm() < 1e-6);
-      RC_ASSERT(std::abs(b.sigma_rad / original->sigma_rad - 1) < 0.03);
+      RC_ASSERT((b.u_B - original->u_B).norm() < 1.5e-4);
+      RC_ASSERT((b.p_B_C - original->p_B_C).norm() < 3e-5);
+      RC_ASSERT(std::abs(b.sigma_rad / original->sigma_rad - 1) < 0.05);
     }
-    for (std::size_t i = 0; i < out.estimates.size(); ++i) {
-      const Pose& a = in.estimates[i].T_B_N.pose;
-      const Pose& b = out.estimates[i].T_B_N.pose;
-      RC_ASSERT(pose_difference(a, b).norm() < 1e-4);
-      const Matrix6d& P = in.estimates[i].T_B_N.covariance;
-      RC_ASSERT((out.estimates[i].T_B_N.covariance - P).norm() < 2e-3 * P.norm());
-    }
+    for (const auto& r : out.ranges) RC_ASSERT(std::abs(r.range_m - 1.0 - r.neighbor.value) < 1e-3);
+    RC_ASSERT(out.estimates.size() == 1U);
+    const NeighborEstimate& original = in.estimates.at(out.estimates[0].neighbor.value - 2U);
+    const Pose& a = original.T_B_N.pose;
+    const Pose& b = out.estimates[0].T_B_N.pose;
+    RC_ASSERT(pose_difference(a, b).norm() < 2e-4);
+    RC_ASSERT((out.estimates[0].v_B_N - original.v_B_N).norm() < 1e-3);
+    const Matrix6d& P = original.T_B_N.covariance;
+    RC_ASSERT((out.estimates[0].T_B_N.covariance - P).norm() < 6e-3 * P.norm());
   }));
 }
 
@@ -219,7 +273,7 @@ TEST(PeerMessage, KeepsCovariancesPositiveHoweverCorrelated) {
     RC_ASSERT(code.has_value());
     const Matrix6d decoded = *decode_covariance(*code);
     RC_ASSERT(Eigen::SelfAdjointEigenSolver<Matrix6d>(decoded).eigenvalues().minCoeff() > 0);
-    RC_ASSERT((decoded - P).norm() < 2e-3 * P.norm());
+    RC_ASSERT((decoded - P).norm() < 6e-3 * P.norm());
   }));
 }
 
@@ -258,7 +312,7 @@ TEST(PeerMessage, DecodesToFiniteValuesOrNotAtAllWhateverASenderSeals) {
 TEST(PeerMessage, SurvivesRandomBytesBehindAValidSeal) {
   EXPECT_TRUE(rc::check([] {
     auto body = *rc::gen::container<std::vector<std::uint8_t>>(rc::gen::arbitrary<std::uint8_t>());
-    const std::vector<std::uint8_t> preamble{'C', 'R', 'P', 1, 2, 0};
+    const std::vector<std::uint8_t> preamble{'C', 'R', 'P', 2, 2, 0};
     body.insert(body.begin(), preamble.begin(), preamble.end());
     const auto message = decode_peer_message(resealed(body));
     const bool is_sound = !message || is_finite(*message);  // RC_ASSERT's own || evaluates both
@@ -279,30 +333,81 @@ TEST(PeerMessage, ReturnsTheFirstError) {
   EXPECT_EQ(fault_of({}), PeerMessageError::kTooShort);
   EXPECT_EQ(fault_of(std::vector<std::uint8_t>(1401)), PeerMessageError::kTooLong);
   EXPECT_EQ(fault_of(std::vector<std::uint8_t>(100)), PeerMessageError::kForeign);
-  EXPECT_EQ(with(3, {2}), PeerMessageError::kOtherVersion);
+  EXPECT_EQ(with(3, {1}), PeerMessageError::kOtherVersion);
   EXPECT_EQ(fault_of(body), PeerMessageError::kDamaged);
   EXPECT_EQ(fault_of(resealed({body.begin(), body.end() - 1})), PeerMessageError::kTruncated);
   EXPECT_EQ(fault_of(resealed(longer)), PeerMessageError::kTrailingBytes);
   EXPECT_EQ(with(4, {0, 0}), PeerMessageError::kBadId);
-  EXPECT_EQ(with(21, {0x7F}), PeerMessageError::kBadStamp);
-  EXPECT_EQ(with(30, {0x00, 0x80}), PeerMessageError::kNotUnit);
-  EXPECT_EQ(with(34, {0, 0, 0xC0, 0x7F}), PeerMessageError::kNotFinite);
-  EXPECT_EQ(with(34, {0, 0, 0, 0}), PeerMessageError::kOutOfRange);
-  EXPECT_EQ(with(body.size() - 2, {0xFF, 0x7F}), PeerMessageError::kBadCovariance);
+  EXPECT_EQ(with(25, {0x7F}), PeerMessageError::kBadStamp);
+}
+
+/// The fault of a datagram whose checksum is right.
+PeerMessageError fault_of_code(wire::CodedBody body) {
+  std::vector<std::uint8_t> bytes{'C', 'R', 'P', 2, 1, 0};
+  bytes.resize(kClearHeader);
+  wire::BodyWriter writer;
+  wire::code_body(writer, body);
+  const auto code = std::move(writer).finished();
+  bytes.insert(bytes.end(), code.begin(), code.end());
+  return fault_of(resealed(bytes));
+}
+
+TEST(PeerMessage, RefusesWhatNoEncoderWrites) {
+  wire::CodedBody seen;
+  seen.cameras = {{0, 0, 0}};
+  seen.sources.push_back({2, {{.age = 0}}, {{.age = 0, .range_mm = 1000}}});
+  const auto with = [&](auto change) {
+    wire::CodedBody body = seen;
+    change(body.sources.front());
+    return fault_of_code(body);
+  };
+  wire::CodedEstimate estimate{.neighbor = 2};
+  const auto with_estimate = [](const wire::CodedEstimate& code) {
+    wire::CodedBody body;
+    body.estimates.push_back(code);
+    return fault_of_code(body);
+  };
+
+  EXPECT_EQ(with([](auto& s) { s.bearings[0].u = {16384, 0}; }), PeerMessageError::kNotUnit);
+  EXPECT_EQ(with([](auto& s) {
+              s.bearings.push_back({.u = {1 << 20, 0}});
+            }),
+            PeerMessageError::kNotUnit);
+  EXPECT_EQ(with([](auto& s) { s.bearings.push_back({.sigma = 128}); }),
+            PeerMessageError::kOutOfRange);
+  EXPECT_EQ(with([](auto& s) { s.bearings[0].age = 200'000; }), PeerMessageError::kBadStamp);
+  EXPECT_EQ(with([](auto& s) { s.ranges[0].range_mm = 0; }), PeerMessageError::kOutOfRange);
+  EXPECT_EQ(with([](auto& s) { s.ranges[0].received = 256; }), PeerMessageError::kOutOfRange);
+  EXPECT_EQ(with([](auto& s) { s.neighbor = 65535; }), PeerMessageError::kBadId);
+  seen.cameras.clear();
+  EXPECT_EQ(with([](auto&) {}), PeerMessageError::kBadIndex);
+
+  wire::CodedBody moved;
+  moved.imu = {.gyro_exponent = 30, .accel_exponent = 0, .predictions = {}, .samples = {{}}};
+  EXPECT_EQ(fault_of_code(moved), PeerMessageError::kOutOfRange);
+  moved.imu.gyro_exponent = 0;
+  moved.imu.samples[0].values[0] = 1 << 30;
+  EXPECT_EQ(fault_of_code(moved), PeerMessageError::kOutOfRange);
+
+  estimate.q = {16383, 16383, 16383};
+  EXPECT_EQ(with_estimate(estimate), PeerMessageError::kNotUnit);
+  estimate.q = {};
+  estimate.factor.fill(2047);
+  EXPECT_EQ(with_estimate(estimate), PeerMessageError::kBadCovariance);
 }
 
 TEST(PeerMessage, OmitsAndCountsWhatCannotBeEncoded) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   OutgoingPeerMessage message = full_message(1, 1, 2);
-  const auto fine = encode_peer_message(message);
+  constexpr WireLimits kLimits{.copies = 8};
+  const auto fine = encode_peer_message(message, kLimits);
   message.report.imu[0].gyro_radps.x() = kNan;
   message.report.bearings[0].u_B = Eigen::Vector3d::Zero();
   message.report.ranges[0].range_m = -1.0;
   message.report.estimates[0].T_B_N.covariance.setZero();
-  message.report.imu[1].stamp -= milliseconds{400};
   message.report.tilt.sigma_rad = kNan;
 
-  const auto encoded = encode_peer_message(message);
+  const auto encoded = encode_peer_message(message, kLimits);
   const auto decoded = decode_peer_message(encoded.bytes);
 
   ASSERT_TRUE(decoded.has_value());

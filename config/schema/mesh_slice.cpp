@@ -1,0 +1,17 @@
+#include "config/schema/mesh_slice.hpp"
+
+#include <cmath>
+
+namespace crepes {
+
+SendSettings send_settings(const Config& config) {
+  const ImuNoise& noise = config.imu.noise;
+  const double half_of_samples = 0.5 * std::sqrt(noise.update_rate);
+  return {.rate_hz = config.net.report_rate_hz,
+          .air_kbps = config.net.air_kbps,
+          .gyro_step_radps = half_of_samples * noise.gyroscope_noise_density,
+          .accel_step_mps2 = half_of_samples * noise.accelerometer_noise_density,
+          .session_salt = 0};
+}
+
+}  // namespace crepes
