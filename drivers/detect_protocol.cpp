@@ -4,9 +4,15 @@
 
 #include "drivers/imu/hipnuc.hpp"
 #include "drivers/imu/mavlink.hpp"
+#include "drivers/imu/microstrain.hpp"
+#include "drivers/imu/vectornav.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/imu/xsens.hpp"
+#include "drivers/uwb/dwm1001.hpp"
+#include "drivers/uwb/fira_uci.hpp"
+#include "drivers/uwb/mauwb.hpp"
 #include "drivers/uwb/nlink_frame.hpp"
+#include "drivers/uwb/range_line.hpp"
 
 namespace crepes {
 namespace {
@@ -17,10 +23,22 @@ struct Candidate {
   FrameCheck (*examine)(Bytes);
 };
 
+/// Comments alone would make any text a list of ranges.
+FrameCheck examine_range_line(Bytes bytes) {
+  return bytes[0] == '#' ? FrameCheck{} : RangeLine::examine(bytes);
+}
+
 constexpr std::array kCandidates{
     Candidate{SerialProtocol::kNlink, "LinkTrack", &examine_nlink},
+    Candidate{SerialProtocol::kDwm1001Shell, "dwm1001", &Dwm1001Shell::examine},
+    Candidate{SerialProtocol::kDwm1001Tlv, "dwm1001_tlv", &Dwm1001Tlv::examine},
+    Candidate{SerialProtocol::kMaUwb, "mauwb", &MaUwb::examine},
+    Candidate{SerialProtocol::kFiraUci, "fira", &FiraUci::examine},
+    Candidate{SerialProtocol::kRangeLine, "lines", &examine_range_line},
     Candidate{SerialProtocol::kWitMotion, "witmotion", &WitMotion::examine},
     Candidate{SerialProtocol::kHipnuc, "hipnuc", &Hipnuc::examine},
+    Candidate{SerialProtocol::kVectorNav, "vectornav", &VectorNav::examine},
+    Candidate{SerialProtocol::kMicroStrain, "microstrain", &MicroStrain::examine},
     Candidate{SerialProtocol::kXsens, "xsens", &Xsens::examine},
     Candidate{SerialProtocol::kMavlink, "mavlink", &Mavlink::examine}};
 
@@ -46,6 +64,8 @@ std::string_view name_of(SerialProtocol protocol) {
   }
   return "";
 }
+
+bool is_of_uwb(SerialProtocol protocol) { return protocol <= SerialProtocol::kRangeLine; }
 
 std::optional<SerialProtocol> detect_protocol(Bytes recent) {
   for (const Candidate& candidate : kCandidates) {

@@ -9,10 +9,26 @@
 
 namespace crepes {
 
-enum class SerialProtocol : std::uint8_t { kNlink, kWitMotion, kHipnuc, kXsens, kMavlink };
+enum class SerialProtocol : std::uint8_t {
+  kNlink,
+  kDwm1001Shell,
+  kDwm1001Tlv,
+  kMaUwb,
+  kFiraUci,
+  kRangeLine,
+  kWitMotion,
+  kHipnuc,
+  kXsens,
+  kMavlink,
+  kVectorNav,
+  kMicroStrain
+};
 
 /// The name in the configuration; for NLink, the name of the product.
 [[nodiscard]] std::string_view name_of(SerialProtocol protocol);
+
+/// Whether a ranging module speaks it, not an inertial sensor.
+[[nodiscard]] bool is_of_uwb(SerialProtocol protocol);
 
 /// The protocol of which at least three frames fill at least a quarter of `recent`; autopilots send
 /// many messages that are unknown here. Empty if there is none. `recent` may begin and end within a

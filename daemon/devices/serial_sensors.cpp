@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <span>
+#include <type_traits>
 #include <utility>
 
 #include "drivers/detect_protocol.hpp"
@@ -10,11 +12,17 @@
 #include "drivers/imu/imu_correction.hpp"
 #include "drivers/imu/imu_health.hpp"
 #include "drivers/imu/mavlink.hpp"
+#include "drivers/imu/microstrain.hpp"
+#include "drivers/imu/vectornav.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/imu/xsens.hpp"
 #include "drivers/serial/device_name.hpp"
 #include "drivers/serial/serial_reader.hpp"
+#include "drivers/uwb/dwm1001.hpp"
+#include "drivers/uwb/fira_uci.hpp"
+#include "drivers/uwb/mauwb.hpp"
 #include "drivers/uwb/nlink.hpp"
+#include "drivers/uwb/range_line.hpp"
 
 namespace crepes {
 namespace {
@@ -22,7 +30,7 @@ namespace {
 using std::chrono::milliseconds;
 
 /// A module may send other frames beside those with ranges.
-SensorTotals totals_of(const NlinkCounts& counts) {
+SensorTotals totals_of(const UwbCounts& counts) {
   return {.faults = {{"unknown_modules", counts.unknown_modules},
                      {"implausible", counts.implausible},
                      {"clock_restarts", counts.clock_restarts}},
@@ -94,6 +102,7 @@ class SerialDevice final : public Device {
     for (auto& fault : preprocessing_.faults()) totals.faults.push_back(std::move(fault));
     totals.faults.emplace_back("skipped_bytes", reader_.counts().skipped_bytes);
     totals.faults.emplace_back("checksum_failures", reader_.counts().checksum_failures);
+    totals.counts.emplace_back("unchecked_frames", reader_.counts().unchecked);
     return totals;
   }
 
@@ -132,20 +141,64 @@ OpenDevice imu_device(SerialProtocol protocol, const ImuSensorSettings& settings
     return device_with(XsensParser(), preprocessing, clock, sink);
   if (protocol == SerialProtocol::kMavlink)
     return device_with(MavlinkParser(), preprocessing, clock, sink);
+  if (protocol == SerialProtocol::kVectorNav)
+    return device_with(VectorNavParser(), preprocessing, clock, sink);
+  if (protocol == SerialProtocol::kMicroStrain)
+    return device_with(MicroStrainParser(), preprocessing, clock, sink);
   return nullptr;
 }
 
-/// Listens until the protocol of the IMU is recognized; from then on it is that device.
-class UnknownImu final : public Device {
+/// The parser of a ranging module that speaks `protocol`; empty if that is not of one.
+OpenDevice uwb_device(SerialProtocol protocol, const UwbSensorSettings& settings,
+                      const Clock& clock, const EventSink& sink) {
+  const auto with = [&]<class Parser>(std::type_identity<Parser>) {
+    return device_with(Parser(settings.modules, settings.max_range_m, settings.own_module),
+                       UwbPreprocessing{}, clock, sink);
+  };
+  switch (protocol) {
+    case SerialProtocol::kNlink:
+      return with(std::type_identity<NlinkParser>());
+    case SerialProtocol::kDwm1001Shell:
+      return with(std::type_identity<Dwm1001ShellParser>());
+    case SerialProtocol::kDwm1001Tlv:
+      return with(std::type_identity<Dwm1001TlvParser>());
+    case SerialProtocol::kMaUwb:
+      return with(std::type_identity<MaUwbParser>());
+    case SerialProtocol::kFiraUci:
+      return with(std::type_identity<FiraUciParser>());
+    case SerialProtocol::kRangeLine:
+      return with(std::type_identity<RangeLineParser>());
+    default:
+      return nullptr;
+  }
+}
+
+/// The mode in which a LinkTrack module sends nothing that could be recognized.
+std::optional<std::string> foreign_meaning(Bytes recent) {
+  constexpr std::size_t kEnough = 3;
+  std::size_t foreign = 0;
+  for (std::size_t at = 0; at < recent.size(); ++at)
+    foreign += NlinkParser::examine(recent.subspan(at)).kind == FrameKind::kForeign ? 1 : 0;
+  if (foreign < kEnough) return std::nullopt;
+  return std::string(NlinkParser::kForeignMeaning);
+}
+
+/// Listens until the protocol is recognized; from then on it is that device.
+class UnknownDevice final : public Device {
  public:
-  UnknownImu(SerialPort port, const ImuSensorSettings& settings, const Clock& clock,
-             const EventSink& sink)
+  using Hint = std::optional<std::string> (*)(Bytes recent);
+
+  /// `kind` is what is wanted, `protocols` are the names of all that would do. `hint` knows bytes
+  /// without frames.
+  UnknownDevice(SerialPort port, std::string kind, std::string protocols, Hint hint,
+                const Clock& clock, std::function<OpenDevice(SerialProtocol)> device_of)
       : port_(std::move(port)),
+        kind_(std::move(kind)),
+        protocols_(std::move(protocols)),
+        hint_(hint),
         since_(clock.now()),
         clock_(clock),
-        device_of_([=, &clock](SerialProtocol protocol) {
-          return imu_device(protocol, settings, clock, sink);
-        }) {}
+        device_of_(std::move(device_of)) {}
 
   [[nodiscard]] Result<std::size_t> read_once(milliseconds timeout) override {
     if (known_) return known_->read_once(timeout);
@@ -167,23 +220,64 @@ class UnknownImu final : public Device {
     constexpr Duration kPatience = std::chrono::seconds(1);
     constexpr std::size_t kEnoughBytes = 64;
     if (known_) return known_->diagnosis();
+    if (const auto meaning = hint_(recent_.get()))
+      return fmt::format("{}: {}", port_.path(), *meaning);
     if (clock_.now() - since_ < kPatience || recent_.get().size() < kEnoughBytes)
       return std::nullopt;
     if (const auto spoken = detect_protocol(recent_.get()))
-      return fmt::format("{}: no inertial sensor: it speaks {}", port_.path(), name_of(*spoken));
-    return port_.path() +
-           ": bytes that are none of witmotion, hipnuc, xsens, mavlink; wrong baud rate or another "
-           "kind of device?";
+      return fmt::format("{}: no {}: it speaks {}", port_.path(), kind_, name_of(*spoken));
+    return fmt::format("{}: bytes that are none of {}; wrong baud rate or another kind of device?",
+                       port_.path(), protocols_);
   }
 
  private:
   SerialPort port_;
+  std::string kind_;
+  std::string protocols_;
+  Hint hint_;
   RecentBytes recent_;
   Timestamp since_;
   const Clock& clock_;
   std::function<OpenDevice(SerialProtocol)> device_of_;
   std::unique_ptr<Device> known_;
 };
+
+/// The names of the protocols of one kind of device, without `auto`.
+template <class Choices>
+std::string names_of(const Choices& choices) {
+  std::string names;
+  for (const auto& choice : std::span(choices).subspan(1))
+    names += (names.empty() ? "" : ", ") + std::string(choice.name);
+  return names;
+}
+
+OpenDevice configured_uwb(const UwbSensorSettings& settings, const Clock& clock,
+                          const EventSink& sink) {
+  const auto device_of = [=, &clock](SerialProtocol protocol) {
+    return uwb_device(protocol, settings, clock, sink);
+  };
+  switch (settings.device.protocol) {
+    case UwbProtocol::kLinkTrack:
+      return device_of(SerialProtocol::kNlink);
+    case UwbProtocol::kDwm1001Shell:
+      return device_of(SerialProtocol::kDwm1001Shell);
+    case UwbProtocol::kDwm1001Tlv:
+      return device_of(SerialProtocol::kDwm1001Tlv);
+    case UwbProtocol::kMaUwb:
+      return device_of(SerialProtocol::kMaUwb);
+    case UwbProtocol::kFiraUci:
+      return device_of(SerialProtocol::kFiraUci);
+    case UwbProtocol::kRangeLine:
+      return device_of(SerialProtocol::kRangeLine);
+    case UwbProtocol::kAuto:
+      break;
+  }
+  return [=, &clock](SerialPort port) {
+    return std::make_unique<UnknownDevice>(std::move(port), "ranging module",
+                                           names_of(kUwbProtocols), &foreign_meaning, clock,
+                                           device_of);
+  };
+}
 
 OpenDevice configured_imu(const ImuSensorSettings& settings, const Clock& clock,
                           const EventSink& sink) {
@@ -196,11 +290,20 @@ OpenDevice configured_imu(const ImuSensorSettings& settings, const Clock& clock,
       return imu_device(SerialProtocol::kXsens, settings, clock, sink);
     case ImuProtocol::kMavlink:
       return imu_device(SerialProtocol::kMavlink, settings, clock, sink);
+    case ImuProtocol::kVectorNav:
+      return imu_device(SerialProtocol::kVectorNav, settings, clock, sink);
+    case ImuProtocol::kMicroStrain:
+      return imu_device(SerialProtocol::kMicroStrain, settings, clock, sink);
     case ImuProtocol::kAuto:
       break;
   }
+  const auto device_of = [=, &clock](SerialProtocol protocol) {
+    return imu_device(protocol, settings, clock, sink);
+  };
   return [=, &clock](SerialPort port) {
-    return std::make_unique<UnknownImu>(std::move(port), settings, clock, sink);
+    const auto no_hint = [](Bytes) -> std::optional<std::string> { return std::nullopt; };
+    return std::make_unique<UnknownDevice>(std::move(port), "inertial sensor",
+                                           names_of(kImuProtocols), no_hint, clock, device_of);
   };
 }
 
@@ -226,6 +329,7 @@ Sensor serial_sensor(const std::string& name, const std::string& port, int baud,
 UwbSensorSettings uwb_sensor_settings(const Config& config) {
   return {.device = config.uwb.device,
           .modules = uwb_modules_of(config.swarm),
+          .own_module = uwb_module_of(config.swarm, config.robot.id),
           .max_range_m = config.uwb.noise.max_range_m};
 }
 
@@ -235,9 +339,8 @@ ImuSensorSettings imu_sensor_settings(const Config& config) {
 
 Sensor uwb_sensor(const UwbSensorSettings& settings, const Clock& clock, const EventSink& sink,
                   const std::string& by_id) {
-  const NlinkParser parser(settings.modules, settings.max_range_m);
   return serial_sensor("uwb", settings.device.port, settings.device.baud,
-                       device_with(parser, UwbPreprocessing{}, clock, sink), by_id);
+                       configured_uwb(settings, clock, sink), by_id);
 }
 
 Sensor imu_sensor(const ImuSensorSettings& settings, const Clock& clock, const EventSink& sink,

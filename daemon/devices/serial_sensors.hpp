@@ -8,8 +8,8 @@
 #include "daemon/stages/stage_context.hpp"
 #include "drivers/imu/imu_config.hpp"
 #include "drivers/serial/device_name.hpp"
-#include "drivers/uwb/nlink.hpp"
 #include "drivers/uwb/uwb_config.hpp"
+#include "drivers/uwb/uwb_ranges.hpp"
 #include "estimator/core/clock.hpp"
 
 namespace crepes {
@@ -17,7 +17,8 @@ namespace crepes {
 struct UwbSensorSettings {
   UwbDeviceConfig device;
   UwbModules modules;
-  double max_range_m = 0.0;  ///< ranges above are refused
+  std::optional<std::uint32_t> own_module = std::nullopt;  ///< this robot's
+  double max_range_m = 0.0;                                ///< ranges above are refused
 
   [[nodiscard]] bool operator==(const UwbSensorSettings&) const = default;
 };

@@ -12,11 +12,22 @@
 
 namespace crepes {
 
-enum class ImuProtocol : std::uint8_t { kAuto, kWitMotion, kHipnuc, kXsens, kMavlink };
-inline constexpr std::array kImuProtocols{
-    Choice{"auto", ImuProtocol::kAuto}, Choice{"witmotion", ImuProtocol::kWitMotion},
-    Choice{"hipnuc", ImuProtocol::kHipnuc}, Choice{"xsens", ImuProtocol::kXsens},
-    Choice{"mavlink", ImuProtocol::kMavlink}};
+enum class ImuProtocol : std::uint8_t {
+  kAuto,
+  kWitMotion,
+  kHipnuc,
+  kXsens,
+  kMavlink,
+  kVectorNav,
+  kMicroStrain
+};
+inline constexpr std::array kImuProtocols{Choice{"auto", ImuProtocol::kAuto},
+                                          Choice{"witmotion", ImuProtocol::kWitMotion},
+                                          Choice{"hipnuc", ImuProtocol::kHipnuc},
+                                          Choice{"xsens", ImuProtocol::kXsens},
+                                          Choice{"mavlink", ImuProtocol::kMavlink},
+                                          Choice{"vectornav", ImuProtocol::kVectorNav},
+                                          Choice{"microstrain", ImuProtocol::kMicroStrain}};
 
 /// What makes of a sensor's reading v the true T K (v - b), as imu_tk calibrates it.
 struct TriadConfig {

@@ -25,6 +25,7 @@ enum MessageId : std::uint32_t {
   kHighresImu = 105,
   kTimesync = 111,
   kScaledImu2 = 116,
+  kScaledImu3 = 129,
 };
 
 /// `length` in version 1; version 2 adds fields up to `extended` and omits trailing zeros.
@@ -36,9 +37,10 @@ struct Message {
 };
 
 constexpr std::array kMessages{Message{kHighresImu, 62, 63, 93}, Message{kScaledImu, 22, 24, 170},
-                               Message{kScaledImu2, 22, 24, 76}, Message{kRawImu, 26, 29, 144},
-                               Message{kHeartbeat, 9, 9, 50},    Message{kSysStatus, 31, 43, 124},
-                               Message{kAttitude, 28, 28, 39},   Message{kTimesync, 16, 18, 34}};
+                               Message{kScaledImu2, 22, 24, 76}, Message{kScaledImu3, 22, 24, 46},
+                               Message{kRawImu, 26, 29, 144},    Message{kHeartbeat, 9, 9, 50},
+                               Message{kSysStatus, 31, 43, 124}, Message{kAttitude, 28, 28, 39},
+                               Message{kTimesync, 16, 18, 34}};
 
 struct Header {
   std::uint32_t id = 0;
@@ -109,34 +111,64 @@ ImuReading highres(Bytes payload) {
           .time = DeviceTime{.ns = unsigned_at(payload, 0, 8) * kMicrosecond}};
 }
 
-ImuReading scaled(Bytes payload) {
-  const Eigen::Vector3d accel = vector_at<std::int16_t>(payload, 4);
-  const Eigen::Vector3d gyro = vector_at<std::int16_t>(payload, 10);
+/// Acceleration in mG and rate in mrad/s.
+ImuReading scaled_triads(Bytes payload, std::size_t accel_at, std::size_t gyro_at) {
+  const Eigen::Vector3d accel = vector_at<std::int16_t>(payload, accel_at);
+  const Eigen::Vector3d gyro = vector_at<std::int16_t>(payload, gyro_at);
   const bool saturated = is_saturated(accel) || is_saturated(gyro);
   return {.verdict = saturated ? ImuVerdict::kSaturated : ImuVerdict::kSample,
           .gyro_radps = turned(gyro) * 1e-3,
-          .accel_mps2 = turned(accel) * kMilliGravity,
-          .time = DeviceTime::ticks(unsigned_at(payload, 0, 4), std::chrono::milliseconds{1}, 32)};
+          .accel_mps2 = turned(accel) * kMilliGravity};
+}
+
+ImuReading scaled(Bytes payload) {
+  ImuReading reading = scaled_triads(payload, 4, 10);
+  reading.time = DeviceTime::ticks(unsigned_at(payload, 0, 4), std::chrono::milliseconds{1}, 32);
+  return reading;
+}
+
+/// RAW_IMU of ArduPilot. Only the first sensor has this scale; `id` is an extension, 0 if omitted.
+ImuReading ardupilot_raw(Bytes payload) {
+  constexpr std::size_t kAccel = 8;
+  constexpr std::size_t kGyro = 14;
+  constexpr std::size_t kId = 26;
+  constexpr std::uint64_t kMicrosecond = 1000;  // ns
+  if (payload[kId] != 0) return {.verdict = ImuVerdict::kUnscaled};
+  ImuReading reading = scaled_triads(payload, kAccel, kGyro);
+  reading.time = DeviceTime{.ns = unsigned_at(payload, 0, 8) * kMicrosecond};
+  return reading;
 }
 
 /// Smaller is better; empty: the message holds no samples.
 std::optional<int> rank_of(std::uint32_t id) {
-  constexpr std::array kBestFirst{kHighresImu, kScaledImu, kScaledImu2};
+  constexpr std::array kBestFirst{kHighresImu, kScaledImu, kRawImu, kScaledImu2, kScaledImu3};
   const auto* const found = std::ranges::find(kBestFirst, id);
   if (found == kBestFirst.end()) return std::nullopt;
   return static_cast<int>(found - kBestFirst.begin());
 }
 
+bool is_start(std::uint8_t byte) { return byte == kVersion1 || byte == kVersion2; }
+
+/// A message without a known checksum counts only if another one begins where it ends.
+FrameCheck examine_unknown(Bytes bytes, const Header& header) {
+  if (bytes.size() <= header.frame()) return {FrameKind::kIncomplete};
+  if (!is_start(bytes[header.frame()])) return {};
+  return {FrameKind::kUnchecked, header.frame()};
+}
+
+std::uint8_t system_of(Bytes frame) { return frame[frame[0] == kVersion1 ? 3 : 5]; }
+
 }  // namespace
 
 FrameCheck Mavlink::examine(Bytes bytes) {
-  if (bytes[0] != kVersion1 && bytes[0] != kVersion2) return {};
+  if (!is_start(bytes[0])) return {};
   if (bytes.size() < header_size(bytes)) return {FrameKind::kIncomplete};
   const Header header = header_of(bytes);
-  const Message* message = message_of(header.id);
-  if (message == nullptr || !can_have(*message, bytes, header.payload)) return {};
   if (bytes[0] == kVersion2 && (bytes[2] & ~1U) != 0)
     return {};  // incompatible flags: must be refused if unknown
+  const Message* message = message_of(header.id);
+  if (message == nullptr) return examine_unknown(bytes, header);
+  if (!can_have(*message, bytes, header.payload)) return {};
   if (bytes.size() < header.frame()) return {FrameKind::kIncomplete};
   const std::size_t end = header.size + header.payload;
   if (crc_of(bytes.subspan(1, end - 1), message->crc_extra) != unsigned_at(bytes, end, kChecksum))
@@ -144,31 +176,50 @@ FrameCheck Mavlink::examine(Bytes bytes) {
   return {FrameKind::kComplete, header.frame()};
 }
 
-ImuReading Mavlink::read(Bytes frame) {
+ImuReading Mavlink::read(Bytes frame, bool is_ardupilot) {
   const Header header = header_of(frame);
   std::array<std::uint8_t, 255> payload{};  // restores omitted zeros
   std::ranges::copy(frame.subspan(header.size, header.payload), payload.begin());
-  if (header.id == kHighresImu) return highres(payload);
-  if (header.id == kScaledImu || header.id == kScaledImu2) return scaled(payload);
-  if (header.id == kRawImu) return {.verdict = ImuVerdict::kUnscaled};
-  return {};
+  switch (header.id) {
+    case kHighresImu:
+      return highres(payload);
+    case kScaledImu:
+    case kScaledImu2:
+    case kScaledImu3:
+      return scaled(payload);
+    case kRawImu:
+      return is_ardupilot ? ardupilot_raw(payload) : ImuReading{.verdict = ImuVerdict::kUnscaled};
+    default:
+      return {};
+  }
 }
 
 bool MavlinkParser::is_chosen(Bytes frame, Timestamp arrival) {
   constexpr Duration kGone = std::chrono::seconds(1);
   const Header header = header_of(frame);
   const std::optional<int> rank = rank_of(header.id);
-  if (!rank) return true;  // no sample: only counted
+  const bool is_unscaled = header.id == kRawImu && !is_ardupilot(frame);
+  if (!rank || is_unscaled) return true;  // no sample: only counted
   const bool is_same = source_ && *rank == source_->rank && header.sender == source_->sender;
   const bool is_better = !source_ || *rank < source_->rank || arrival - source_->heard > kGone;
   if (is_same || is_better) source_ = Source{*rank, header.sender, arrival};
   return is_same || is_better;
 }
 
+bool MavlinkParser::is_ardupilot(Bytes frame) const {
+  return ardupilots_.contains(system_of(frame));
+}
+
 void MavlinkParser::parse(Bytes frame, Timestamp arrival,
                           const std::function<void(const ImuSample&)>& sink) {
+  constexpr std::size_t kAutopilot = 5;       // of the payload of HEARTBEAT
+  constexpr std::uint8_t kArduPilotMega = 3;  // MAV_AUTOPILOT_ARDUPILOTMEGA
+  const Header header = header_of(frame);
+  const bool has_autopilot = header.id == kHeartbeat && header.payload > kAutopilot;
+  if (has_autopilot && frame[header.size + kAutopilot] == kArduPilotMega)
+    ardupilots_.insert(system_of(frame));
   if (is_chosen(frame, arrival))
-    forward_sample(Mavlink::read(frame), arrival, clock_, counts_, sink);
+    forward_sample(Mavlink::read(frame, is_ardupilot(frame)), arrival, clock_, counts_, sink);
 }
 
 std::string MavlinkParser::no_measurement_reason() const {

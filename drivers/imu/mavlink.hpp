@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -12,11 +13,13 @@
 
 namespace crepes {
 
-/// Versions 1 and 2. HIGHRES_IMU, SCALED_IMU and SCALED_IMU2 hold samples; their axes (x forward,
-/// y right, z down) are converted to ours (x forward, y left, z up). RAW_IMU is refused: its
-/// numbers have no unit.
+/// Versions 1 and 2. HIGHRES_IMU and SCALED_IMU to SCALED_IMU3 hold samples; their axes (x forward,
+/// y right, z down) are converted to ours (x forward, y left, z up). The numbers of RAW_IMU have no
+/// unit, but for ArduPilot's: "on ArduPilot platforms, this message is identical to SCALED_IMU"
+/// (common.xml).
 struct Mavlink {
-  static constexpr std::size_t kMaxFrame = 10 + 255 + 2 + 13;  ///< version 2, signed
+  static constexpr std::size_t kMaxFrame =
+      10 + 255 + 2 + 13 + 1;  ///< version 2, signed, and a byte
   static constexpr std::string_view kNoSamples =
       "MAVLink without an IMU message; have the autopilot send HIGHRES_IMU (105) at "
       "imu.update_rate "
@@ -25,13 +28,16 @@ struct Mavlink {
       "MAVLink with RAW_IMU only, whose numbers have no unit; have the autopilot send HIGHRES_IMU "
       "(105) or SCALED_IMU (26)";
 
-  /// Messages of unknown kinds cannot be checked and count as skipped bytes.
+  /// The checksums of unknown messages cannot be computed. They are passed over as `kUnchecked` if
+  /// another message begins where they end.
   [[nodiscard]] static FrameCheck examine(Bytes bytes);
-  [[nodiscard]] static ImuReading read(Bytes frame);
+  /// `is_ardupilot`: the sender's autopilot, which scales RAW_IMU.
+  [[nodiscard]] static ImuReading read(Bytes frame, bool is_ardupilot = false);
 };
 
-/// Several messages may report the same motion. The best kind is used (HIGHRES_IMU, then
-/// SCALED_IMU, then SCALED_IMU2), from one sender. Another is used only after a second of silence.
+/// Several messages may report the same motion. The best kind is used (HIGHRES_IMU, SCALED_IMU,
+/// ArduPilot's RAW_IMU, SCALED_IMU2, SCALED_IMU3), from one sender. Another is used only after a
+/// second of silence.
 class MavlinkParser {
  public:
   using Measurement = ImuSample;
@@ -51,8 +57,10 @@ class MavlinkParser {
     Timestamp heard{};
   };
   [[nodiscard]] bool is_chosen(Bytes frame, Timestamp arrival);
+  [[nodiscard]] bool is_ardupilot(Bytes frame) const;
 
   std::optional<Source> source_;
+  std::set<std::uint8_t> ardupilots_;  ///< systems whose heartbeats say so
   DeviceClock clock_;
   ImuCounts counts_;
 };

@@ -19,6 +19,7 @@ enum class FrameKind : std::uint8_t {
   kIncomplete,   ///< valid so far; needs more bytes
   kBadChecksum,  ///< a frame with a wrong checksum
   kForeign,      ///< a frame of this device in another mode of operation
+  kUnchecked,    ///< a frame of `length` bytes of a kind whose checksum cannot be computed
   kComplete,     ///< a frame of `length` bytes
 };
 
@@ -37,10 +38,12 @@ concept FrameProtocol = requires(Bytes bytes) {
 /// Totals since the start; `..._in_a_row` since the last valid frame.
 struct DecoderCounts {
   std::uint64_t frames = 0;
+  std::uint64_t unchecked = 0;  ///< frames that were passed over
   std::uint64_t skipped_bytes = 0;
   std::uint64_t checksum_failures = 0;
   std::uint64_t skipped_in_a_row = 0;
   std::uint64_t foreign_in_a_row = 0;
+  std::uint64_t unchecked_in_a_row = 0;
 };
 
 /// Returns whole frames in order, regardless of how the stream is divided into chunks. After a
@@ -62,7 +65,9 @@ class FrameDecoder {
       }
       count(check.kind);
       if (check.kind == FrameKind::kComplete) on_frame(rest.first(check.length));
-      start += check.kind == FrameKind::kComplete ? check.length : 1;
+      const bool is_whole =
+          check.kind == FrameKind::kComplete || check.kind == FrameKind::kUnchecked;
+      start += is_whole ? check.length : 1;
     }
     pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(start));
   }
@@ -75,6 +80,12 @@ class FrameDecoder {
       ++counts_.frames;
       counts_.skipped_in_a_row = 0;
       counts_.foreign_in_a_row = 0;
+      counts_.unchecked_in_a_row = 0;
+      return;
+    }
+    if (kind == FrameKind::kUnchecked) {
+      ++counts_.unchecked;
+      ++counts_.unchecked_in_a_row;
       return;
     }
     ++counts_.skipped_bytes;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "drivers/detect_protocol.hpp"
+#include "drivers/serial/device_request.hpp"
 #include "drivers/serial/frame_decoder.hpp"
 #include "drivers/serial/serial_port.hpp"
 #include "estimator/core/clock.hpp"
@@ -32,6 +33,12 @@ class RecentBytes {
 
  private:
   std::vector<std::uint8_t> bytes_;
+};
+
+/// A protocol whose device must be asked: the requests in order, from number 0 on.
+template <class Parser>
+concept AsksItsDevice = requires(std::size_t number) {
+  { Parser::request(number) } -> std::same_as<DeviceRequest>;
 };
 
 /// Reads one device. A `Parser` is a FrameProtocol that turns whole frames into measurements:
@@ -57,6 +64,9 @@ class SerialReader {
   /// Waits for bytes and forwards the measurements that they complete, stamped with their arrival.
   /// An error means that the device is gone.
   [[nodiscard]] Result<void> read_once(std::chrono::milliseconds timeout) {
+    if constexpr (AsksItsDevice<Parser>) {
+      if (Result<void> asked = ask(); !asked) return asked;
+    }
     const Result<Bytes> chunk = port_.read_some(timeout);
     if (!chunk) return tl::unexpected(chunk.error());
     const Timestamp arrival = clock_.now();
@@ -74,15 +84,17 @@ class SerialReader {
   /// One sentence on what is wrong with the received bytes, if anything. Silence is not judged
   /// here.
   [[nodiscard]] std::optional<std::string> diagnosis() const {
-    constexpr std::uint64_t kEnoughForeign = 3;
+    constexpr std::uint64_t kEnoughFrames = 3;
     constexpr std::uint64_t kEnoughBytes = 64;
     constexpr Duration kPatience = std::chrono::seconds(1);
     const Timestamp now = clock_.now();
     const DecoderCounts& counts = decoder_.counts();
-    if (counts.foreign_in_a_row >= kEnoughForeign) {
+    if (counts.foreign_in_a_row >= kEnoughFrames) {
       return fmt::format("{}: {}", port_.path(), Parser::kForeignMeaning);
     }
     if (now - last_frame_ >= kPatience) {
+      if (counts.unchecked_in_a_row >= kEnoughFrames)
+        return fmt::format("{}: {}", port_.path(), parser_.no_measurement_reason());
       if (counts.skipped_in_a_row < kEnoughBytes) return std::nullopt;
       return fmt::format("{}: {}", port_.path(), describe_unknown_bytes());
     }
@@ -94,6 +106,18 @@ class SerialReader {
   [[nodiscard]] const Parser& parser() const { return parser_; }
 
  private:
+  /// Sends the next request when it is time.
+  [[nodiscard]] Result<void> ask() {
+    constexpr Duration kSilence = std::chrono::seconds(1);
+    constexpr std::chrono::milliseconds kWriteTimeout{100};
+    const Timestamp now = clock_.now();
+    const DeviceRequest request = Parser::request(requests_);
+    if (now < next_request_ || (request.only_if_silent && now - last_frame_ < kSilence)) return {};
+    next_request_ = now + request.pause;
+    ++requests_;
+    return port_.write_all(bytes_of_text(request.bytes), kWriteTimeout);
+  }
+
   [[nodiscard]] std::string describe_unknown_bytes() const {
     const std::optional<SerialProtocol> spoken = detect_protocol(recent_.get());
     return spoken ? fmt::format("another kind of device: it speaks {}", name_of(*spoken))
@@ -108,6 +132,8 @@ class SerialReader {
   RecentBytes recent_;
   Timestamp last_frame_;
   Timestamp last_measurement_;
+  Timestamp next_request_{Duration::min()};
+  std::size_t requests_ = 0;
 };
 
 }  // namespace crepes

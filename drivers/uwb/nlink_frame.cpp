@@ -12,6 +12,7 @@ namespace crepes {
 namespace {
 
 constexpr std::uint8_t kNlinkHeader = 0x55;
+constexpr std::uint8_t kIotHeader = 0x6a;
 constexpr std::uint8_t kLastRole = 6;
 constexpr std::size_t kMostNodes = 255;
 
@@ -21,18 +22,24 @@ constexpr std::size_t kMostNodes = 255;
 struct Layout {
   NlinkKind kind;
   std::string_view name;
-  std::size_t id_size = 1;  ///< of module ids; the nodes' stand behind their role
+  std::size_t id = 5;          ///< of the module
+  std::size_t id_size = 1;     ///< of module ids
+  std::size_t role = 4;        ///< of the module
+  bool has_node_roles = true;  ///< before the nodes' ids
   std::size_t local_time = 0;
   std::size_t system_time = 0;
   std::size_t voltage = 0;
   std::size_t count = 0;
   std::size_t node_size = 0;  ///< with user data: of what precedes them
+  std::size_t node_id = 1;
   std::size_t node_range = 0;
   std::size_t node_powers = 0;
   std::size_t node_time = 0;
   std::size_t node_angle = 0;
   std::size_t node_position = 0;
-  std::size_t node_user_data = 0;  ///< their length, u16
+  std::size_t node_user_data = 0;       ///< their number
+  std::size_t node_user_data_size = 2;  ///< of that number
+  std::size_t node_user_data_unit = 1;  ///< bytes each
 
   [[nodiscard]] std::size_t first_node() const { return count + 1; }
 };
@@ -70,6 +77,18 @@ constexpr std::array kLayouts{
            .node_size = 7,
            .node_range = 2,
            .node_powers = 5},
+    Layout{.kind = NlinkKind::kNodeFrame4,
+           .name = "NodeFrame4",
+           .has_node_roles = false,
+           .local_time = 10,
+           .system_time = 6,
+           .voltage = 18,
+           .count = 20,
+           .node_size = 5,
+           .node_id = 0,
+           .node_user_data = 4,
+           .node_user_data_size = 1,
+           .node_user_data_unit = 4},
     Layout{.kind = NlinkKind::kAoaNodeFrame0,
            .name = "AOA NodeFrame0",
            .local_time = 6,
@@ -96,12 +115,34 @@ constexpr std::array kLayouts{
            .count = 13,
            .node_size = 7,
            .node_user_data = 5},
+    // As in nlink_unpack/nlink_iot_frame0.c of github.com/nooploop-dev/nlink_parser; no recording.
+    Layout{.kind = NlinkKind::kIotFrame0,
+           .name = "IoT Frame0",
+           .id = 4,
+           .id_size = 4,
+           .role = 0,
+           .has_node_roles = false,
+           .count = 13,
+           .node_size = 14,
+           .node_id = 0,
+           .node_range = 4,
+           .node_powers = 11,
+           .node_user_data = 13,
+           .node_user_data_size = 1},
 };
 
 /// TagFrame0 has eight ranges, to anchors 0 to 7, instead of nodes.
 constexpr std::size_t kTagLength = 128;
 constexpr std::size_t kTagRanges = 22;
 constexpr std::size_t kTagAnchors = 8;
+
+/// AnchorFrame0 has a fixed length, a tail instead of a checksum, and 30 tags, also empty ones.
+constexpr std::size_t kAnchorLength = 896;
+constexpr std::uint8_t kAnchorTail = 0xee;
+constexpr std::size_t kAnchorFirstTag = 2;
+constexpr std::size_t kAnchorTagSize = 27;
+constexpr std::size_t kAnchorTags = 30;
+constexpr std::uint8_t kNoTag = 0xff;
 
 /// Offsets of NlinkMotion. Orientation: gyro, acceleration, 12 bytes, angles, quaternion.
 struct MotionLayout {
@@ -119,6 +160,14 @@ constexpr std::size_t kQuaternion = 42;
 const Layout* layout_of(NlinkKind kind) {
   const auto* const found = std::ranges::find(kLayouts, kind, &Layout::kind);
   return found == kLayouts.end() ? nullptr : found;
+}
+
+/// Empty: no frame of this protocol. Needs two bytes.
+std::optional<NlinkKind> kind_of(Bytes bytes) {
+  if (bytes[0] == kIotHeader && bytes[1] == 0x00) return NlinkKind::kIotFrame0;
+  const NlinkKind kind{bytes[1]};
+  if (bytes[0] != kNlinkHeader || kind == NlinkKind::kIotFrame0) return std::nullopt;
+  return kind;
 }
 
 double int24_at(Bytes bytes, std::size_t at) {
@@ -141,7 +190,9 @@ Eigen::Vector4d wxyz_at(Bytes bytes, std::size_t at) {
 }
 
 std::size_t user_data_size(Bytes bytes, const Layout& layout, std::size_t node) {
-  return layout.node_user_data == 0 ? 0 : unsigned_at(bytes, node + layout.node_user_data, 2);
+  if (layout.node_user_data == 0) return 0;
+  return layout.node_user_data_unit *
+         unsigned_at(bytes, node + layout.node_user_data, layout.node_user_data_size);
 }
 
 /// Whether the nodes received so far can fill a frame of `length` bytes.
@@ -159,7 +210,8 @@ bool nodes_can_fill(Bytes bytes, const Layout& layout, std::size_t length) {
 }
 
 bool has_known_roles(Bytes frame, const Layout& layout) {
-  if (frame[4] > kLastRole) return false;
+  if (layout.role != 0 && frame[layout.role] > kLastRole) return false;
+  if (!layout.has_node_roles) return true;
   for (std::size_t at = layout.first_node(); at + 1 < frame.size();
        at += layout.node_size + user_data_size(frame, layout, at)) {
     if (frame[at] > kLastRole) return false;
@@ -180,6 +232,18 @@ FrameCheck examine_tag(Bytes bytes) {
   return {FrameKind::kComplete, kTagLength};
 }
 
+/// Without a checksum, the roles of the tags are checked as soon as they are there.
+FrameCheck examine_anchor(Bytes bytes) {
+  for (std::size_t tag = 0; tag < kAnchorTags; ++tag) {
+    const std::size_t at = kAnchorFirstTag + tag * kAnchorTagSize;
+    if (at + 1 >= bytes.size()) break;
+    if (bytes[at] != kNoTag && bytes[at + 1] > kLastRole) return {};
+  }
+  if (bytes.size() < kAnchorLength) return {FrameKind::kIncomplete};
+  if (bytes[kAnchorLength - 1] != kAnchorTail) return {};
+  return {FrameKind::kComplete, kAnchorLength};
+}
+
 NlinkMotion motion_in(Bytes frame, const MotionLayout& at) {
   const std::size_t angles = at.orientation + kAngles;
   const Eigen::Vector4d wxyz = wxyz_at(frame, at.orientation + kQuaternion);
@@ -198,6 +262,7 @@ NlinkFrame decode_tag(Bytes frame) {
   NlinkFrame decoded{.kind = NlinkKind::kTagFrame0,
                      .role = frame[3],
                      .module = frame[2],
+                     .has_clock = true,
                      .local_time_ms = field_at<std::uint32_t>(frame, 108),
                      .system_time_ms = field_at<std::uint32_t>(frame, 112),
                      .voltage_v = field_at<std::uint16_t>(frame, 120) / 1000.0,
@@ -213,8 +278,8 @@ NlinkFrame decode_tag(Bytes frame) {
 
 NlinkNode decode_node(Bytes frame, const Layout& layout, std::size_t at) {
   NlinkNode node;
-  node.role = frame[at];
-  node.module = static_cast<std::uint32_t>(unsigned_at(frame, at + 1, layout.id_size));
+  if (layout.has_node_roles) node.role = frame[at];
+  node.module = static_cast<std::uint32_t>(unsigned_at(frame, at + layout.node_id, layout.id_size));
   if (layout.node_range != 0) node.range_m = int24_at(frame, at + layout.node_range) / 1000.0;
   if (layout.node_powers != 0) {
     node.first_path_dbm = frame[at + layout.node_powers] / -2.0;
@@ -243,22 +308,26 @@ std::uint32_t power_code(double dbm) {
 }  // namespace
 
 std::string_view name_of(NlinkKind kind) {
+  if (kind == NlinkKind::kAnchorFrame0) return "AnchorFrame0";
   const Layout* layout = layout_of(kind);
   return layout == nullptr ? "TagFrame0" : layout->name;
 }
 
 bool has_ranges(NlinkKind kind) {
+  if (kind == NlinkKind::kAnchorFrame0) return false;
   const Layout* layout = layout_of(kind);
   return layout == nullptr || layout->node_range != 0;
 }
 
 FrameCheck examine_nlink(Bytes bytes) {
-  if (bytes[0] != kNlinkHeader && bytes[0] != 0xff) return {};
+  if (bytes[0] != kNlinkHeader && bytes[0] != kIotHeader && bytes[0] != 0xff) return {};
   if (bytes.size() < 2) return {FrameKind::kIncomplete};
   if (bytes[0] == 0xff) return {bytes[1] == 0x02 ? FrameKind::kForeign : FrameKind::kNone};
-  const NlinkKind kind{bytes[1]};
+  const std::optional<NlinkKind> kind = kind_of(bytes);
+  if (!kind) return {};
   if (kind == NlinkKind::kTagFrame0) return examine_tag(bytes);
-  const Layout* layout = layout_of(kind);
+  if (kind == NlinkKind::kAnchorFrame0) return examine_anchor(bytes);
+  const Layout* layout = layout_of(*kind);
   if (layout == nullptr) return {};
 
   // The length field and the number of nodes must agree.
@@ -275,14 +344,18 @@ FrameCheck examine_nlink(Bytes bytes) {
 }
 
 NlinkFrame decode_nlink(Bytes frame) {
-  const NlinkKind kind{frame[1]};
+  const std::optional<NlinkKind> kind = kind_of(frame);
+  CREPES_EXPECT(kind.has_value(), "a whole frame");
   if (kind == NlinkKind::kTagFrame0) return decode_tag(frame);
-  const Layout* layout = layout_of(kind);
+  if (kind == NlinkKind::kAnchorFrame0) return {.kind = NlinkKind::kAnchorFrame0};
+  const Layout* layout = layout_of(*kind);
   CREPES_EXPECT(layout != nullptr, "a whole frame of a known kind");
-  NlinkFrame decoded{.kind = kind,
-                     .role = frame[4],
-                     .module = static_cast<std::uint32_t>(unsigned_at(frame, 5, layout->id_size))};
-  if (layout->voltage != 0) {
+  NlinkFrame decoded{
+      .kind = *kind,
+      .role = layout->role == 0 ? std::uint8_t{0} : frame[layout->role],
+      .module = static_cast<std::uint32_t>(unsigned_at(frame, layout->id, layout->id_size)),
+      .has_clock = layout->voltage != 0};
+  if (decoded.has_clock) {
     decoded.local_time_ms = field_at<std::uint32_t>(frame, layout->local_time);
     decoded.system_time_ms = field_at<std::uint32_t>(frame, layout->system_time);
     decoded.voltage_v = field_at<std::uint16_t>(frame, layout->voltage) / 1000.0;

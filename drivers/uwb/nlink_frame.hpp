@@ -13,16 +13,19 @@
 
 namespace crepes {
 
-/// The second byte of a frame.
+/// The second byte of a frame, but for the IoT modules' frame, which begins with another byte.
 enum class NlinkKind : std::uint8_t {
+  kAnchorFrame0 = 0x00,
   kTagFrame0 = 0x01,
   kNodeFrame0 = 0x02,
   kNodeFrame1 = 0x03,
   kNodeFrame2 = 0x04,
   kNodeFrame3 = 0x05,
+  kNodeFrame4 = 0x06,
   kAoaNodeFrame0 = 0x07,
   kNodeFrame5 = 0x08,
   kNodeFrame6 = 0x09,
+  kIotFrame0 = 0x6a,
 };
 
 /// The name in NAssistant.
@@ -40,7 +43,8 @@ struct NlinkNode {
       std::nullopt;                                ///< NodeFrame2: when the range was measured
   std::optional<double> angle_rad = std::nullopt;  ///< AoaNodeFrame0
   std::optional<Eigen::Vector3d> position_m = std::nullopt;  ///< NodeFrame1
-  std::vector<std::uint8_t> user_data = {};                  ///< NodeFrame0, NodeFrame6
+  std::vector<std::uint8_t> user_data = {};  ///< NodeFrame0, NodeFrame6, IotFrame0; NodeFrame4:
+                                             ///< the tag's anchors
 };
 
 /// A tag's own state, in the axes of its anchors.
@@ -58,6 +62,7 @@ struct NlinkFrame {
   NlinkKind kind = NlinkKind::kNodeFrame3;
   std::uint8_t role = 0;
   std::uint32_t module = 0;
+  bool has_clock = false;            ///< whether the times and the voltage are known
   std::uint32_t local_time_ms = 0;   ///< the module's own
   std::uint32_t system_time_ms = 0;  ///< the network's
   double voltage_v = 0.0;
@@ -70,7 +75,8 @@ inline constexpr std::size_t kLongestNlinkFrame = 119 + 255 * 13 + 1;  ///< Node
 /// Whether `bytes` begin with a frame of this protocol.
 [[nodiscard]] FrameCheck examine_nlink(Bytes bytes);
 
-/// Decodes a whole frame that `examine_nlink` found.
+/// Decodes a whole frame that `examine_nlink` found. Of AnchorFrame0, which has no checksum, only
+/// the kind is read.
 [[nodiscard]] NlinkFrame decode_nlink(Bytes frame);
 
 /// The frame that a module with role NODE sends; times are milliseconds of the module's clock.

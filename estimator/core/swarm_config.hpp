@@ -31,7 +31,8 @@ struct MemberConfig {
             "blink pattern, one character per slot: 1 lit, 0 dark; either this or duty");
     v.field("duty", duty, Bounds{0.05, 0.95},
             "lit share of swarm.period_ms; either this or pattern");
-    v.field("uwb_id", uwb_id, Bounds{0, 65535}, "id of the UWB module; if omitted: the robot id");
+    v.field("uwb_id", uwb_id, Bounds{0, 2147483647},
+            "id of the UWB module; if omitted: the robot id");
     v.field("p_body_led", p_body_led, Bounds{-5, 5},
             "center of the LED ring in the body frame [m]");
     v.field("p_body_uwb", p_body_uwb, Bounds{-5, 5}, "UWB antenna in the body frame [m]");

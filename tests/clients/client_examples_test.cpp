@@ -4,8 +4,10 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -92,8 +94,9 @@ TEST_F(Clients, InEachLanguageGetThePosesThatAreTrue) {
 
   {
     SCOPED_TRACE("Python");
-    expect_poses("/usr/bin/python3", {kClients + "/python/crepes_client.py", "--port", port_,
-                                      "--rate", "20", "--count", "10"});
+    expect_poses("/usr/bin/env",
+                 {"PYTHONPATH=" + kClients + "/python", "/usr/bin/python3", "-B", "-m",
+                  "crepes_client", "--port", port_, "--rate", "20", "--count", "10"});
   }
   {
     SCOPED_TRACE("C++");
@@ -118,42 +121,43 @@ TEST_F(Clients, InEachLanguageGetThePosesThatAreTrue) {
   }
 }
 
-TEST_F(Clients, InRosGetPosesWithCovarianceAndTransforms) {
+TEST_F(Clients, InRosGetPosesOdometryTransformsAndDiagnostics) {
   expect_true_poses(first_);
 
-  const auto lines =
-      lines_of("/usr/bin/env",
-               {"PYTHONPATH=" + source_dir() + "/tests/clients/fake_ros", "FAKE_ROS_COUNT=20",
-                "/usr/bin/python3", kClients + "/ros2/crepes_bridge.py", "--ros-args", "-p",
-                "port:=" + port_, "-p", "publish_tf:=true"},
-               20);
+  const auto lines = lines_of(
+      "/usr/bin/env",
+      {"PYTHONPATH=" + source_dir() + "/tests/clients/fake_ros:" + kClients +
+           "/python:" + kClients + "/ros2",
+       "FAKE_ROS_COUNT=100", "/usr/bin/python3", "-B", "-m", "crepes_bridge.bridge", "--ros-args",
+       "-p", "port:=" + port_, "-p", "publish_tf:=true", "-p", "diagnostics_period_s:=0.2"},
+      100);
 
-  int poses = 0;
-  int transforms = 0;
+  std::map<std::string, int> told;
   for (const std::string& line : lines) {
-    const Json told = Json::parse(line);
-    const Json& message = told["message"];
-    EXPECT_EQ(message["header"]["frame_id"], "robot_1/base_link");
+    const Json published = Json::parse(line);
+    const auto topic = published["topic"].get<std::string>();
+    const Json& message = published["message"];
+    ++told[topic];
     EXPECT_GT(message["header"]["stamp"]["sec"].get<std::int64_t>(), 1'600'000'000);
-    if (told["topic"] == "/tf") {
+    if (topic == "/diagnostics") continue;
+    EXPECT_EQ(message["header"]["frame_id"], "robot_1/base_link");
+    if (topic == "/tf") {
       EXPECT_EQ(message["child_frame_id"], "robot_2/base_link");
-      ++transforms;
-    } else {
-      EXPECT_EQ(told["topic"], "crepes/r2/pose");
-      const Json& covariance = message["pose"]["covariance"];
-      ASSERT_EQ(covariance.size(), 36U);
-      EXPECT_GT(covariance[0].get<double>(), 0.0);
-      EXPECT_GT(covariance[35].get<double>(), 0.0);
-      const double norm =
-          std::hypot(message["pose"]["pose"]["orientation"]["w"].get<double>(),
-                     message["pose"]["pose"]["orientation"]["x"].get<double>(),
-                     std::hypot(message["pose"]["pose"]["orientation"]["y"].get<double>(),
-                                message["pose"]["pose"]["orientation"]["z"].get<double>()));
-      EXPECT_NEAR(norm, 1.0, 1e-6);
-      ++poses;
+      continue;
     }
+    const Json& pose = message["pose"];
+    ASSERT_EQ(pose["covariance"].size(), 36U);
+    EXPECT_GT(pose["covariance"][0].get<double>(), 0.0);
+    EXPECT_GT(pose["covariance"][35].get<double>(), 0.0);
+    const Json& q = pose["pose"]["orientation"];
+    const Eigen::Vector4d wxyz(q["w"].get<double>(), q["x"].get<double>(), q["y"].get<double>(),
+                               q["z"].get<double>());
+    EXPECT_NEAR(wxyz.norm(), 1.0, 1e-6);
   }
-  EXPECT_EQ(poses, transforms);
+  EXPECT_EQ(told["crepes/r2/pose"], told["crepes/r2/odometry"]);
+  EXPECT_EQ(told["crepes/r2/pose"], told["/tf"]);
+  EXPECT_GT(told["crepes/r2/pose"], 20);
+  EXPECT_GT(told["/diagnostics"], 0);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 * sh: a command whose files are in the repository runs. A command that needs a robot, a recording or
   root is compared with the program's help, or is one of `NOT_RUN`.
 * python: runs beside a live simulated pair for longer than a lease; poses must still arrive at the end.
+  `pip install` is not run (crepes_client_test.py does): the package is imported where it is.
 * yaml: must pass `crepesd --check-config` as a fragment of a configuration.
 * json: each line must be an object.
 * text: a table of a program's output; its head must be what the program prints.
@@ -73,6 +74,8 @@ class Shell:
         if words[0] in NOT_RUN:
             done = run(["bash", "-n", words[0]], self.place)
             return done.stderr if done.returncode or not os.access(self.place / words[0], os.X_OK) else None
+        if words[:2] == ["pip", "install"]:
+            return None if (self.place / words[2] / "pyproject.toml").exists() else f"{words[2]}: no Python package"
         if words[0] not in ("crepesctl", "crepesd"):
             return f"{words[0]}: the test does not know this program"
         if self.can_run(words):
@@ -187,13 +190,15 @@ def fault_of_python(lines, place):
 
     def listen(output):
         for line in output:
-            if not re.match(r"\d+ (direct|graph|predicted) \{", line):
+            if not re.match(r"\d+ (direct|graph|predicted) Vector\(", line):
                 continue
             arrivals.append(time.monotonic())
 
     with live_pair(place, port) as swarm:
         await_daemon(port)
-        with started([sys.executable, "-c", program.replace("47475", str(port))], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as client:
+        words = [sys.executable, "-B", "-c", program.replace("47475", str(port))]
+        library = {**os.environ, "PYTHONPATH": str(SOURCE / "config/examples/clients/python")}
+        with started(words, env=library, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as client:
             thread = threading.Thread(target=listen, args=(client.stdout,), daemon=True)
             thread.start()
             end = time.monotonic() + PATIENCE_S

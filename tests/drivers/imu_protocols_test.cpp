@@ -6,6 +6,8 @@
 
 #include "drivers/imu/hipnuc.hpp"
 #include "drivers/imu/mavlink.hpp"
+#include "drivers/imu/microstrain.hpp"
+#include "drivers/imu/vectornav.hpp"
 #include "drivers/imu/xsens.hpp"
 #include "estimator/core/constants.hpp"
 #include "tests/support/frame_damage.hpp"
@@ -190,6 +192,130 @@ TEST(Mavlink, RefusesRawImuWithAReason) {
 
   EXPECT_EQ(parser.counts().unscaled, 1U);
   EXPECT_NE(parser.no_measurement_reason().find("RAW_IMU only"), std::string::npos);
+}
+
+/// A message of version 2 from system 1, with its checksum.
+std::vector<std::uint8_t> mavlink_message(std::uint32_t id, std::uint8_t crc_extra,
+                                          const std::string& payload) {
+  const auto content = bytes_of(payload);
+  std::vector<std::uint8_t> message{0xfd,
+                                    static_cast<std::uint8_t>(content.size()),
+                                    0,
+                                    0,
+                                    7,
+                                    1,
+                                    1,
+                                    static_cast<std::uint8_t>(id & 0xffU),
+                                    static_cast<std::uint8_t>(id >> 8U & 0xffU),
+                                    0};
+  message = message + content;
+  std::uint32_t crc = 0xffffU;
+  auto covered = message;
+  covered.push_back(crc_extra);
+  for (std::size_t i = 1; i < covered.size(); ++i) {
+    crc ^= covered[i];
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 1U) != 0 ? crc >> 1U ^ 0x8408U : crc >> 1U;
+  }
+  message.push_back(static_cast<std::uint8_t>(crc & 0xffU));
+  message.push_back(static_cast<std::uint8_t>(crc >> 8U));
+  return message;
+}
+
+/// 1 s; 100, -200, -1000 mG; 50, -25, 10 mrad/s.
+const char* const kRawImuPayload =
+    "40 42 0f 00 00 00 00 00 64 00 38 ff 18 fc 32 00 e7 ff 0a 00 00 00 00 00 00 00 00";
+const char* const kArduPilotHeartbeat = "00 00 00 00 02 03 51 04 03";
+const char* const kPx4Heartbeat = "00 00 00 00 02 0c 51 04 03";
+
+TEST(Mavlink, ReadsRawImuOfArduPilotOnly) {
+  const auto raw = mavlink_message(27, 144, kRawImuPayload);
+  MavlinkParser px4;
+  EXPECT_EQ(samples_in(px4, mavlink_message(0, 50, kPx4Heartbeat) + raw), 0U);
+  EXPECT_EQ(px4.counts().unscaled, 1U);
+
+  MavlinkParser ardupilot;
+  EXPECT_EQ(samples_in(ardupilot, mavlink_message(0, 50, kArduPilotHeartbeat) + raw), 1U);
+
+  expect_sample(Mavlink::read(raw, true), {0.05, 0.025, -0.01},
+                Eigen::Vector3d(0.1, 0.2, 1.0) * kGravityMps2);
+}
+
+TEST(Mavlink, LeavesRawImuOfFurtherSensorsWithoutAUnit) {
+  std::string second = kRawImuPayload;
+  second.replace(second.size() - 2, 2, "01");
+
+  EXPECT_EQ(Mavlink::read(mavlink_message(27, 144, second), true).verdict, ImuVerdict::kUnscaled);
+}
+
+TEST(Mavlink, ReadsScaledImu3) {
+  const auto message =
+      mavlink_message(129, 46, "e8 03 00 00 64 00 38 ff 18 fc 32 00 e7 ff 0a 00 00 00 00 00 00 00");
+  ASSERT_EQ(Mavlink::examine(message).kind, FrameKind::kComplete);
+
+  expect_sample(Mavlink::read(message), {0.05, 0.025, -0.01},
+                Eigen::Vector3d(0.1, 0.2, 1.0) * kGravityMps2);
+  expect_refuses_damage<MavlinkParser>(message);
+}
+
+TEST(Mavlink, PassesOverUnknownMessagesWithoutCallingThemSkippedBytes) {
+  const auto known = recorded_file("imu/mavlink_highres_imu_v2").bytes;
+  // GPS_RAW_INT, whose checksum is not known here.
+  const auto unknown = mavlink_message(24, 24, "01 02 fd 04 05 fe 07 08 09 0a 0b 0c 0d 0e 0f 10");
+  for (std::size_t chunk = 1; chunk < 60; ++chunk) {
+    FrameDecoder<MavlinkParser> decoder;
+    EXPECT_EQ(decode(decoder, known + unknown + unknown + known, chunk), (Frames{known, known}));
+    EXPECT_EQ(decoder.counts().skipped_bytes, 0U);
+    EXPECT_EQ(decoder.counts().unchecked, 2U);
+  }
+
+  FrameDecoder<MavlinkParser> torn;
+  const std::vector<std::uint8_t> half(unknown.begin(), unknown.begin() + 14);
+  EXPECT_EQ(decode(torn, half + known + known + known + known).size(), 4U);
+  EXPECT_EQ(torn.counts().skipped_bytes, half.size());
+}
+
+TEST(VectorNav, ReadsPublishedLinesAndBinaryMessagesOfGroup1) {
+  for (const char* name : {"imu/vectornav_vnimu_published", "imu/vectornav_binary_built"}) {
+    const RecordedFrame file = recorded_file(name);
+    ASSERT_EQ(VectorNav::examine(file.bytes).length, file.bytes.size()) << name;
+    expect_sample(VectorNav::read(file.bytes), vector_of(file.decoded["gyro_rads"]),
+                  vector_of(file.decoded["acc_ms2"]));
+    expect_refuses_damage<VectorNavParser>(file.bytes);
+  }
+  expect_time(VectorNav::read(recorded_file("imu/vectornav_binary_built").bytes), 123456789012,
+              1ns);
+}
+
+TEST(VectorNav, TakesCompensatedFieldsWhereImuIsNotThere) {
+  const auto message = bytes_of(
+      "fa 01 20 01 00 00 00 3e 00 00 00 bf 00 00 80 3d 00 00 00 3f 00 00 80 be 00 00 1d c1 eb 31");
+  ASSERT_EQ(VectorNav::examine(message).kind, FrameKind::kComplete);
+
+  expect_sample(VectorNav::read(message), {0.125, -0.5, 0.0625}, {0.5, -0.25, -9.8125});
+}
+
+TEST(VectorNav, PassesByMessagesWithoutSamples) {
+  const auto angles = recorded_file("imu/vectornav_ypr_published").bytes;
+  ASSERT_EQ(VectorNav::examine(angles).length, angles.size());
+  EXPECT_EQ(VectorNav::read(angles).verdict, ImuVerdict::kOther);
+}
+
+TEST(MicroStrain, ReadsAccelerationAndRateOfOnePacket) {
+  const RecordedFrame file = recorded_file("imu/microstrain_imu_built");
+  ASSERT_EQ(MicroStrain::examine(file.bytes).length, file.bytes.size());
+
+  expect_sample(MicroStrain::read(file.bytes), vector_of(file.decoded["gyro_rads"]),
+                vector_of(file.decoded["acc_g"]) * kGravityMps2);
+  expect_time(MicroStrain::read(file.bytes), 123456789012, 1ns);
+  expect_refuses_damage<MicroStrainParser>(file.bytes);
+}
+
+TEST(MicroStrain, FindsThePublishedPacketAndCallsItHalfASample) {
+  const auto published = recorded_file("imu/microstrain_accel_published").bytes;
+  ASSERT_EQ(MicroStrain::examine(published).length, published.size());
+
+  EXPECT_EQ(MicroStrain::read(published).verdict, ImuVerdict::kPartial);
+  expect_refuses_damage<MicroStrainParser>(published);
 }
 
 TEST(Mavlink, TakesTheBestMessageOnlyAndAnotherWhenThatIsGone) {

@@ -139,6 +139,31 @@ TEST(Nlink, ReadsRangesOfEveryKindThatHasThem) {
   EXPECT_EQ(ranges_of("nlink/tagframe0_01")[1].received_dbm, 0.0);
 }
 
+TEST(Nlink, SaysThatARangeOfAMemberIsRefusedAndWhy) {
+  NlinkParser parser({{2, RobotId{17}}}, 6.0);
+  const auto reason_for = [&](double range_m) {
+    ranges_in(parser,
+              encode_node_frame3(1, 0, {{5, 1.0, -80.0, -78.0}, {2, range_m, -80.0, -78.0}}));
+    return parser.no_measurement_reason();
+  };
+
+  EXPECT_EQ(
+      reason_for(-0.5),
+      "the range to robot 17 is refused: -0.5 m is not above 0 and up to uwb.max_range_m, 6 m");
+  EXPECT_NE(reason_for(0.0).find("refused: 0 m"), std::string::npos);
+  EXPECT_NE(reason_for(7.25).find("refused: 7.25 m"), std::string::npos);
+}
+
+TEST(Nlink, NamesAnchorFramesThatHaveNoRangesOfThisRobot) {
+  NlinkParser parser(identity_modules(), 200.0);
+  for (const auto& [file, name] : {std::pair{"nlink/anchorframe0_01", "sends AnchorFrame0,"},
+                                   std::pair{"nlink/nodeframe4_01", "sends NodeFrame4,"}}) {
+    EXPECT_EQ(ranges_in(parser, recorded_file(file).bytes).size(), 0U);
+    EXPECT_NE(parser.no_measurement_reason().find(name), std::string::npos)
+        << parser.no_measurement_reason();
+  }
+}
+
 TEST(Nlink, SaysWhyThereAreNoRanges) {
   NlinkParser parser({{9, RobotId{9}}}, 200.0);
   ranges_in(parser, recorded_file("nlink/nodeframe1_01").bytes);
@@ -147,7 +172,8 @@ TEST(Nlink, SaysWhyThereAreNoRanges) {
   EXPECT_EQ(parser.counts().without_ranges, 1U);
 
   ranges_in(parser, recorded_file("nlink/nodeframe3_02").bytes);
-  EXPECT_NE(parser.no_measurement_reason().find("such as 0; see swarm.members"), std::string::npos);
+  EXPECT_NE(parser.no_measurement_reason().find("such as 0 (0x0); see swarm.members"),
+            std::string::npos);
 
   ranges_in(parser, encode_node_frame3(9, 0, {}));
   EXPECT_NE(parser.no_measurement_reason().find("are the others on"), std::string::npos);

@@ -10,10 +10,16 @@
 #include "drivers/device_clock.hpp"
 #include "drivers/imu/hipnuc.hpp"
 #include "drivers/imu/mavlink.hpp"
+#include "drivers/imu/microstrain.hpp"
+#include "drivers/imu/vectornav.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/imu/xsens.hpp"
 #include "drivers/serial/byte_fields.hpp"
+#include "drivers/uwb/dwm1001.hpp"
+#include "drivers/uwb/fira_uci.hpp"
+#include "drivers/uwb/mauwb.hpp"
 #include "drivers/uwb/nlink.hpp"
+#include "drivers/uwb/range_line.hpp"
 #include "estimator/core/contract.hpp"
 #include "firmware/protocol/led_messages.h"
 #include "net/mesh/crc32.hpp"
@@ -70,10 +76,16 @@ std::vector<FuzzInput> recorded(const std::string& folder, const std::string& pa
   return seeds;
 }
 
-void run_nlink(Bytes data) {
+template <class Parser>
+void run_uwb(Bytes data) {
   UwbModules modules;
   for (std::uint16_t id = 0; id < 8; ++id) modules.emplace(id, RobotId{id});
-  run_stream(data, NlinkParser(modules, 200.0));
+  run_stream(data, Parser(modules, 200.0));
+}
+
+std::vector<FuzzInput> text_seed(std::string_view line) {
+  const std::vector<std::uint8_t> bytes(line.begin(), line.end());
+  return {piece_by_piece(bytes + bytes)};
 }
 
 void run_detect_protocol(Bytes data) {
@@ -231,7 +243,33 @@ std::vector<FuzzInput> led_seeds() {
 }
 
 constexpr std::array kTargets{
-    FuzzTarget{"nlink", &run_nlink, [] { return recorded("nlink", ""); }},
+    FuzzTarget{"nlink", &run_uwb<NlinkParser>, [] { return recorded("nlink", ""); }},
+    FuzzTarget{"range_line", &run_uwb<RangeLineParser>,
+               [] { return text_seed("range 3 4.27 -91.5 -80\n"); }},
+    FuzzTarget{"dwm1001", &run_uwb<Dwm1001ShellParser>,
+               [] {
+                 return text_seed(
+                     "DIST,1,AN0,0005,1.7,4.5,2.3,1.61,POS,1,2,3,4\r\n"
+                     "0005[1.75,4.55,2.33]=1.61 le_us=3082 est[1,2,3,4]\r\n");
+               }},
+    FuzzTarget{"dwm1001_tlv", &run_uwb<Dwm1001TlvParser>,
+               [] {
+                 return std::vector<FuzzInput>{piece_by_piece(bytes_of(
+                     "40 01 00 41 0d 4b 0a 00 00 1f 0e 00 00 9c 0f 00 00 40 48 0e 01 05 00 "
+                     "34 12 00 00 ca de 39 05 00 00 64"))};
+               }},
+    FuzzTarget{
+        "mauwb", &run_uwb<MaUwbParser>,
+        [] { return text_seed("AT+RANGE=tid:7,mask:0F,seq:1,range:(997,0),ancid:(0,1)\n"); }},
+    FuzzTarget{
+        "fira_uci", &run_uwb<FiraUciParser>,
+        [] {
+          FuzzInput frame = bytes_of(
+              "62 00 00 38 10 00 00 00 11 00 00 00 00 c8 00 00 00 01 00 00 00 00 00 00 00 00 "
+              "00 00 01 01 00 00 00 99 00");
+          frame.resize(60);
+          return std::vector<FuzzInput>{piece_by_piece(frame)};
+        }},
     FuzzTarget{"witmotion", [](Bytes data) { run_stream(data, WitMotionParser()); },
                [] { return recorded("imu", "witmotion"); }},
     FuzzTarget{"hipnuc", [](Bytes data) { run_stream(data, HipnucParser()); },
@@ -240,6 +278,10 @@ constexpr std::array kTargets{
                [] { return recorded("imu", "xsens"); }},
     FuzzTarget{"mavlink", [](Bytes data) { run_stream(data, MavlinkParser()); },
                [] { return recorded("imu", "mavlink"); }},
+    FuzzTarget{"vectornav", [](Bytes data) { run_stream(data, VectorNavParser()); },
+               [] { return recorded("imu", "vectornav"); }},
+    FuzzTarget{"microstrain", [](Bytes data) { run_stream(data, MicroStrainParser()); },
+               [] { return recorded("imu", "microstrain"); }},
     FuzzTarget{"detect_protocol", &run_detect_protocol, &detect_protocol_seeds},
     FuzzTarget{"device_clock", &run_device_clock, &device_clock_seeds},
     FuzzTarget{"peer_message", &run_peer_message, &peer_message_seeds},

@@ -78,7 +78,7 @@ std::string text_of(const CameraDevice& camera) {
 std::string text_of(const SerialDevice& device) {
   if (!device.fault.empty()) return fmt::format("{}\n    {}\n", device.port, device.fault);
   if (!device.speaks) return device.port + "\n    says nothing that is known\n";
-  const std::string section = *device.speaks == SerialProtocol::kNlink ? "uwb" : "imu";
+  const std::string section = is_of_uwb(*device.speaks) ? "uwb" : "imu";
   return fmt::format("{0}\n    speaks {1}\n    {2}: port: \"{0}\", baud: {3}\n", device.port,
                      name_of(*device.speaks), section, device.baud);
 }

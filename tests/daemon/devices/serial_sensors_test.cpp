@@ -76,6 +76,31 @@ TEST_F(SerialSensors, RecognizeWhichInertialSensorTalks) {
   }
 }
 
+TEST_F(SerialSensors, RecognizeWhichRangingModuleTalks) {
+  const std::string line = "range 1 4.27\n";
+  const auto device = open_uwb();
+
+  send_for(*device, {line.begin(), line.end()}, 1600ms);
+
+  EXPECT_EQ(device->diagnosis(), std::nullopt);
+  const Totals counts = device->counters().counts;
+  EXPECT_EQ(counts.front().first, "ranges");
+  EXPECT_GE(counts.front().second, 10U);
+}
+
+TEST_F(SerialSensors, AskADwm1001ForDistancesWhileItIsSilent) {
+  config_.uwb.device.protocol = UwbProtocol::kDwm1001Shell;
+  const auto device = open_uwb();
+  for (int i = 0; i < 3; ++i) {
+    clock_.set(clock_.now() + 1s);
+    ASSERT_TRUE(device->read_once(1ms));
+  }
+
+  const auto asked = line_->read(1s);
+
+  EXPECT_EQ(std::string(asked.begin(), asked.end()), "\r\rlec\r\r\r");
+}
+
 TEST_F(SerialSensors, ReadTheConfiguredProtocolFromTheFirstFrameOn) {
   config_.imu.device.protocol = ImuProtocol::kXsens;
   const auto device = open_imu();

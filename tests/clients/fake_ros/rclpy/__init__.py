@@ -3,14 +3,22 @@ lines of JSON, and an end after FAKE_ROS_COUNT of them."""
 import json
 import os
 import sys
+import time
+
+from rclpy.executors import ExternalShutdownException
+from rclpy.qos import QoSProfile
 
 _left = int(os.environ.get("FAKE_ROS_COUNT", "10"))
+
+
+def plain(value):
+    return value.hex() if isinstance(value, bytes) else vars(value)
 
 
 def tell(topic, message):
     global _left
     _left -= 1
-    print(json.dumps({"topic": topic, "message": message}, default=vars), flush=True)
+    print(json.dumps({"topic": topic, "message": message}, default=plain), flush=True)
 
 
 def init():
@@ -19,6 +27,11 @@ def init():
 
 def ok():
     return _left > 0
+
+
+def spin(node):
+    node.was_spun = True
+    raise ExternalShutdownException
 
 
 def try_shutdown():
@@ -39,23 +52,39 @@ class Publisher:
         tell(self.topic, message)
 
 
+class Time:
+    def __init__(self, nanoseconds):
+        self.nanoseconds = nanoseconds
+
+
+class Clock:
+    def now(self):
+        return Time(time.time_ns())
+
+
 class Node:
-    def declare_parameter(self, name, default):
+    def declare_parameter(self, name, value=None, descriptor=None, ignore_override=False):
+        assert descriptor.description
         for word in sys.argv:
             if word.startswith(name + ":="):
                 text = word.split(":=", 1)[1]
-                return Parameter(text == "true" if isinstance(default, bool) else type(default)(text))
-        return Parameter(default)
+                return Parameter(text == "true" if isinstance(value, bool) else type(value)(text))
+        return Parameter(value)
 
-    def create_publisher(self, kind, topic, depth):
-        assert depth > 0
-        return Publisher(kind, topic)
+    def create_publisher(self, msg_type, topic, qos_profile):
+        assert isinstance(qos_profile, (int, QoSProfile))
+        return Publisher(msg_type, topic)
+
+    def get_clock(self):
+        return Clock()
 
     def get_logger(self):
         return self
 
     def warning(self, text):
         print(text, file=sys.stderr)
+
+    info = warning
 
 
 def create_node(_name):

@@ -1,4 +1,5 @@
 import rclpy
+from geometry_msgs.msg import TransformStamped
 
 
 class TransformBroadcaster:
@@ -6,4 +7,5 @@ class TransformBroadcaster:
         assert isinstance(node, rclpy.Node)
 
     def sendTransform(self, transform):
+        assert isinstance(transform, TransformStamped)
         rclpy.tell("/tf", transform)

@@ -1,0 +1,1 @@
+"""Poses and status of a crepesd as ROS 2 topics."""

@@ -1,0 +1,3 @@
+class LaunchConfiguration:
+    def __init__(self, variable_name):
+        self.variable_name = variable_name

@@ -1,0 +1,3 @@
+from interfaces import export
+
+export("nav_msgs", globals())
