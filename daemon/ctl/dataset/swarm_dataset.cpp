@@ -211,33 +211,27 @@ Result<Config> read_config(const fs::path& file, const SwarmRobot& robot) {
   return config;
 }
 
-Context context_of(const SwarmRobot& robot, const Config& config, double duration_s,
-                   DatasetFaults& faults) {
-  constexpr double kMargin = 2.0;  // s; sensors start a little before and stop a little after
-  Context context{robot.clock.local(-kMargin), robot.clock.local(duration_s + kMargin), {}, faults};
+std::vector<RobotId> neighbors_of(const Config& config) {
+  std::vector<RobotId> neighbors;
   for (const MemberConfig& member : config.swarm.members)
-    if (member.id != robot.id) context.neighbors.push_back(member.id);
-  return context;
+    if (member.id != config.robot.id) neighbors.push_back(member.id);
+  return neighbors;
 }
 
-Result<RobotRecording> load_robot(const fs::path& root, const SwarmRobot& robot, double duration_s,
-                                  DatasetFaults& faults) {
-  const fs::path dir = root / robot.dir;
-  RobotRecording recording;
-  recording.robot = robot;
-  recording.config_file = dir / "crepesd.yaml";
-  Result<Config> config = read_config(recording.config_file, robot);
-  if (!config) return tl::unexpected(config.error());
-  recording.config = std::move(*config);
-  const Context context = context_of(robot, recording.config, duration_s, faults);
-
-  auto imu = read_imu(dir / "imu0" / "data.csv", context);
-  if (!imu) return tl::unexpected(imu.error());
-  recording.imu = std::move(*imu);
-  auto ranges = read_ranges(dir / "uwb0" / "data.csv", context);
-  if (!ranges) return tl::unexpected(ranges.error());
-  recording.ranges = std::move(*ranges);
-
+/// Reads the robot's files into `recording`, whose configuration has been read.
+Result<void> read_sensors(const fs::path& dir, const RecordedSensors& sensors,
+                          const Context& context, RobotRecording& recording) {
+  if (sensors.imu) {
+    auto imu = read_imu(dir / "imu0" / "data.csv", context);
+    if (!imu) return tl::unexpected(imu.error());
+    recording.imu = std::move(*imu);
+  }
+  if (sensors.ranges) {
+    auto ranges = read_ranges(dir / "uwb0" / "data.csv", context);
+    if (!ranges) return tl::unexpected(ranges.error());
+    recording.ranges = std::move(*ranges);
+  }
+  if (!sensors.cameras) return {};
   const std::size_t cameras = recording.config.cameras.size();
   for (std::size_t k = 0; k < cameras; ++k) {
     auto camera =
@@ -248,9 +242,26 @@ Result<RobotRecording> load_robot(const fs::path& root, const SwarmRobot& robot,
   const fs::path surplus = dir / (fmt::format("cam{}", cameras));
   std::error_code status;
   if (fs::exists(surplus, status)) {
-    faults.add(surplus, 0, "camera without calibration",
-               "not in " + recording.config_file.string());
+    context.faults.add(surplus, 0, "camera without calibration",
+                       "not in " + recording.config_file.string());
   }
+  return {};
+}
+
+Result<RobotRecording> load_swarm_robot(const fs::path& root, const SwarmRobot& robot,
+                                        double duration_s, DatasetFaults& faults) {
+  constexpr double kMargin = 2.0;  // s; sensors start a little before and stop a little after
+  const fs::path dir = root / robot.dir;
+  RobotRecording recording;
+  recording.robot = robot;
+  recording.config_file = dir / "crepesd.yaml";
+  Result<Config> config = read_config(recording.config_file, robot);
+  if (!config) return tl::unexpected(config.error());
+  recording.config = std::move(*config);
+  const Context context{robot.clock.local(-kMargin), robot.clock.local(duration_s + kMargin),
+                        neighbors_of(recording.config), faults};
+  if (auto read = read_sensors(dir, {}, context, recording); !read)
+    return tl::unexpected(read.error());
   return recording;
 }
 
@@ -262,11 +273,35 @@ Result<SwarmDataset> load_swarm(const fs::path& dir) {
   SwarmDataset swarm;
   swarm.manifest = std::move(*manifest);
   for (const SwarmRobot& robot : swarm.manifest.robots) {
-    auto recording = load_robot(dir, robot, swarm.manifest.duration_s, swarm.faults);
+    auto recording = load_swarm_robot(dir, robot, swarm.manifest.duration_s, swarm.faults);
     if (!recording) return tl::unexpected(recording.error());
     swarm.robots.push_back(std::move(*recording));
   }
   return swarm;
+}
+
+Result<RobotRecording> load_robot(const fs::path& dir, const RecordedSensors& sensors,
+                                  DatasetFaults& faults) {
+  std::error_code status;
+  if (!fs::exists(dir / "crepesd.yaml", status) && fs::exists(dir / "swarm.yaml", status)) {
+    const Result<SwarmManifest> manifest = load_manifest(dir);
+    if (!manifest) return tl::unexpected(manifest.error());
+    if (manifest->robots.size() != 1) {
+      return fail(ErrorCode::kUsage,
+                  dir.string() + ": holds several robots; name the folder of one");
+    }
+    return load_robot(dir / manifest->robots.front().dir, sensors, faults);
+  }
+  RobotRecording recording;
+  recording.config_file = dir / "crepesd.yaml";
+  Result<Config> config = load_config(recording.config_file);
+  if (!config) return tl::unexpected(config.error());
+  recording.config = std::move(*config);
+  recording.robot.id = recording.config.robot.id;
+  const Context context{Timestamp::min(), Timestamp::max(), neighbors_of(recording.config), faults};
+  if (auto read = read_sensors(dir, sensors, context, recording); !read)
+    return tl::unexpected(read.error());
+  return recording;
 }
 
 }  // namespace crepes

@@ -44,4 +44,17 @@ struct SwarmDataset {
 /// is refused that leaves the others in order.
 [[nodiscard]] Result<SwarmDataset> load_swarm(const std::filesystem::path& dir);
 
+/// Which files of a robot are read.
+struct RecordedSensors {
+  bool imu = true;
+  bool ranges = true;
+  bool cameras = true;
+};
+
+/// Reads one robot's folder without its swarm: crepesd.yaml and the files of `sensors`. `dir` may
+/// also be a data set of one robot. Refused rows go to `faults`.
+[[nodiscard]] Result<RobotRecording> load_robot(const std::filesystem::path& dir,
+                                                const RecordedSensors& sensors,
+                                                DatasetFaults& faults);
+
 }  // namespace crepes

@@ -1,0 +1,24 @@
+/// crepesctl calibrate camera: lens, mounting and time shift, with no target but other boards.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "daemon/ctl/calibrate/calibration_report.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+struct CalibrateCameraOptions {
+  std::filesystem::path robot_dir;
+  std::filesystem::path out;
+  std::optional<double> fov_deg;  ///< if given, crepesd.yaml's lens is not used as a guess
+  bool json = false;
+  std::function<void(double)> on_progress;  ///< 0..1; optional
+};
+
+/// Writes FILE, a camchain-imucam.yaml of Kalibr.
+[[nodiscard]] Result<CalibrationReport> calibrate_camera(const CalibrateCameraOptions& options);
+
+}  // namespace crepes

@@ -1,0 +1,20 @@
+/// crepesctl calibrate range: antenna delays from robots at rest at taped distances.
+#pragma once
+
+#include <filesystem>
+
+#include "daemon/ctl/calibrate/calibration_report.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+struct CalibrateRangeOptions {
+  std::filesystem::path swarm_dir;
+  std::filesystem::path tape;
+  std::filesystem::path out;
+  bool json = false;
+};
+
+[[nodiscard]] Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options);
+
+}  // namespace crepes

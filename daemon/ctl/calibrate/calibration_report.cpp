@@ -1,0 +1,23 @@
+#include "daemon/ctl/calibrate/calibration_report.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace crepes {
+
+nlohmann::ordered_json report_head(const std::vector<std::string>& reasons,
+                                   const std::vector<std::string>& warnings) {
+  return {{"ok", reasons.empty()}, {"reasons", reasons}, {"warnings", warnings}};
+}
+
+std::string warning_lines(const std::vector<std::string>& warnings) {
+  std::string text;
+  for (const std::string& warning : warnings) text += "warning: " + warning + "\n";
+  return text;
+}
+
+std::filesystem::path beside(const std::filesystem::path& file, const std::string& suffix) {
+  std::filesystem::path other = file;
+  return other.replace_extension(suffix);
+}
+
+}  // namespace crepes

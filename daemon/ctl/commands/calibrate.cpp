@@ -1,0 +1,88 @@
+#include <cstdio>
+
+#include "daemon/ctl/calibrate/calibrate_camera.hpp"
+#include "daemon/ctl/calibrate/calibrate_imu.hpp"
+#include "daemon/ctl/calibrate/calibrate_range.hpp"
+#include "daemon/ctl/commands/command_line.hpp"
+#include "daemon/ctl/commands/commands.hpp"
+
+namespace crepes {
+namespace {
+
+/// Prints the report. Refused rows and the reasons of a refusal go to standard error, one a line.
+Result<void> finish(const Result<CalibrationReport>& report) {
+  if (!report) return tl::unexpected(report.error());
+  for (const std::string& fault : report->faults.list())
+    std::fprintf(stderr, "refused: %s\n", fault.c_str());
+  if (auto printed = print_result(report->text); !printed) return printed;
+  if (report->reasons.empty()) return {};
+  std::string message;
+  for (const std::string& reason : report->reasons)
+    message += (message.empty() ? "" : "\n") + reason;
+  return fail(ErrorCode::kFormat, message);
+}
+
+void add_imu(CommandLine& line, CLI::App* calibrate) {
+  auto& options = line.make<CalibrateImuOptions>();
+  CLI::App* sub = calibrate->add_subcommand(
+      "imu",
+      "Accelerometer and gyroscope: bias, scale and axes, from 30 to 50 attitudes at rest; or "
+      "their noise, from an hour at rest");
+  sub->add_option("ROBOT_DIR", options.robot_dir, "the robot's folder of a recording")->required();
+  sub->add_option("--out", options.out,
+                  "fragment of crepesd.yaml; Kalibr's imu.yaml is written beside it as "
+                  "NAME.kalibr.yaml")
+      ->required();
+  sub->add_flag("--rest", options.rest,
+                "the robot lay still for an hour: noise densities and random walks");
+  sub->add_option("--gravity", options.gravity_mps2, "gravity at this place [m/s^2]")
+      ->capture_default_str()
+      ->check(CLI::Range(9.7, 9.9));
+  add_json_flag(sub, options.json);
+  line.run(sub, [&options] { return finish(calibrate_imu(options)); });
+}
+
+void add_range(CommandLine& line, CLI::App* calibrate) {
+  auto& options = line.make<CalibrateRangeOptions>();
+  CLI::App* sub = calibrate->add_subcommand(
+      "range", "Antenna delays of pairs and modules, from robots at rest at taped distances");
+  sub->add_option("SWARM_DIR", options.swarm_dir, "the recording of all robots")->required();
+  sub->add_option("--tape", options.tape,
+                  "segments: [{from_s, to_s, pairs: [{ids: [1, 2], distance_m: 5.00}]}]; seconds "
+                  "after the first row, distances from antenna to antenna")
+      ->required();
+  sub->add_option("--out", options.out, "biases of pairs and modules, YAML")->required();
+  add_json_flag(sub, options.json);
+  line.run(sub, [&options] { return finish(calibrate_range(options)); });
+}
+
+void add_camera(CommandLine& line, CLI::App* calibrate) {
+  auto& options = line.make<CalibrateCameraOptions>();
+  CLI::App* sub = calibrate->add_subcommand(
+      "camera",
+      "Lens, mounting and time shift of the first camera: one to four LED boards at rest, 2 to 5 m "
+      "away, and the robot turned by hand for a minute");
+  sub->add_option("ROBOT_DIR", options.robot_dir, "the robot's folder of a recording")->required();
+  sub->add_option("--out", options.out, "camchain-imucam.yaml of Kalibr")->required();
+  sub->add_option("--fov", options.fov_deg,
+                  "the lens's rough field of view [deg]; default: start from the lens in "
+                  "crepesd.yaml")
+      ->check(CLI::Range(60.0, 220.0));
+  add_json_flag(sub, options.json);
+  line.run(sub, [&options] {
+    options.on_progress = progress_on_terminal();
+    return finish(calibrate_camera(options));
+  });
+}
+
+}  // namespace
+
+void add_calibrate(CommandLine& line) {
+  CLI::App* sub = line.add("calibrate", "Calibrate a robot's sensors from a recording");
+  sub->require_subcommand(1);
+  add_camera(line, sub);
+  add_imu(line, sub);
+  add_range(line, sub);
+}
+
+}  // namespace crepes

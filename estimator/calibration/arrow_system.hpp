@@ -1,0 +1,50 @@
+/// Normal equations of a chain of states with a border of constants.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+namespace crepes {
+
+/// H x = g.  A state shares measurements with the state after it and with the constants, so H is
+/// block tridiagonal with a dense border. One Cholesky sweep costs a constant time for each state.
+class ArrowSystem {
+ public:
+  static constexpr int kState = 15;
+  using StateMatrix = Eigen::Matrix<double, kState, kState>;
+  using StateVector = Eigen::Matrix<double, kState, 1>;
+
+  struct Step {
+    std::vector<StateVector> states;
+    Eigen::VectorXd constants;
+    Eigen::MatrixXd constants_covariance;  ///< the inverse of H's Schur complement
+  };
+
+  ArrowSystem(std::size_t states, int constants);
+
+  /// The blocks of H and g that a caller adds to.
+  StateMatrix& diagonal(std::size_t k) { return blocks_[k].D; }
+  StateMatrix& to_next(std::size_t k) { return blocks_[k].E; }  ///< rows k, columns k + 1
+  Eigen::MatrixXd& to_constants(std::size_t k) { return blocks_[k].F; }
+  StateVector& gradient(std::size_t k) { return blocks_[k].g; }
+  Eigen::MatrixXd& constants() { return H_; }
+  Eigen::VectorXd& constants_gradient() { return g_; }
+
+  /// Solves with the diagonal multiplied by 1 + `damping` (Marquardt 1963). Empty if H is not
+  /// positive definite.
+  [[nodiscard]] std::optional<Step> solve(double damping) const;
+
+ private:
+  struct Block {
+    StateMatrix D = StateMatrix::Zero();
+    StateMatrix E = StateMatrix::Zero();
+    Eigen::MatrixXd F;
+    StateVector g = StateVector::Zero();
+  };
+  std::vector<Block> blocks_;
+  Eigen::MatrixXd H_;
+  Eigen::VectorXd g_;
+};
+
+}  // namespace crepes
