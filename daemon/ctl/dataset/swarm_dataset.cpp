@@ -269,4 +269,13 @@ Result<SwarmDataset> load_swarm(const fs::path& dir) {
   return swarm;
 }
 
+Result<std::vector<ImuSample>> load_imu(const fs::path& file, DatasetFaults& faults) {
+  return read_imu(file, {Timestamp::min(), Timestamp::max(), {}, faults});
+}
+
+Result<std::vector<SpotFrame>> load_spots(const fs::path& file, std::uint8_t camera,
+                                          DatasetFaults& faults) {
+  return read_spots(file, camera, {Timestamp::min(), Timestamp::max(), {}, faults});
+}
+
 }  // namespace crepes

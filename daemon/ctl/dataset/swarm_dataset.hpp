@@ -44,4 +44,10 @@ struct SwarmDataset {
 /// is refused that leaves the others in order.
 [[nodiscard]] Result<SwarmDataset> load_swarm(const std::filesystem::path& dir);
 
+/// One sensor's file of a single robot, whose clock may show any time. Bad rows as in load_swarm().
+[[nodiscard]] Result<std::vector<ImuSample>> load_imu(const std::filesystem::path& file,
+                                                      DatasetFaults& faults);
+[[nodiscard]] Result<std::vector<SpotFrame>> load_spots(const std::filesystem::path& file,
+                                                        std::uint8_t camera, DatasetFaults& faults);
+
 }  // namespace crepes
