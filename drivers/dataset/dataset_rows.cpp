@@ -33,4 +33,13 @@ void append_rows(std::string& text, const SpotFrame& frame) {
     append_row(text, stamp, spot.u_px, spot.v_px, spot.area_px2, spot.peak);
 }
 
+void append_bearing_row(std::string& text, Timestamp frame, const Bearing& bearing, double u_px,
+                        double v_px) {
+  const Eigen::Vector3d& u_B = bearing.u_B;
+  append_row(text, to_ns(frame), bearing.neighbor.value, u_px, v_px, u_B.x(), u_B.y(), u_B.z(),
+             bearing.sigma_rad);
+  text.back() = ',';
+  text += bearing.is_predicted ? "predicted\n" : "read\n";
+}
+
 }  // namespace crepes

@@ -13,10 +13,14 @@ inline constexpr std::string_view kRangeHeader =
     "#timestamp [ns],peer,distance [m],first path [dBm],received [dBm]\n";
 inline constexpr std::string_view kSpotHeader = "#timestamp [ns],u,v,area,peak\n";
 inline constexpr std::string_view kPictureHeader = "#timestamp [ns],filename\n";
+inline constexpr std::string_view kBearingHeader = "t_ns,id,u,v,bx,by,bz,sigma_rad,how\n";
 
 void append_rows(std::string& text, const ImuSample& sample);
 void append_rows(std::string& text, const UwbRange& range);
 /// One row per spot. A frame without spots is one row.
 void append_rows(std::string& text, const SpotFrame& frame);
+/// A bearing in the picture of `frame`, at the pixel `u_px`, `v_px`. `how`: read or predicted.
+void append_bearing_row(std::string& text, Timestamp frame, const Bearing& bearing, double u_px,
+                        double v_px);
 
 }  // namespace crepes

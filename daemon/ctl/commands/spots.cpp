@@ -24,14 +24,16 @@ void add_spots(CommandLine& line) {
   auto& options = line.make<SpotsOptions>();
   CLI::App* sub = line.add(
       "spots",
-      "Show what the detector and the tracker find in recorded pictures, to set exposure and "
-      "threshold");
-  sub->add_option("IMAGE_OR_FOLDER", options.source,
-                  "a picture, a data set's cam0, or any folder of pictures")
+      "Show what the detector and the tracker find in a recording, to set exposure and threshold, "
+      "and write the bearings");
+  sub->add_option(
+         "ROBOT_DIR", options.source,
+         "a recorded robot (cam0 and imu0), its cam0, any folder of pictures, or a picture")
       ->required();
   sub->add_option("--config", options.config, "crepesd.yaml of the robot that took them")
       ->required();
-  sub->add_option("--out", options.out, "directory for PNGs with spots, robots and their trails");
+  sub->add_option("--out", options.out,
+                  "directory for bearings.csv and PNGs with spots, robots and their trails");
   sub->add_option("--every", options.every, "draw every n-th picture")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));

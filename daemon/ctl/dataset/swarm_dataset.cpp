@@ -304,4 +304,13 @@ Result<RobotRecording> load_robot(const fs::path& dir, const RecordedSensors& se
   return recording;
 }
 
+Result<std::vector<ImuSample>> load_imu(const fs::path& file, DatasetFaults& faults) {
+  return read_imu(file, {Timestamp::min(), Timestamp::max(), {}, faults});
+}
+
+Result<std::vector<SpotFrame>> load_spots(const fs::path& file, std::uint8_t camera,
+                                          DatasetFaults& faults) {
+  return read_spots(file, camera, {Timestamp::min(), Timestamp::max(), {}, faults});
+}
+
 }  // namespace crepes

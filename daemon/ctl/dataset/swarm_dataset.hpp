@@ -57,4 +57,10 @@ struct RecordedSensors {
                                                 const RecordedSensors& sensors,
                                                 DatasetFaults& faults);
 
+/// One sensor's file of a single robot, whose clock may show any time. Bad rows as in load_swarm().
+[[nodiscard]] Result<std::vector<ImuSample>> load_imu(const std::filesystem::path& file,
+                                                      DatasetFaults& faults);
+[[nodiscard]] Result<std::vector<SpotFrame>> load_spots(const std::filesystem::path& file,
+                                                        std::uint8_t camera, DatasetFaults& faults);
+
 }  // namespace crepes

@@ -7,7 +7,9 @@
 
 #include "config/reading/config_file.hpp"
 #include "daemon/ctl/setup/spots_drawing.hpp"
-#include "drivers/dataset/picture_list.hpp"
+#include "daemon/ctl/setup/spots_recording.hpp"
+#include "drivers/dataset/dataset_rows.hpp"
+#include "drivers/dataset/part_file.hpp"
 #include "estimator/vision/blink_tracker.hpp"
 
 namespace crepes {
@@ -65,13 +67,15 @@ void count(const PictureFindings& findings, Timestamp first, SpotsSummary& summa
 /// One camera's detector and tracker.
 class Inspector {
  public:
-  Inspector(const Config& config, std::size_t index, CameraModel model, const IdLibrary& library)
+  Inspector(const Config& config, std::size_t index, CameraModel model, const IdLibrary& library,
+            std::vector<ImuSample> imu)
       : swarm_(config.swarm),
         index_(static_cast<std::uint8_t>(index)),
         camera_(config.cameras[index].calibration),
         model_(std::move(model)),
+        imu_(std::move(imu)),
         detector_(config.vision),
-        tracker_(camera_, model_, config.vision, library) {}
+        tracker_(camera_, model_, config.vision, library, config.robot.id) {}
 
   /// Reads the picture. It must have the size of this camera's pictures.
   [[nodiscard]] Result<Frame> read(const fs::path& file) const {
@@ -93,40 +97,67 @@ class Inspector {
                                            .height = frame.height,
                                            .stride = frame.width});
     const auto& spots = findings.detection.spots;
-    const auto bearings =
-        tracker_.step({picture.stamp, index_, std::vector<Spot>(spots.begin(), spots.end())});
-    for (const Bearing& bearing : bearings) {
-      const auto uv = model_.project(camera_.T_cam_imu.q * bearing.u_B);
-      if (!uv) continue;
-      findings.robots.push_back(
-          {bearing.neighbor, name_of(bearing.neighbor, swarm_), uv->x(), uv->y()});
-    }
+    track({picture.stamp, index_, std::vector<Spot>(spots.begin(), spots.end())}, findings);
+    return findings;
+  }
+
+  /// `frame` must outlive the findings.
+  [[nodiscard]] PictureFindings inspect(const SpotFrame& frame) {
+    PictureFindings findings;
+    findings.stamp = frame.stamp;
+    findings.detection.spots = frame.spots;
+    if (frame.spots.empty()) findings.detection.exposure = Exposure::kDark;
+    track(frame, findings);
     return findings;
   }
 
  private:
+  void track(const SpotFrame& frame, PictureFindings& findings) {
+    const Timestamp now = frame.stamp + from_seconds(camera_.timeshift_cam_imu);
+    while (next_imu_ < imu_.size() && (next_imu_ == 0 || imu_[next_imu_ - 1].stamp < now))
+      tracker_.add_imu(imu_[next_imu_++]);
+    for (const Bearing& bearing : tracker_.step(frame)) {
+      const auto uv = model_.project(camera_.T_cam_imu.q * bearing.u_B);
+      if (!uv) continue;
+      findings.robots.push_back(
+          {bearing.neighbor, name_of(bearing.neighbor, swarm_), bearing, uv->x(), uv->y()});
+    }
+  }
+
   const SwarmConfig& swarm_;
   std::uint8_t index_;
   CameraCalibration camera_;
   CameraModel model_;
+  std::vector<ImuSample> imu_;
+  std::size_t next_imu_ = 0;
   SpotDetector detector_;
   BlinkTracker tracker_;
 };
 
-/// The trails of the robots, and the drawn pictures.
+/// What goes into the folder of results: bearings.csv, and drawings with the robots' trails.
 class Album {
  public:
-  explicit Album(const SpotsOptions& options) : folder_(options.out), every_(options.every) {}
-
-  [[nodiscard]] Result<void> open() const {
-    if (!folder_) return {};
+  [[nodiscard]] static Result<Album> open(const SpotsOptions& options) {
+    Album album(options);
+    if (!options.out) return album;
     std::error_code status;
-    fs::create_directories(*folder_, status);
-    if (!status) return {};
-    return fail(ErrorCode::kIo, fmt::format("{}: {}", folder_->string(), status.message()));
+    fs::create_directories(*options.out, status);
+    if (status)
+      return fail(ErrorCode::kIo, fmt::format("{}: {}", options.out->string(), status.message()));
+    auto bearings = PartFile::create(*options.out / "bearings.csv", kBearingHeader);
+    if (!bearings) return tl::unexpected(bearings.error());
+    album.bearings_ = std::move(*bearings);
+    return album;
   }
 
-  [[nodiscard]] Result<void> add(const Frame& frame, const PictureFindings& findings) {
+  void add(const PictureFindings& findings) {
+    if (!bearings_) return;
+    for (const RobotSighting& seen : findings.robots)
+      append_bearing_row(bearings_->text(), findings.stamp, seen.bearing, seen.u_px, seen.v_px);
+    bearings_->flush_if_large();
+  }
+
+  [[nodiscard]] Result<void> draw(const Frame& frame, const PictureFindings& findings) {
     if (!folder_) return {};
     std::vector<DrawnRobot> robots;
     for (const RobotSighting& seen : findings.robots) {
@@ -140,40 +171,69 @@ class Album {
     return draw_spots(frame, findings.detection.spots, robots, picture_caption(findings), file);
   }
 
+  [[nodiscard]] Result<void> publish() { return bearings_ ? bearings_->publish() : Result<void>{}; }
+
  private:
+  explicit Album(const SpotsOptions& options) : folder_(options.out), every_(options.every) {}
+
   std::optional<fs::path> folder_;
   std::size_t every_;
   std::size_t count_ = 0;
+  std::optional<PartFile> bearings_;
   std::map<RobotId, std::vector<Eigen::Vector2d>> trails_;
 };
 
-Result<SpotsSummary> inspect_all(const std::vector<RecordedPicture>& pictures, Inspector& inspector,
-                                 const SpotsOptions& options) {
-  SpotsSummary summary;
-  Album album(options);
-  if (auto opened = album.open(); !opened) return tl::unexpected(opened.error());
-  std::string last_fault;
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    if (options.on_progress)
-      options.on_progress(static_cast<double>(i) / static_cast<double>(pictures.size()));
-    const Result<Frame> frame = inspector.read(pictures[i].file);
-    if (!frame) {
-      ++summary.refused;
-      last_fault = frame.error().message;
-      if (options.on_fault && pictures.size() > 1) options.on_fault(last_fault);
-      continue;
-    }
-    const PictureFindings findings = inspector.inspect(pictures[i], *frame);
-    count(findings, pictures.front().stamp, summary);
-    if (options.on_text && (options.json || pictures.size() == 1))
-      options.on_text(options.json ? picture_json(findings) : picture_text(findings));
-    if (auto drawn = album.add(*frame, findings); !drawn) return tl::unexpected(drawn.error());
+/// Reads the recording frame by frame and hands on what is found.
+class Inspection {
+ public:
+  Inspection(Inspector& inspector, Album& album, const SpotsOptions& options)
+      : inspector_(inspector), album_(album), options_(options) {}
+
+  [[nodiscard]] Result<SpotsSummary> run(const SpotsRecording& recording) {
+    const auto& [pictures, frames, imu] = recording;
+    first_ = pictures.empty() ? frames.front().stamp : pictures.front().stamp;
+    total_ = pictures.size() + frames.size();
+    for (const RecordedPicture& picture : pictures)
+      if (auto seen = look_at(picture); !seen) return tl::unexpected(seen.error());
+    for (const SpotFrame& frame : frames) add(inspector_.inspect(frame));
+    if (summary_.pictures > 0) return summary_;
+    if (total_ == 1) return fail(ErrorCode::kFormat, last_fault_);
+    return fail(ErrorCode::kFormat, fmt::format("{}: none of {} pictures can be used",
+                                                options_.source.string(), total_));
   }
-  if (summary.pictures > 0) return summary;
-  if (pictures.size() == 1) return fail(ErrorCode::kFormat, last_fault);
-  return fail(ErrorCode::kFormat, fmt::format("{}: none of {} pictures can be used",
-                                              options.source.string(), pictures.size()));
-}
+
+ private:
+  [[nodiscard]] Result<void> look_at(const RecordedPicture& picture) {
+    const Result<Frame> frame = inspector_.read(picture.file);
+    if (!frame) {
+      ++summary_.refused;
+      last_fault_ = frame.error().message;
+      if (options_.on_fault && total_ > 1) options_.on_fault(last_fault_);
+      return {};
+    }
+    const PictureFindings findings = inspector_.inspect(picture, *frame);
+    add(findings);
+    return album_.draw(*frame, findings);
+  }
+
+  void add(const PictureFindings& findings) {
+    if (options_.on_progress)
+      options_.on_progress(static_cast<double>(summary_.pictures + summary_.refused) /
+                           static_cast<double>(total_));
+    count(findings, first_, summary_);
+    album_.add(findings);
+    if (options_.on_text && (options_.json || total_ == 1))
+      options_.on_text(options_.json ? picture_json(findings) : picture_text(findings));
+  }
+
+  Inspector& inspector_;
+  Album& album_;
+  const SpotsOptions& options_;
+  Timestamp first_{};
+  std::size_t total_ = 0;
+  SpotsSummary summary_;
+  std::string last_fault_;
+};
 
 }  // namespace
 
@@ -190,12 +250,15 @@ Result<SpotsSummary> inspect_spots(const SpotsOptions& options) {
   if (!model) return tl::unexpected(model.error());
   const auto library = IdLibrary::from(config->swarm).map_error(in_config);
   if (!library) return tl::unexpected(library.error());
-  const auto pictures = list_pictures(options.source, camera.rate_hz);
-  if (!pictures) return tl::unexpected(pictures.error());
+  const auto recording = load_spots_recording(options, *index, camera.rate_hz);
+  if (!recording) return tl::unexpected(recording.error());
+  auto album = Album::open(options);
+  if (!album) return tl::unexpected(album.error());
 
-  Inspector inspector(*config, *index, *model, *library);
-  Result<SpotsSummary> summary = inspect_all(*pictures, inspector, options);
+  Inspector inspector(*config, *index, *model, *library, recording->imu);
+  Result<SpotsSummary> summary = Inspection(inspector, *album, options).run(*recording);
   if (!summary) return summary;
+  if (auto published = album->publish(); !published) return tl::unexpected(published.error());
   summary->is_automatic = config->vision.threshold == 0;
   if (options.on_text)
     options.on_text(options.json ? summary_json(*summary) : summary_text(*summary));

@@ -17,14 +17,14 @@
 namespace crepes {
 
 struct SpotsOptions {
-  std::filesystem::path source;              ///< a picture or a folder of pictures
-  std::filesystem::path config;              ///< crepesd.yaml of the robot
-  std::optional<std::filesystem::path> out;  ///< where to draw; if empty, nothing is drawn
+  std::filesystem::path source;  ///< a robot's folder, a folder of pictures or a picture
+  std::filesystem::path config;  ///< crepesd.yaml of the robot
+  std::optional<std::filesystem::path> out;  ///< for bearings.csv and drawings; if empty, none
   std::optional<std::string> camera;  ///< its name; if empty, `cam<k>` in the path selects it, or 0
   std::size_t every = 1;              ///< draw every n-th picture
   bool json = false;
   std::function<void(const std::string&)> on_text;   ///< lines for standard output
-  std::function<void(const std::string&)> on_fault;  ///< pictures that were refused, and why
+  std::function<void(const std::string&)> on_fault;  ///< pictures and rows refused, and why
   std::function<void(double)> on_progress;           ///< 0..1; optional
 };
 
@@ -46,6 +46,7 @@ struct Extent {
 struct RobotSighting {
   RobotId id{};
   std::string name;
+  Bearing bearing;
   double u_px = 0.0;
   double v_px = 0.0;
 };
@@ -81,7 +82,8 @@ struct SpotsSummary {
 };
 
 /// Refuses files that are not pictures or do not have the camera's size, and continues. An error if
-/// no picture can be used.
+/// no picture can be used. Of a robot's folder the gyro guides the tracker, and spots.csv stands in
+/// for pictures that were not recorded.
 [[nodiscard]] Result<SpotsSummary> inspect_spots(const SpotsOptions& options);
 
 /// What to change if the exposure is unusable; empty otherwise.

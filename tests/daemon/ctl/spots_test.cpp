@@ -134,6 +134,46 @@ TEST_F(Pictures, AreDrawnWithCirclesWhereSpotsAre) {
   EXPECT_EQ(colored_far, 0);
 }
 
+TEST_F(Pictures, OfARobotGiveARowForEachBearing) {
+  record("r1/cam0/data", [](int i) { return std::to_string(i) + ".png"; });
+  swarm_.write("r1/cam0/data.csv", list_);
+  options_.out = swarm_.dir() / "found";
+  options_.every = 1000;
+
+  const auto summary = look_at("r1");
+
+  ASSERT_TRUE(summary) << summary.error().message;
+  std::istringstream rows(swarm_.read("found/bearings.csv"));
+  std::string row;
+  std::getline(rows, row);
+  EXPECT_EQ(row, "t_ns,id,u,v,bx,by,bz,sigma_rad,how");
+  std::size_t count = 0;
+  while (std::getline(rows, row)) {
+    ++count;
+    EXPECT_NE(row.find(",2,10"), std::string::npos) << row;
+    EXPECT_TRUE(row.ends_with(",read")) << row;
+  }
+  EXPECT_EQ(count, summary->robots.at(RobotId{2}).pictures);
+  EXPECT_GT(count, 20U);
+}
+
+TEST_F(Pictures, ThatWereNotRecordedAreReplacedBySpots) {
+  std::string spots = "#t_ns,u,v,area,peak\n";
+  const std::string pattern = "001001011111111111";
+  for (int i = 0; i < 100; ++i) {
+    const std::string stamp = std::to_string(1'000'000'000LL + i * 5'000'000LL);
+    spots += stamp +
+             (pattern[static_cast<std::size_t>(i / 2) % 18] == '1' ? ",100,90,12,200\n" : ",,,,\n");
+  }
+  swarm_.write("r1/cam0/spots.csv", spots);
+
+  const auto summary = look_at("r1");
+
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->pictures, 100U);
+  EXPECT_EQ(summary->robots.count(RobotId{2}), 1U);
+}
+
 TEST_F(Pictures, AreToldInJson) {
   save("shots/1.png", picture(0, true));
   save("shots/2.png", picture(0, false));

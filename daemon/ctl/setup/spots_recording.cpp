@@ -1,0 +1,52 @@
+#include "daemon/ctl/setup/spots_recording.hpp"
+
+#include <fmt/core.h>
+
+#include "daemon/ctl/dataset/swarm_dataset.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The folder that holds `imu0`: the source itself, or the one around its `cam<k>` or
+/// `cam<k>/data`.
+fs::path robot_folder_of(const fs::path& source) {
+  fs::path folder = (source / "").lexically_normal().parent_path();
+  if (folder.filename() == "data") folder = folder.parent_path();
+  if (folder.filename().string().starts_with("cam")) folder = (folder / "..").lexically_normal();
+  return folder;
+}
+
+}  // namespace
+
+Result<SpotsRecording> load_spots_recording(const SpotsOptions& options, std::size_t camera,
+                                            double rate_hz) {
+  SpotsRecording recording;
+  DatasetFaults faults;
+  std::error_code status;
+  const fs::path own = options.source / fmt::format("cam{}", camera);
+  const bool is_robot = fs::is_directory(own, status);
+  if (is_robot && !fs::exists(own / "data.csv", status) && fs::exists(own / "spots.csv", status)) {
+    auto frames = load_spots(own / "spots.csv", static_cast<std::uint8_t>(camera), faults);
+    if (!frames) return tl::unexpected(frames.error());
+    recording.frames = std::move(*frames);
+    if (recording.frames.empty())
+      return fail(ErrorCode::kNotFound, (own / "spots.csv").string() + ": holds no frames");
+  } else {
+    auto pictures = list_pictures(is_robot ? own : options.source, rate_hz);
+    if (!pictures) return tl::unexpected(pictures.error());
+    recording.pictures = std::move(*pictures);
+  }
+  const fs::path imu_file = robot_folder_of(options.source) / "imu0" / "data.csv";
+  if (fs::is_directory(options.source, status) && fs::exists(imu_file, status)) {
+    auto imu = load_imu(imu_file, faults);
+    if (!imu) return tl::unexpected(imu.error());
+    recording.imu = std::move(*imu);
+  }
+  if (faults.total() > 0 && options.on_fault)
+    options.on_fault(fmt::format("{} rows; the last: {}", faults.total(), faults.last()));
+  return recording;
+}
+
+}  // namespace crepes
