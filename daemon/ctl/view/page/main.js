@@ -145,7 +145,7 @@ function drawTransport(t) {
   const shown = store.isLive ? (store.cursor === null ? "live" : `${fixed(t - last, 2)} s`) : `${fixed(t, 2)} s`;
   setText(byId("clock"), shown);
   slider.setAttribute("aria-valuetext", shown);
-  setText(byId("play"), isPlaying ? "⏸" : "▶");
+  setText(byId("play"), isPlaying ? "‖" : "▶");
   byId("play").setAttribute("aria-label", isPlaying ? "Pause" : "Play");
   byId("live").hidden = !store.isLive || store.cursor === null;
 }
