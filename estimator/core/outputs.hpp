@@ -45,6 +45,7 @@ struct NeighborPose {
   double age_s = 0.0;                               ///< since the last measurement that was used
   std::uint32_t reset_counter = 0;                  ///< grows when the filter starts anew
   PoseSources sources;
+  std::optional<Eigen::Vector3d> up_B;  ///< unit vector against gravity at `stamp`, if known
 };
 
 /// Why there is no pose, the most upstream reason first.

@@ -282,7 +282,10 @@ Outputs Estimator::State::handle(const Tick& tick) {
     neighbor.tick(tick.stamp, self);
     append(neighbor.outcomes().drain_records(), outputs.records);
     if (auto estimate = neighbor.output().estimate()) estimates.push_back(*estimate);
-    if (auto pose = neighbor.output().published()) outputs.poses.push_back(std::move(*pose));
+    if (auto pose = neighbor.output().published()) {
+      if (const auto tilt = self.tilt_at(pose->stamp)) pose->up_B = tilt->up_B;
+      outputs.poses.push_back(std::move(*pose));
+    }
   }
   if (report_timer.is_due(tick.stamp)) {
     outputs.report = composer.compose(tick.stamp, self, estimates);

@@ -46,6 +46,7 @@ PoseMessage pose_from(const ParsedJson& json) {
   pose.T_B_N.pose.q = Eigen::Quaterniond(w, xyz.x(), xyz.y(), xyz.z()).normalized();
   if (json.contains("covariance")) pose.T_B_N.covariance = covariance_from(json["covariance"]);
   if (json.contains("velocity")) pose.v_B_N = vector_from(json["velocity"]);
+  if (json.contains("up")) pose.up_B = vector_from(json["up"]);
   pose.age_s = json.value("age_s", 0.0);
   pose.reset_counter = json.value("reset_counter", 0U);
   return message;

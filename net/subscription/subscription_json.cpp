@@ -64,6 +64,7 @@ std::string pose_json(std::uint64_t sequence, RobotId self, std::string_view nam
                            {"z", rounded_to_digits(q.z(), 9)}};
   }
   put_vector(json, "velocity", pose.v_B_N);
+  if (pose.up_B) put_vector(json, "up", *pose.up_B);
   if (pose.T_B_N.covariance.allFinite()) json["covariance"] = covariance_of(pose.T_B_N.covariance);
   put(json, "age_s", pose.age_s, 4);
   json["reset_counter"] = pose.reset_counter;

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import urllib.request
 
 from subscriber import Subscriber
 
@@ -163,6 +164,22 @@ def recording():
     check("what it measures can be recorded", done.returncode == 0 and rows > 200, f"{rows} rows {done.stderr.strip()}")
 
 
+def page():
+    """The page's service: off after installation, and when it is started it shows what the daemon sends."""
+    check("the page is not served by default", run("systemctl", "is-enabled", "crepes-view").stdout.strip() == "disabled")
+    run("systemctl", "start", "crepes-view")
+
+    def frame_comes():
+        try:
+            with urllib.request.urlopen("http://127.0.0.1:8080/events?robot=0", timeout=5) as stream:
+                return any(stream.readline() == b"event: frame\n" for _ in range(200))
+        except OSError:
+            return False
+    served, seconds = awaited(frame_comes, 15.0)
+    state = run("systemctl", "status", "--no-pager", "crepes-view").stdout
+    check("when started, it shows the neighbor", served, f"{seconds:.2f} s" if served else state)
+
+
 def stop():
     begin = time.monotonic()
     run("systemctl", "stop", "crepesd")
@@ -174,7 +191,7 @@ def remove():
     run("systemctl", "start", "crepesd")
     check("the package is removed from under the running service", run("dpkg", "--purge", "crepes").returncode == 0)
     check("which stops", not awaited(lambda: shown("ActiveState") == "active", 0.1)[0])
-    left = [path for path in ("/lib/systemd/system/crepesd.service", "/etc/systemd/system/crepesd.service",
+    left = [path for path in ("/lib/systemd/system/crepesd.service", "/lib/systemd/system/crepes-view.service", "/etc/systemd/system/crepesd.service",
                               "/etc/systemd/system/multi-user.target.wants/crepesd.service", "/usr/bin/crepesd")
             if os.path.lexists(path)]
     check("and leaves nothing but the robot's own file", not left and CONFIG.exists(), left)
@@ -192,6 +209,7 @@ def main():
     comes_back(subscriber, "hung", lambda process: os.kill(process, signal.SIGSTOP), 3.0 + 3.0)  # WatchdogSec and as above
     reloading(subscriber)
     recording()
+    page()
     stop()
     neighbor.terminate()
     neighbor.wait()

@@ -24,4 +24,5 @@ sleep 15
 "$tool" status --port 47581 >"$scratch/status"
 wait "$demo"
 "$here/draw.py" screen "$scratch/status" "$here/status.svg"
+CREPES_TOOL=$tool "$source/tests/page/make_pictures.py" "$here"
 ls -l "$here"/*.svg "$here"/*.png

@@ -24,11 +24,13 @@ void add_sources(CommandLine& line);
 void add_spots(CommandLine& line);
 void add_status(CommandLine& line);
 void add_waitpose(CommandLine& line);
+void add_view(CommandLine& line);
 void add_watch(CommandLine& line);
 
 /// In the order of --help: running daemons, recordings, setup.
 inline constexpr std::array kCommands{&add_status,
                                       &add_watch,
+                                      &add_view,
                                       &add_sources,
                                       &add_waitpose,
                                       &add_record,

@@ -6,6 +6,8 @@
 namespace crepes {
 namespace {
 
+constexpr double kViewFor_s = 600.0;  ///< with a page, unless --for is given
+
 Result<void> run_demo(DemoOptions options, bool json) {
   options.show_table = !json;
   if (json) options.on_progress = progress_on_terminal();
@@ -21,11 +23,14 @@ Result<void> run_demo(DemoOptions options, bool json) {
 void add_demo(CommandLine& line) {
   auto& options = line.make<DemoOptions>();
   auto& json = line.make<bool>();
+  auto& view = line.make<bool>();
+  auto& listen = line.make<std::string>();
+  listen = "127.0.0.1:8080";
   CLI::App* sub = line.add(
       "demo", "Start real daemons in a simulated world and compare their poses with its truth");
-  sub->add_option("--for", options.for_s, "duration in seconds")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 600.0));
+  CLI::Option* for_s = sub->add_option("--for", options.for_s, "duration in seconds")
+                           ->capture_default_str()
+                           ->check(CLI::Range(1.0, 600.0));
   add_choice(
       sub, "--scenario", kSimScenarios,
       [&options](SimScenario scenario) { options.scenario = scenario; },
@@ -38,8 +43,19 @@ void add_demo(CommandLine& line) {
       ->capture_default_str()
       ->check(CLI::Range(1024, 65000));
   sub->add_option("--keep", options.keep, "directory in which configurations and logs are kept");
+  CLI::Option* view_flag =
+      sub->add_flag("--view", view,
+                    "serve a page that shows the robots (crepesctl view), and run for ten minutes "
+                    "unless --for says otherwise");
+  sub->add_option("--listen", listen, "where --view serves the page, ADDRESS:PORT")
+      ->capture_default_str()
+      ->needs(view_flag);
   add_json_flag(sub, json, "one object at the end");
-  line.run(sub, [&options, &json] { return run_demo(options, json); });
+  line.run(sub, [&options, &json, &view, &listen, for_s] {
+    if (view) options.view = listen;
+    if (view && for_s->empty()) options.for_s = kViewFor_s;
+    return run_demo(options, json);
+  });
 }
 
 }  // namespace crepes

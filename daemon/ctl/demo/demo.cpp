@@ -12,6 +12,7 @@
 
 #include "config/reading/config_file.hpp"
 #include "daemon/ctl/demo/child_process.hpp"
+#include "daemon/ctl/demo/demo_page.hpp"
 #include "daemon/ctl/demo/demo_swarm.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
@@ -79,13 +80,14 @@ class Demo {
     const Result<std::uint16_t> mesh_port = free_mesh_port(options_.port, ids.size());
     if (!mesh_port) return tl::unexpected(mesh_port.error());
     std::error_code status;
-    const fs::path daemon = fs::read_symlink("/proc/self/exe", status).parent_path() / "crepesd";
+    const fs::path tool = fs::read_symlink("/proc/self/exe", status);
+    const fs::path daemon = tool.parent_path() / "crepesd";
     start_ = clock_.now();
     for (DemoRobot& robot :
          demo_swarm(sim_config(options_), ids, epoch_s(), options_.port, *mesh_port)) {
       if (auto done = start_robot(dir, daemon, std::move(robot)); !done) return done;
     }
-    return {};
+    return options_.view.empty() ? Result<void>() : start_page(tool, dir);
   }
 
   /// Runs until the time is over, a daemon ends, or a signal arrives.
@@ -116,6 +118,7 @@ class Demo {
     end_s_ = world_s();
     for (const ChildProcess& daemon : daemons_) daemon.terminate();
     daemons_.clear();
+    page_.reset();
   }
 
   /// Scores the whole run of each pair.
@@ -186,6 +189,11 @@ class Demo {
     return {};
   }
 
+  Result<void> start_page(const fs::path& tool, const fs::path& dir) {
+    return DemoPage::start(tool, dir, options_.view, options_.port, robots_.size())
+        .map([this](DemoPage&& page) { page_.emplace(std::move(page)); });
+  }
+
   Result<void> check_daemons() {
     for (std::size_t i = 0; i < daemons_.size(); ++i) {
       const std::optional<std::string>& exit_reason = daemons_[i].exit_reason();
@@ -195,7 +203,7 @@ class Demo {
                                               name_of_robot(robot.robot.config.robot.id),
                                               *exit_reason, tail_of(robot.log)));
     }
-    return {};
+    return page_ ? page_->check() : Result<void>();
   }
 
   /// Requests to a daemon that does not run yet are lost.
@@ -248,8 +256,9 @@ class Demo {
     std::vector<Row> rows{{"pair", "mode", "range m", "error m", "error deg", "sigma m", "deg",
                            "age ms", "first pose s", "why not"}};
     for (const Pair& pair : pairs_) rows.push_back(live_row(pair));
-    return fmt::format("world time {} s of {}\n\n{}", fixed(world_s(), 1), fixed(options_.for_s, 0),
-                       text_table(rows));
+    const std::string page = page_ ? fmt::format("page: {}\n", page_->url()) : "";
+    return fmt::format("{}world time {} s of {}\n\n{}", page, fixed(world_s(), 1),
+                       fixed(options_.for_s, 0), text_table(rows));
   }
 
   [[nodiscard]] Row live_row(const Pair& pair) const {
@@ -286,6 +295,7 @@ class Demo {
   Timestamp start_;
   std::vector<RunningRobot> robots_;
   std::vector<ChildProcess> daemons_;  ///< one for each of robots_, while they run
+  std::optional<DemoPage> page_;
   std::vector<Pair> pairs_;
   std::map<std::pair<RobotId, RobotId>, std::size_t> pair_index_;
   double end_s_ = 0.0;  ///< world time at the end

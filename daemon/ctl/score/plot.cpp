@@ -2,50 +2,23 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "daemon/ctl/dataset/replay_pairs.hpp"
 #include "daemon/ctl/dataset/swarm_manifest.hpp"
 #include "daemon/ctl/dataset/truth.hpp"
 #include "daemon/ctl/score/plot_pair.hpp"
 #include "daemon/ctl/score/plot_style.hpp"
 #include "daemon/ctl/score/svg_chart.hpp"
 #include "drivers/dataset/part_file.hpp"
-#include "drivers/dataset/pose_file.hpp"
-#include "drivers/dataset/record_file.hpp"
 
 namespace crepes {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The names of a pair, as in its file names.
-struct PairName {
-  std::string observer;
-  std::string neighbor;
-};
-
-/// Every DIR/<observer>/<neighbor>.csv, in order.
-std::vector<PairName> pairs_in(const fs::path& results) {
-  std::vector<PairName> pairs;
-  std::error_code status;
-  for (const auto& dir : fs::directory_iterator(results, status)) {
-    if (!dir.is_directory(status)) continue;
-    for (const auto& file : fs::directory_iterator(dir.path(), status)) {
-      const fs::path stem = file.path().stem();
-      if (file.path().extension() == ".csv" && !stem.has_extension())
-        pairs.push_back({dir.path().filename().string(), stem.string()});
-    }
-  }
-  std::sort(pairs.begin(), pairs.end(), [](const PairName& a, const PairName& b) {
-    return std::tie(a.observer, a.neighbor) < std::tie(b.observer, b.neighbor);
-  });
-  return pairs;
-}
 
 struct PlottedRecording {
   SwarmManifest manifest;
@@ -69,30 +42,17 @@ Result<SwarmRobot> robot_named(const PlottedRecording& recording, const std::str
                           options.swarm.string(), name, options.results.string()));
 }
 
-/// Records may be missing, but existing ones must be valid.
-template <class Record>
-Result<std::vector<Record>> optional_records(Result<std::vector<Record>> records) {
-  if (!records && records.error().code == ErrorCode::kNotFound) return std::vector<Record>{};
-  return records;
-}
-
 Result<PairData> load_pair(const PlotOptions& options, const PairName& name) {
-  const fs::path stem = options.results / name.observer / name.neighbor;
-  const auto file = [&stem](const char* extension) { return fs::path(stem) += extension; };
-  auto poses = read_pose_file(file(".csv"), {});
-  if (!poses) return tl::unexpected(poses.error());
-  auto measurements = optional_records(read_innovation_file(file(".innovations.csv")));
-  if (!measurements) return tl::unexpected(measurements.error());
-  auto calibrations = optional_records(read_calibration_file(file(".calibration.csv")));
-  if (!calibrations) return tl::unexpected(calibrations.error());
-  return PairData{.observer = name.observer,
-                  .neighbor = name.neighbor,
-                  .poses = std::move(*poses),
-                  .measurements = std::move(*measurements),
-                  .calibrations = std::move(*calibrations),
-                  .truth = {},
-                  .seconds = {},
-                  .duration_s = 0.0};
+  return read_pair(options.results, name).map([&](PairFiles&& files) {
+    return PairData{.observer = name.observer,
+                    .neighbor = name.neighbor,
+                    .poses = std::move(files.poses),
+                    .measurements = std::move(files.measurements),
+                    .calibrations = std::move(files.calibrations),
+                    .truth = {},
+                    .seconds = {},
+                    .duration_s = 0.0};
+  });
 }
 
 /// Seconds of true time if it is known, otherwise since the observer's first row.

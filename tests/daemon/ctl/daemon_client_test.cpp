@@ -24,6 +24,7 @@ NeighborPose a_pose() {
   pose.T_B_N.covariance = Eigen::Matrix<double, 6, 1>(1, 2, 3, 4, 5, 6).asDiagonal();
   pose.T_B_N.covariance(0, 5) = pose.T_B_N.covariance(5, 0) = 0.5;
   pose.age_s = 0.25;
+  pose.up_B = Eigen::Vector3d(0.6, 0.0, 0.8);
   return pose;
 }
 
@@ -40,6 +41,7 @@ TEST(DaemonMessages, ReadWhatTheDaemonWrites) {
   EXPECT_NEAR(pose.pose.T_B_N.pose.q.angularDistance(a_pose().T_B_N.pose.q), 0.0, 1e-7);
   EXPECT_EQ(pose.pose.T_B_N.covariance, a_pose().T_B_N.covariance);
   EXPECT_EQ(pose.pose.age_s, 0.25);
+  EXPECT_EQ(pose.pose.up_B, a_pose().up_B);
 }
 
 TEST(DaemonMessages, ReadTheReasonWhereThereIsNoPose) {

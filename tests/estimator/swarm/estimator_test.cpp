@@ -104,6 +104,19 @@ TEST(Estimator, GivesTheSameOutputsToTheBitForTheSameEvents) {
   expect_same_to_the_bit(a, b);
 }
 
+TEST(Estimator, PublishesTheDirectionOfUpWithEachPose) {
+  Estimator estimator(two_robots());
+
+  const auto poses = poses_of(estimator, two_seconds());
+
+  ASSERT_FALSE(poses.empty());
+  ASSERT_TRUE(poses.back().up_B);
+  const Tilt tilt = estimator.status().tilt.value();
+  EXPECT_NEAR(poses.back().up_B->norm(), 1.0, 1e-9);
+  // The tilt is that of the newest sample, at most 20 ms from the pose.
+  EXPECT_LT((*poses.back().up_B - tilt.up_B).norm(), 0.05);
+}
+
 TEST(Estimator, TellsOfEveryMeasurementIfAskedAndGivesTheSamePoses) {
   const std::vector<Event> events = two_seconds();
   Estimator silent(two_robots());

@@ -1,0 +1,54 @@
+#include "daemon/ctl/dataset/replay_pairs.hpp"
+
+#include <algorithm>
+#include <system_error>
+#include <tuple>
+#include <utility>
+
+#include "drivers/dataset/pose_file.hpp"
+#include "drivers/dataset/record_file.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Records may be missing, but existing ones must be valid.
+template <class Record>
+Result<std::vector<Record>> optional_records(Result<std::vector<Record>> records) {
+  if (!records && records.error().code == ErrorCode::kNotFound) return std::vector<Record>{};
+  return records;
+}
+
+}  // namespace
+
+std::vector<PairName> pairs_in(const fs::path& results) {
+  std::vector<PairName> pairs;
+  std::error_code status;
+  for (const auto& dir : fs::directory_iterator(results, status)) {
+    if (!dir.is_directory(status)) continue;
+    for (const auto& file : fs::directory_iterator(dir.path(), status)) {
+      const fs::path stem = file.path().stem();
+      if (file.path().extension() == ".csv" && !stem.has_extension())
+        pairs.push_back({dir.path().filename().string(), stem.string()});
+    }
+  }
+  std::sort(pairs.begin(), pairs.end(), [](const PairName& a, const PairName& b) {
+    return std::tie(a.observer, a.neighbor) < std::tie(b.observer, b.neighbor);
+  });
+  return pairs;
+}
+
+Result<PairFiles> read_pair(const fs::path& results, const PairName& pair) {
+  const fs::path stem = results / pair.observer / pair.neighbor;
+  const auto file = [&stem](const char* extension) { return fs::path(stem) += extension; };
+  auto poses = read_pose_file(file(".csv"), {});
+  if (!poses) return tl::unexpected(poses.error());
+  auto measurements = optional_records(read_innovation_file(file(".innovations.csv")));
+  if (!measurements) return tl::unexpected(measurements.error());
+  auto calibrations = optional_records(read_calibration_file(file(".calibration.csv")));
+  if (!calibrations) return tl::unexpected(calibrations.error());
+  return PairFiles{std::move(*poses), std::move(*measurements), std::move(*calibrations)};
+}
+
+}  // namespace crepes

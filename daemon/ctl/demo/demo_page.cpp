@@ -1,0 +1,39 @@
+#include "daemon/ctl/demo/demo_page.hpp"
+
+#include <fmt/core.h>
+
+#include <utility>
+#include <vector>
+
+#include "drivers/base/text_file.hpp"
+
+namespace crepes {
+
+Result<DemoPage> DemoPage::start(const std::filesystem::path& tool,
+                                 const std::filesystem::path& dir, const std::string& listen,
+                                 std::uint16_t first_port, std::size_t robots) {
+  std::vector<std::string> arguments{"view", "--listen", listen, "--port",
+                                     std::to_string(first_port)};
+  for (std::size_t i = 1; i < robots; ++i) {
+    arguments.emplace_back("--also");
+    arguments.push_back(fmt::format("127.0.0.1:{}", first_port + i));
+  }
+  std::filesystem::path log = dir / "view.log";
+  return ChildProcess::start(tool, arguments, log).map([&](ChildProcess&& process) {
+    return DemoPage(std::move(process), std::move(log));
+  });
+}
+
+Result<void> DemoPage::check() {
+  const auto& reason = process_.exit_reason();
+  if (!reason) return {};
+  return fail(ErrorCode::kIo, fmt::format("crepesctl view ended: {}\n{}", *reason,
+                                          read_text_file(log_).value_or("")));
+}
+
+std::string DemoPage::url() const {
+  const std::string text = read_text_file(log_).value_or("");
+  return text.substr(0, text.find('\n'));
+}
+
+}  // namespace crepes

@@ -1,0 +1,183 @@
+// Tiles of sensors and neighbors with reason and advice, the links, and the events.
+
+import { degrees, element, fit, fixed, length, setText, style } from "./dom.js";
+import { norm } from "./geometry.js";
+import { AGE, MODE, MODES, SIGMA, SIGMA_ROTATION, T, indexAt, positionOf } from "./store.js";
+
+// What to do where there is no pose; at length in config/docs/troubleshooting.md.
+const ADVICE = {
+  "never heard": "Check the mesh, net.interface, a firewall on UDP 47474, and whether its crepesd runs.",
+  "silent": "Out of reach, or its battery or daemon has stopped.",
+  "clock offset unknown": "Wait two seconds. If it stays, packets arrive in one direction only.",
+  "own IMU silent": "See the IMU's tile below.",
+  "peer IMU silent": "Its IMU is silent or faulty: check there.",
+  "tilt unknown": "Hold still for a second. Wrong axes in imu.T_body_imu also cause it.",
+  "not seen": "Is it in view? Are its LEDs on? Check exposure_us and vision.threshold.",
+  "does not see us": "It reports no bearing of our board. Check our LEDs, and its camera.",
+  "no range": "No UWB distance between the two. Check the modules' ids and channel.",
+  "near the vertical": "Almost straight above or below: yaw is not observable. Move aside.",
+  "too close": "Move more than half a meter apart.",
+  "contested": "Bearings do not agree. Look for reflections and for lamps that blink.",
+  "uncertain": "Known worse than 1 m or 20 deg: too few measurements, see the links.",
+};
+const SPARK_SECONDS = 30;
+
+const totals = (object) => Object.entries(object || {}).map(([name, count]) => `${name.replaceAll("_", " ")} ${count}`).join(", ");
+
+/** A list entry that stays while its texts change: no layout jumps, and focus is kept. */
+function tileIn(list, key) {
+  let tile = [...list.children].find((each) => each.dataset.key === key);
+  if (!tile) {
+    tile = element("li", { class: "tile", "data-key": key }, element("div", { class: "head" }, element("span"), element("span", { class: "state" })),
+      element("p", { class: "advice" }), element("p", { class: "numbers" }), element("canvas", { "aria-hidden": "true" }));
+    list.append(tile);
+  }
+  return tile;
+}
+
+function fill(tile, { name, state, advice, numbers, isBad, spark }) {
+  setText(tile.querySelector(".head span"), name);
+  setText(tile.querySelector(".state"), state);
+  setText(tile.querySelector(".advice"), advice);
+  setText(tile.querySelector(".numbers"), numbers);
+  tile.classList.toggle("bad", isBad);
+  drawSpark(tile.querySelector("canvas"), spark);
+}
+
+/** The points of the last half minute, from zero upwards. */
+function drawSpark(canvas, { points, from, to }) {
+  if (canvas.clientWidth === 0) return;
+  fit(canvas);
+  const pen = canvas.getContext("2d");
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  pen.clearRect(0, 0, width, height);
+  const top = Math.max(1e-9, ...points.map(([, value]) => value));
+  pen.strokeStyle = style("--accent");
+  pen.lineWidth = 1.5;
+  pen.beginPath();
+  points.forEach(([t, value], i) => {
+    const x = ((t - from) / (to - from)) * width;
+    const y = height - 2 - (value / top) * (height - 4);
+    if (i === 0 || t - points[i - 1][0] > 2) pen.moveTo(x, y);
+    else pen.lineTo(x, y);
+  });
+  pen.stroke();
+}
+
+const verdicts = (neighbor, kind, verdict) => neighbor.measurements?.[kind]?.[verdict] || 0;
+const allOf = (neighbor, verdict) => Object.values(neighbor.measurements || {}).reduce((sum, kind) => sum + (kind[verdict] || 0), 0);
+
+/** Measurements per second between two looks at the totals. */
+export class Rates {
+  constructor() {
+    this.looks = new Map();
+  }
+
+  /** Called after each STATUS; `seconds` is the wall's time. Adds rows to the store for charts and sparklines. */
+  look(store, seconds) {
+    for (const neighbor of store.status.neighbors || []) {
+      const key = String(neighbor.peer);
+      const last = this.looks.get(key);
+      if (last && seconds - last.seconds < 0.9) continue;
+      const now = { seconds, counts: structuredClone(neighbor.measurements || {}), gated: allOf(neighbor, "gated") };
+      const known = store.neighbor(key, neighbor.name);
+      const t = store.newest?.t;
+      if (last && t !== undefined) {
+        known.gated = [...(known.gated || []).slice(-400), [t, Math.max(0, (now.gated - last.gated) / (seconds - last.seconds))]];
+        known.rates = Object.fromEntries(Object.keys(now.counts).map((kind) => [kind, (verdicts(neighbor, kind, "fused") - (last.counts[kind]?.fused || 0)) / (seconds - last.seconds)]));
+      }
+      this.looks.set(key, now);
+    }
+    for (const sensor of store.status.sensors || []) {
+      const rows = (store.sensorRates ||= new Map()).get(sensor.name) || [];
+      if (rows.length && seconds - rows.at(-1)[0] < 0.4) continue;
+      store.sensorRates.set(sensor.name, [...rows.slice(-120), [seconds, sensor.rate_hz || 0]]);
+    }
+  }
+}
+
+export class Health {
+  constructor(nodes, store) {
+    this.nodes = nodes;
+    this.reset(store);
+  }
+
+  reset(store) {
+    this.store = store;
+    this.shownEvents = null;
+    for (const list of [this.nodes.neighbors, this.nodes.sensors, this.nodes.links, this.nodes.events]) list.replaceChildren();
+  }
+
+  draw(t, wallSeconds) {
+    this.drawNeighbors(t);
+    if (!this.store.isLive) return;
+    this.drawSensors(wallSeconds);
+    this.drawLinks();
+    this.drawEvents();
+    const { status } = this.store;
+    const share = status.uptime_s > 0 ? (100 * status.cpu_s) / status.uptime_s : NaN;
+    setText(this.nodes.load, status.self ? `${status.name}: up ${fixed(status.uptime_s, 0)} s, ${fixed(share, 1)} % of a core, ${fixed(status.rss_mb, 0)} MB` : "");
+  }
+
+  drawNeighbors(t) {
+    for (const neighbor of this.store.neighbors.values()) {
+      const { row } = this.store.poseAt(neighbor, t);
+      const about = (this.store.status.neighbors || []).find(({ peer }) => String(peer) === neighbor.key);
+      const reason = about?.reason || (this.store.isLive ? "no answer from the daemon" : "no row in the replay");
+      const faults = (about?.faults || []).join("; ");
+      const from = t - SPARK_SECONDS;
+      const rows = neighbor.rows.slice(Math.max(0, indexAt(neighbor.rows, from)), indexAt(neighbor.rows, t) + 1);
+      fill(tileIn(this.nodes.neighbors, neighbor.key), {
+        name: neighbor.name,
+        state: row ? MODES[row[MODE]] : reason,
+        isBad: !row || faults !== "",
+        advice: faults || (row ? "" : ADVICE[reason] || ""),
+        numbers: row ? `${length(norm(positionOf(row)))} away, σ ${length(row[SIGMA])}, ${fixed(degrees(row[SIGMA_ROTATION]), 2)} deg${this.store.isLive ? `, measured ${fixed(1000 * row[AGE], 0)} ms ago` : ""}` : "",
+        spark: { points: rows.map((each) => [each[T], each[SIGMA]]), from, to: t },
+      });
+    }
+  }
+
+  drawSensors(wallSeconds) {
+    const sensors = this.store.status.sensors || [];
+    for (const tile of [...this.nodes.sensors.children]) if (!sensors.some(({ name }) => name === tile.dataset.key)) tile.remove();
+    for (const sensor of sensors) {
+      const counts = [totals(sensor.faults), totals(sensor.counts)].filter(Boolean).join("; ");
+      fill(tileIn(this.nodes.sensors, sensor.name), {
+        name: sensor.name,
+        state: sensor.ok ? "ok" : "fault",
+        isBad: !sensor.ok,
+        advice: sensor.ok ? "" : sensor.message || "fault",
+        numbers: `${fixed(sensor.rate_hz || 0, 1)} Hz${counts ? `; ${counts}` : ""}`,
+        spark: { points: this.store.sensorRates?.get(sensor.name) || [], from: wallSeconds - SPARK_SECONDS, to: wallSeconds },
+      });
+    }
+  }
+
+  drawLinks() {
+    const head = ["neighbor", "heard ms ago", "lost %", "clock s", "± ms", "we see /s", "sees us /s", "ranges /s", "gated"];
+    const rows = (this.store.status.neighbors || []).map((neighbor) => {
+      const clock = (this.store.status.clocks || []).find(({ peer }) => peer === neighbor.peer) || {};
+      const { received = 0, lost = 0, age_s: age } = neighbor.reports || {};
+      const rates = this.store.neighbor(String(neighbor.peer)).rates || {};
+      const range = (rates.range ?? NaN) + (rates.peer_range ?? 0);
+      return [neighbor.name || String(neighbor.peer), fixed(1000 * age, 0), fixed((100 * lost) / (received + lost), 1), fixed(clock.offset_s, 6),
+        fixed(1000 * clock.sigma_s, 3), fixed(rates.bearing, 1), fixed(rates.peer_bearing, 1), fixed(range, 1), String(allOf(neighbor, "gated"))];
+    });
+    const table = this.nodes.links;
+    if (table.rows.length !== rows.length + 1) {
+      table.replaceChildren(element("thead", {}, element("tr", {}, ...head.map((text) => element("th", { scope: "col" }, text)))),
+        element("tbody", {}, ...rows.map((cells) => element("tr", {}, ...cells.map(() => element("td"))))));
+    }
+    rows.forEach((cells, i) => cells.forEach((text, j) => setText(table.rows[i + 1].cells[j], text)));
+    rows.forEach((cells, i) => table.rows[i + 1].cells[2].classList.toggle("bad", parseFloat(cells[2]) > 10));
+  }
+
+  drawEvents() {
+    const newest = this.store.events[0];
+    if (newest === this.shownEvents) return;
+    this.shownEvents = newest;
+    this.nodes.events.replaceChildren(...this.store.events.map(({ kind, text, time }) =>
+      element("li", { class: kind }, element("time", { datetime: time.toISOString() }, time.toLocaleTimeString()), element("span", {}, text))));
+  }
+}

@@ -1,0 +1,192 @@
+// What is known about the swarm as one robot sees it, live or recorded, and which instant is shown.
+
+// The columns of a row; see pose_row in view_json.hpp.
+export const T = 0;
+export const MODE = 1;
+export const P = 2;
+export const Q = 5;
+export const COV = 9;
+export const SIGMA = 15;
+export const SIGMA_ROTATION = 16;
+export const AGE = 17;
+export const RESETS = 18;
+export const MODES = ["direct", "graph", "predicted"];
+
+const LIVE_SECONDS = 300; // kept of a live swarm
+const STALE_SECONDS = 0.5; // an older pose is none
+const MAX_EVENTS = 200;
+
+export const positionOf = (row) => row.slice(P, P + 3);
+export const quaternionOf = (row) => row.slice(Q, Q + 4);
+export function covarianceOf(row) {
+  const [xx, xy, xz, yy, yz, zz] = row.slice(COV, COV + 6);
+  return [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+}
+
+/** The index of the last row at or before `t`; -1 if there is none. */
+export function indexAt(rows, t) {
+  let [low, high] = [0, rows.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (rows[middle][T] <= t) low = middle + 1;
+    else high = middle;
+  }
+  return low - 1;
+}
+
+export class Store {
+  constructor(isLive) {
+    this.isLive = isLive;
+    this.neighbors = new Map(); // by id (live) or name (replay)
+    this.ups = []; // rows of t, x, y, z
+    this.status = {};
+    this.events = [];
+    this.link = { ok: false, reason: "not connected yet" };
+    this.cursor = null; // the instant that is shown; null: the newest
+    this.hasTruth = false;
+    this.newest = null; // the time of the newest row, and when it came
+    this.rates = new Map(); // counts of the last two statuses: see health.js
+    this.version = 0; // grows with every change
+  }
+
+  changed() {
+    ++this.version;
+  }
+
+  neighbor(key, name) {
+    let found = this.neighbors.get(key);
+    if (!found) {
+      found = { key, name: name || `robot ${key}`, index: 0, rows: [], truth: [] };
+      this.neighbors.set(key, found);
+      // In the order of ids, so that colours do not depend on who was seen first.
+      const ordered = [...this.neighbors.values()].sort((a, b) =>
+        String(a.key).localeCompare(String(b.key), "en", { numeric: true }));
+      this.neighbors = new Map(ordered.map((each, index) => [each.key, Object.assign(each, { index })]));
+    }
+    if (name) found.name = name;
+    return found;
+  }
+
+  addReplay({ has_truth: hasTruth, up, neighbors }) {
+    this.hasTruth = hasTruth;
+    this.ups = up;
+    for (const { name, ...rows } of neighbors) Object.assign(this.neighbor(name, name), rows);
+    this.link = { ok: true };
+    this.cursor = Math.min(...neighbors.filter(({ rows }) => rows.length).map(({ rows }) => rows[0][T]), this.range()[1]);
+    this.changed();
+  }
+
+  addFrame({ t, up, rows }, wallSeconds) {
+    // A daemon or a machine that started again has another time.
+    if (this.newest && t < this.newest.t - 1) this.forget();
+    this.newest = { t: this.newest ? Math.max(t, this.newest.t) : t, wall: wallSeconds };
+    if (up) this.ups.push([t, ...up]);
+    for (const [id, row] of Object.entries(rows)) this.addRow(this.neighbor(id), row);
+    this.trim(t - LIVE_SECONDS);
+    this.changed();
+  }
+
+  addRow(neighbor, row) {
+    const last = neighbor.rows.at(-1);
+    if (last && row[T] <= last[T]) return;
+    if (last && row[RESETS] !== last[RESETS]) this.tell("reset", `${neighbor.name}: its filter started anew`);
+    if (last && row[T] - last[T] > 1) this.tell("found", `${neighbor.name}: located again (${MODES[row[MODE]]})`);
+    neighbor.rows.push(row);
+  }
+
+  trim(oldest) {
+    // Rarely, because it moves all that stays.
+    const cut = (rows) => {
+      if (rows.length > 100 && rows[0][T] < oldest - 10) rows.splice(0, indexAt(rows, oldest));
+    };
+    cut(this.ups);
+    for (const { rows } of this.neighbors.values()) cut(rows);
+  }
+
+  forget() {
+    this.ups = [];
+    for (const neighbor of this.neighbors.values()) neighbor.rows = [];
+    this.newest = null;
+    this.cursor = null;
+  }
+
+  /** A STATUS may be about a part: its lists replace ours, its neighbors and clocks join them. */
+  addStatus(status) {
+    const before = structuredClone(this.status);
+    const { neighbors = [], clocks = [], more = [], ...rest } = status;
+    Object.assign(this.status, rest);
+    const merge = (name, entries) => {
+      const known = new Map((this.status[name] || []).map((each) => [each.peer, each]));
+      for (const each of entries) known.set(each.peer, Object.assign(known.get(each.peer) || {}, { faults: undefined, reason: undefined }, each));
+      this.status[name] = [...known.values()].sort((a, b) => a.peer - b.peer);
+    };
+    merge("neighbors", neighbors.concat(more.map((peer) => ({ peer }))));
+    merge("clocks", clocks);
+    for (const { peer, name } of this.status.neighbors) this.neighbor(String(peer), name);
+    this.tellChanges(before, this.status);
+    this.changed();
+  }
+
+  tellChanges(before, after) {
+    if (!before.self) return;
+    if (after.uptime_s < before.uptime_s) this.tell("restart", `${after.name}: the daemon has started anew`);
+    if (after.config && before.config) {
+      if (after.config.generation > before.config.generation) this.tell("reload", "the configuration was reloaded");
+      if (after.config.fault && after.config.fault !== before.config.fault) this.tell("fault", `reload refused: ${after.config.fault}`);
+    }
+    for (const sensor of after.sensors || []) {
+      const was = (before.sensors || []).find(({ name }) => name === sensor.name);
+      if (was && was.ok !== sensor.ok) this.tell(sensor.ok ? "found" : "fault", `${sensor.name}: ${sensor.ok ? "works again" : sensor.message || "fault"}`);
+    }
+    for (const neighbor of after.neighbors) {
+      const was = (before.neighbors || []).find(({ peer }) => peer === neighbor.peer);
+      if (was && was.state !== "none" && neighbor.state === "none") this.tell("lost", `${neighbor.name}: no pose (${neighbor.reason})`);
+      for (const fault of neighbor.faults || []) if (was && !(was.faults || []).includes(fault)) this.tell("fault", `${neighbor.name}: ${fault}`);
+    }
+  }
+
+  setLink(link) {
+    if (link.ok !== this.link.ok) this.tell(link.ok ? "found" : "lost", link.ok ? "the daemon answers" : link.reason);
+    this.link = link;
+    this.changed();
+  }
+
+  tell(kind, text) {
+    this.events.unshift({ kind, text, time: new Date() });
+    this.events.length = Math.min(this.events.length, MAX_EVENTS);
+  }
+
+  /** First and last time of all rows. */
+  range() {
+    let [first, last] = [Infinity, -Infinity];
+    for (const { rows, truth } of this.neighbors.values()) {
+      for (const list of [rows, truth]) {
+        if (list.length) [first, last] = [Math.min(first, list[0][T]), Math.max(last, list.at(-1)[T])];
+      }
+    }
+    return first <= last ? [first, last] : [0, 1];
+  }
+
+  /** The instant that is shown. The newest one advances while nothing comes: poses grow old. */
+  now(wallSeconds) {
+    if (this.cursor !== null) return this.cursor;
+    return this.newest ? this.newest.t + Math.max(0, wallSeconds - this.newest.wall) : this.range()[1];
+  }
+
+  /** The neighbor's row at `t`, or null where it has no pose; `last` is the one before in any case. */
+  poseAt(neighbor, t) {
+    const last = neighbor.rows[indexAt(neighbor.rows, t)] || null;
+    return { row: last && t - last[T] <= STALE_SECONDS ? last : null, last };
+  }
+
+  truthAt(neighbor, t) {
+    const row = neighbor.truth[indexAt(neighbor.truth, t)];
+    return row && t - row[T] <= STALE_SECONDS ? row : null;
+  }
+
+  /** The vector against gravity in the body at `t`; null where it is not known. */
+  upAt(t) {
+    const row = this.ups[indexAt(this.ups, t)];
+    return row && t - row[T] <= 2 ? row.slice(1) : null;
+  }
+}

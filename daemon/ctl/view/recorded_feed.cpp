@@ -1,0 +1,181 @@
+#include "daemon/ctl/view/recorded_feed.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "daemon/ctl/view/view_json.hpp"
+#include "net/subscription/json_parts.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kRowPeriod_s = 0.04;    // what an eye needs
+constexpr double kTruthPeriod_s = 0.05;  // interpolated between
+constexpr std::size_t kMaxRows = 20000;  // of a pair; a longer replay is thinned further
+constexpr std::size_t kMaxRecords = 4000;
+
+/// What the observer saw of one neighbor.
+struct Seen {
+  std::string neighbor;
+  PairFiles files;
+};
+
+std::string joined(const std::vector<std::string>& rows) {
+  std::string text = "[";
+  for (const std::string& row : rows) text += (text.size() > 1 ? "," : "") + row;
+  return text + "]";
+}
+
+/// The time between two rows of which one is kept.
+Duration row_period(const std::vector<NeighborPose>& poses) {
+  if (poses.empty()) return {};
+  const double span_s = to_seconds(poses.back().stamp - poses.front().stamp);
+  return from_seconds(std::max(kRowPeriod_s, span_s / static_cast<double>(kMaxRows)));
+}
+
+template <class Seconds>
+std::string rows_of(const std::vector<NeighborPose>& poses, const Seconds& seconds) {
+  // Half a row early, because stamps are not exactly periodic.
+  const Duration period = row_period(poses) - from_seconds(0.01);
+  std::vector<std::string> rows;
+  std::optional<Timestamp> last;
+  for (const NeighborPose& pose : poses) {
+    if (last && pose.stamp - *last < period) continue;
+    last = pose.stamp;
+    if (std::string row = pose_row(seconds(pose.stamp), pose); !row.empty())
+      rows.push_back(std::move(row));
+  }
+  return joined(rows);
+}
+
+/// Every so many of the records that at most kMaxRecords remain.
+template <class Record, class Row>
+std::string record_rows(const std::vector<Record>& records, const Row& row) {
+  const std::size_t stride = records.size() / kMaxRecords + 1;
+  std::vector<std::string> rows;
+  for (std::size_t i = 0; i < records.size(); i += stride)
+    if (std::string text = row(records[i]); !text.empty()) rows.push_back(std::move(text));
+  return joined(rows);
+}
+
+std::string innovation_row(double t_s, const MeasurementRecord& record) {
+  const Fusion& fusion = record.fusion;
+  if (fusion.dimension == 0 || !std::isfinite(fusion.nis)) return {};
+  return fmt::format("[{:.3f},{},{},{:.3g}]", t_s, static_cast<int>(record.kind),
+                     static_cast<int>(fusion.verdict),
+                     fusion.nis / static_cast<double>(fusion.dimension));
+}
+
+std::string calibration_row(double t_s, const CalibrationRecord& record) {
+  std::string text = fmt::format("[{:.3f}", t_s);
+  for (const double value : record.value) {
+    if (!std::isfinite(value)) return {};
+    text += fmt::format(",{:.4g}", value);
+  }
+  return text + "]";
+}
+
+/// Calls `row` at each instant of the recording; what is not empty is a row.
+template <class Row>
+std::string truth_rows(double duration_s, const Row& row) {
+  const double period_s = std::max(kTruthPeriod_s, duration_s / static_cast<double>(kMaxRows));
+  std::vector<std::string> rows;
+  for (int i = 0; i * period_s <= duration_s; ++i)
+    if (std::string text = row(i * period_s); !text.empty()) rows.push_back(std::move(text));
+  return joined(rows);
+}
+
+}  // namespace
+
+Result<RecordedFeed> RecordedFeed::open(const fs::path& results, const fs::path& swarm) {
+  RecordedFeed feed;
+  feed.results_ = results;
+  feed.pairs_ = pairs_in(results);
+  std::error_code status;
+  if (fs::exists(results / "swarm.yaml", status)) {
+    return fail(ErrorCode::kNotFound,
+                fmt::format("{0}: a recording; replay it first: crepesctl replay {0} --out DIR",
+                            results.string()));
+  }
+  if (feed.pairs_.empty()) {
+    return fail(ErrorCode::kNotFound,
+                results.string() + ": no <observer>/<neighbor>.csv of a replay");
+  }
+  for (const PairName& pair : feed.pairs_) {
+    if (feed.observers_.empty() || feed.observers_.back() != pair.observer)
+      feed.observers_.push_back(pair.observer);
+  }
+  if (swarm.empty()) return feed;
+  auto manifest = load_manifest(swarm);
+  if (!manifest) return tl::unexpected(manifest.error());
+  auto truth = SwarmTruth::load(swarm, *manifest);
+  if (!truth) return tl::unexpected(truth.error());
+  feed.recording_ = Recording{std::move(*manifest), std::move(*truth)};
+  for (const PairName& pair : feed.pairs_) {
+    for (const std::string& name : {pair.observer, pair.neighbor}) {
+      if (feed.robot_named(name) != nullptr) continue;
+      return fail(ErrorCode::kNotFound,
+                  fmt::format("{}: no robot '{}', of which there are results in {}", swarm.string(),
+                              name, results.string()));
+    }
+  }
+  return feed;
+}
+
+const SwarmRobot* RecordedFeed::robot_named(const std::string& name) const {
+  if (!recording_) return nullptr;
+  const auto found = std::ranges::find(recording_->manifest.robots, name, &SwarmRobot::name);
+  return found == recording_->manifest.robots.end() ? nullptr : &*found;
+}
+
+Result<std::string> RecordedFeed::json_of(const std::string& observer) const {
+  std::vector<Seen> neighbors;
+  for (const PairName& pair : pairs_) {
+    if (pair.observer != observer) continue;
+    auto files = read_pair(results_, pair);
+    if (!files) return tl::unexpected(files.error());
+    neighbors.push_back({pair.neighbor, std::move(*files)});
+  }
+  Timestamp start = Timestamp::max();
+  for (const Seen& seen : neighbors)
+    if (!seen.files.poses.empty()) start = std::min(start, seen.files.poses.front().stamp);
+  const SwarmRobot* const B = robot_named(observer);
+  const auto seconds = [&](Timestamp t) {
+    return B != nullptr ? B->clock.true_s(t) : to_seconds(t - start);
+  };
+  const double duration_s = recording_ ? recording_->manifest.duration_s : -1.0;
+  const std::string up = truth_rows(duration_s, [&](double t) -> std::string {
+    const auto T_W_B = recording_->truth.pose(B->id, t);
+    if (!T_W_B) return {};
+    const Eigen::Vector3d up_B = T_W_B->q.conjugate() * Eigen::Vector3d::UnitZ();
+    return fmt::format("[{:.3f},{}", t, vector_row(up_B).substr(1));
+  });
+  std::vector<std::string> parts;
+  for (const auto& [name, files] : neighbors) {
+    const SwarmRobot* const N = robot_named(name);
+    const std::string truth = truth_rows(duration_s, [&](double t) -> std::string {
+      const auto T_B_N = recording_->truth.relative(B->id, N->id, B->clock.local(t));
+      return T_B_N ? truth_row(t, *T_B_N) : std::string();
+    });
+    const std::string innovations =
+        record_rows(files.measurements, [&](const MeasurementRecord& record) {
+          return innovation_row(seconds(record.stamp), record);
+        });
+    const std::string calibrations =
+        record_rows(files.calibrations, [&](const CalibrationRecord& record) {
+          return calibration_row(seconds(record.stamp), record);
+        });
+    parts.push_back(fmt::format(
+        R"({{"name":{},"rows":{},"truth":{},"innovations":{},"calibrations":{}}})",
+        dump(OrderedJson(name)), rows_of(files.poses, seconds), truth, innovations, calibrations));
+  }
+  return fmt::format(R"({{"has_truth":{},"up":{},"neighbors":{}}})", recording_.has_value(), up,
+                     joined(parts));
+}
+
+}  // namespace crepes

@@ -1,0 +1,27 @@
+/// crepesctl view: a page that shows a live swarm or a replay in a browser.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "net/client/daemon_client.hpp"
+
+namespace crepes {
+
+struct ViewOptions {
+  std::string listen = "127.0.0.1:8080";
+  DaemonAddress daemon;
+  std::vector<std::string> also;     ///< ADDRESS:PORT of further daemons
+  std::filesystem::path replay;      ///< empty: live
+  std::filesystem::path swarm;       ///< the data set with the truth of the replay
+  std::filesystem::path token_file;  ///< empty: a random token where one is needed
+  bool open = false;                 ///< start the desktop's browser
+  std::function<Result<void>(const std::string& url)> on_ready{};  ///< called once, when listening
+};
+
+/// Serves the page until a signal arrives. The daemon may start, stop and start again meanwhile.
+[[nodiscard]] Result<void> view(const ViewOptions& options);
+
+}  // namespace crepes

@@ -1,0 +1,87 @@
+"""A daemon that answers as config/docs/formats.md says: robots on circles, in a thread of this process."""
+import json
+import math
+import select
+import socket
+import threading
+import time
+
+
+def position_of(robot, t):
+    """Robot 2 is 2 m away, robot 3 is 2.5 m away, and so on; each on its circle."""
+    radius, angle = 1.0 + 0.5 * robot, 0.3 * t + 1.3 * robot
+    return {"x": radius * math.cos(angle), "y": radius * math.sin(angle), "z": 0.2 * robot}
+
+
+class FakeDaemon:
+    def __init__(self, neighbors=4, port=0, rate_hz=50):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", port))
+        self.port = self.socket.getsockname()[1]
+        self.neighbors = range(2, 2 + neighbors)
+        self.rate_hz = rate_hz
+        self.watchers = {}
+        self.is_over = False
+        self.lost = set()  # neighbors without a pose
+        self.broken = {}  # sensors by name, with what they say
+        self.sent = 0
+        self.start = time.monotonic()
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def stop(self):
+        self.is_over = True
+        self.thread.join()
+        self.socket.close()
+
+    def run(self):
+        due = time.monotonic()
+        while not self.is_over:
+            now = time.monotonic()
+            if now >= due:
+                due = max(due + 1 / self.rate_hz, now - 1)
+                self.send_poses(now)
+            while select.select([self.socket], [], [], max(0, due - time.monotonic()))[0]:
+                data, client = self.socket.recvfrom(2000)
+                self.answer(json.loads(data), client)
+
+    def send_poses(self, now):
+        self.watchers = {client: end for client, end in self.watchers.items() if end > now}
+        for robot in self.neighbors:
+            if robot in self.lost or not self.watchers:
+                continue
+            variance = [1e-4, 0, 0, 0, 0, 0, 4e-4, 0, 0, 0, 0, 9e-4, 0, 0, 0, 1e-5, 0, 0, 1e-5, 0, 1e-5]
+            pose = json.dumps({"class": "POSE", "seq": self.sent, "timestamp": now, "t_ns": str(int(now * 1e9)), "self": 1, "peer": robot,
+                               "name": f"r{robot}", "mode": ("direct", "graph", "predicted")[robot % 3], "position": position_of(robot, now),
+                               "orientation": {"w": 1, "x": 0, "y": 0, "z": 0}, "up": {"x": 0, "y": 0, "z": 1},
+                               "covariance": variance, "age_s": 0.01, "reset_counter": 1, "sources": ["range"]}).encode()
+            for client in self.watchers:
+                self.socket.sendto(pose, client)
+            self.sent += 1
+
+    def answer(self, request, client):
+        now = time.monotonic()
+        if request["class"] == "WATCH":
+            self.watchers[client] = now + 10 if request.get("enable", True) else now
+            reply = {"class": "VERSION", "release": "fake", "proto_major": 1, "proto_minor": 0, "lease_s": 10}
+        else:
+            reply = self.status(request, now)
+        self.socket.sendto(json.dumps(reply).encode(), client)
+
+    def status(self, request, now):
+        status = {"class": "STATUS", "self": 1, "name": "r1", "uptime_s": now - self.start, "cpu_s": 0.1 * (now - self.start), "rss_mb": 70,
+                  "config": {"generation": 1}}
+        if "about" not in request:
+            wanted = [r for r in self.neighbors if request.get("peer", r) == r]
+            status["neighbors"] = [self.neighbor(r, now) for r in wanted]
+            status["clocks"] = [{"peer": r, "offset_s": -10.0 * r, "skew_ppm": 3, "sigma_s": 2e-5} for r in wanted]
+        if "peer" not in request:
+            status["sensors"] = [{"name": name, "rate_hz": rate, "ok": name not in self.broken, **({"message": self.broken[name]} if name in self.broken else {})}
+                                 for name, rate in (("imu", 100.0), ("uwb", 40.0), ("cam0", 200.0))]
+        return status
+
+    def neighbor(self, robot, now):
+        count = int(20 * (now - self.start))
+        state = {"state": "none", "reason": "not seen"} if robot in self.lost else {"state": "direct"}
+        return {"peer": robot, "name": f"r{robot}", **state, "measurements": {"bearing": {"fused": count, "gated": count // 50}, "range": {"fused": count}},
+                "reports": {"received": count, "lost": count // 40, "restarts": 0, "age_s": 0.02}}

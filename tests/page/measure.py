@@ -1,0 +1,75 @@
+#!/usr/bin/python3
+"""What the page costs: its size, and the server's bytes and CPU with robots at 50 Hz and open pages.
+    tests/page/measure.py [SECONDS]"""
+import gzip
+import select
+import socket
+import sys
+import time
+
+from devtools import Browser, CannotStart
+from fake_daemon import FakeDaemon
+from viewer import SOURCE, Viewer
+
+
+def size_of_the_page():
+    texts = [file.read_bytes() for file in (SOURCE / "daemon/ctl/view/page").iterdir() if file.suffix != ".md"]
+    return sum(map(len, texts)), sum(len(gzip.compress(text)) for text in texts)
+
+
+def reader(viewer):
+    connection = socket.create_connection(("127.0.0.1", viewer.port), 10)
+    connection.sendall(f"GET /events?robot=0 HTTP/1.1\r\nHost: 127.0.0.1:{viewer.port}\r\n\r\n".encode())
+    return connection
+
+
+def cost(robots, pages, seconds):
+    """CPU of the server [share of a core] and bytes a second to one page."""
+    daemon = FakeDaemon(neighbors=robots - 1)
+    viewer = Viewer("--port", daemon.port)
+    readers = [reader(viewer) for _ in range(pages)]
+    time.sleep(1)
+    start, before, received = time.monotonic(), viewer.cpu_s(), 0
+    while time.monotonic() < start + seconds:
+        for connection in select.select(readers, [], [], 0.2)[0]:
+            received += len(connection.recv(1 << 20))
+    share = (viewer.cpu_s() - before) / (time.monotonic() - start)
+    for connection in readers:
+        connection.close()
+    viewer.stop()
+    daemon.stop()
+    return share, received / pages / seconds if pages else 0
+
+
+def first_picture():
+    """Seconds from the navigation to the first robot in the scene, the second time: the browser is warm."""
+    daemon = FakeDaemon(neighbors=4)
+    viewer = Viewer("--port", daemon.port)
+    browser = Browser()
+    took = []
+    for _ in range(3):
+        start = time.monotonic()
+        page = browser.page(viewer.url)
+        page.wait("globalThis.crepes && crepes.scene.robots.length > 0")
+        took.append(time.monotonic() - start)
+        latency = page.value("""new Promise((done) => { const seen = []; const look = () => {
+            if (crepes.store.newest && seen.at(-1) !== crepes.store.newest.wall) seen.push(crepes.store.newest.wall);
+            seen.length < 100 ? requestAnimationFrame(look) : done((seen.at(-1) - seen[0]) / (seen.length - 1)); }; look(); })""")
+        page.close()
+    browser.close()
+    viewer.stop()
+    daemon.stop()
+    return took, latency
+
+
+if __name__ == "__main__":
+    duration = float(sys.argv[1]) if len(sys.argv) > 1 else 10
+    print("page: {} bytes, {} compressed".format(*size_of_the_page()))
+    for robots, pages in ((2, 1), (5, 0), (5, 1), (5, 10), (20, 1), (20, 10)):
+        share, rate = cost(robots, pages, duration)
+        print(f"{robots} robots, {pages} pages: {100 * share:.1f} % of a core, {rate / 1000:.1f} kB/s to each page")
+    try:
+        times, period = first_picture()
+        print(f"first robot in the scene after {', '.join(f'{t:.2f}' for t in times)} s; frames every {1000 * period:.0f} ms")
+    except CannotStart as why:
+        print(why)

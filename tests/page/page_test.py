@@ -1,0 +1,238 @@
+#!/usr/bin/python3
+"""The page of crepesctl view in a real browser: what it draws, read back."""
+import json
+import math
+import sys
+import tempfile
+import time
+import unittest
+from urllib.parse import urlsplit
+
+from devtools import Browser, CannotStart
+from fake_daemon import FakeDaemon, position_of
+from viewer import RECORDING, Viewer, replayed
+
+class PageTest(unittest.TestCase):
+    """A page per test; whatever it does, it neither complains nor speaks to any other host."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.browser = Browser()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+
+    def open(self, viewer, **options):
+        page = self.browser.page(viewer.url, **options)
+        self.addCleanup(self.check, page, viewer)
+        page.wait("globalThis.crepes && crepes.scene.robots.length > 0", "robots in the scene")
+        return page
+
+    def check(self, page, viewer, expected=()):
+        complaints = [text for text in page.complaints() if not any(part in text for part in expected)]
+        self.assertEqual(complaints, [])
+        hosts = {urlsplit(url).netloc for url in page.requests() if not url.startswith(("blob:", "data:"))}
+        self.assertEqual(hosts, {f"127.0.0.1:{viewer.port}"})
+        page.close()
+
+
+class Live(PageTest):
+    def setUp(self):
+        self.daemon = FakeDaemon(neighbors=4)
+        self.viewer = Viewer("--port", self.daemon.port)
+
+    def tearDown(self):
+        self.viewer.stop()
+        self.daemon.stop()
+
+    def test_robots_stand_where_the_poses_are(self):
+        page = self.open(self.viewer)
+        page.wait("crepes.scene.robots.length === 4 && crepes.scene.isLevel", "four robots")
+        shown = page.value("crepes.scene.robots.map(({ name, mode, stamp, position }) => ({ name, mode, stamp, position }))")
+        for robot in shown:
+            true = position_of(int(robot["name"][1:]), robot["stamp"])
+            # Stamps and positions are rounded to a millisecond and a tenth of a millimetre.
+            self.assertLess(math.dist(robot["position"], true.values()), 0.003, robot)
+        self.assertEqual({robot["mode"] for robot in shown}, {"direct", "graph", "predicted"})
+
+    def test_charts_move_and_pause(self):
+        page = self.open(self.viewer)
+        page.wait("crepes.charts.figures[0].lines?.[0]?.points.length > 10", "points in the charts")
+        points = "crepes.charts.figures[0].lines[0].points.at(-1)[0]"
+        before = page.value(points)
+        page.wait(f"{points} > {before}", "moving charts")
+        page.key(" ")
+        page.wait("crepes.store.cursor !== null", "a pause")
+        page.wait("!document.getElementById('live').hidden", "the way back")
+        page.key("End")
+        page.wait("crepes.store.cursor === null", "the newest again")
+
+    def test_a_stopped_daemon_is_shown_and_found_again(self):
+        page = self.open(self.viewer)
+        page.wait("crepes.store.link.ok")
+        port = self.daemon.port
+        self.daemon.stop()
+        # In two seconds; the rest is for the machine on which this runs.
+        took = page.wait("document.getElementById('link').classList.contains('bad')", "a warning")
+        print(f"a stopped daemon is shown after {took:.2f} s", file=sys.stderr)
+        self.assertIn("is crepesd running there?", page.value("document.getElementById('link').textContent"))
+        page.wait("crepes.scene.robots.every(({ mode }) => mode === 'none')", "no poses")
+        self.daemon = FakeDaemon(neighbors=4, port=port)
+        page.wait("crepes.store.link.ok && crepes.scene.robots.some(({ mode }) => mode !== 'none')", "poses again")
+
+    def test_a_stopped_server_is_shown_and_found_again(self):
+        page = self.browser.page(self.viewer.url)
+        self.addCleanup(self.check, page, self.viewer, expected=("ERR_",))
+        page.wait("globalThis.crepes && crepes.store.link.ok")
+        self.viewer.stop()
+        page.wait("!crepes.store.link.ok", "a warning")
+        self.viewer = Viewer("--port", self.daemon.port, listen=f"127.0.0.1:{self.viewer.port}")
+        page.wait("crepes.store.link.ok", "the connection again")
+
+    def test_reasons_and_advice_are_shown(self):
+        page = self.open(self.viewer, width=1280)
+        page.wait("document.querySelectorAll('#sensors .tile').length === 3", "tiles of sensors")
+        self.daemon.lost.add(3)
+        self.daemon.broken["uwb"] = "no such file: plug it in"
+        page.wait("document.querySelector('#sensors .bad')?.textContent.includes('plug it in')", "the sensor's advice")
+        page.wait("document.querySelector('#neighbors .bad')?.textContent.includes('Are its LEDs on?')", "the neighbor's advice")
+        page.wait("document.querySelectorAll('#links tbody tr').length === 4", "links")
+        page.wait("/r3: no pose .*not seen/.test(document.getElementById('events').textContent)", "the event")
+
+    def test_a_screen_reader_finds_names(self):
+        page = self.open(self.viewer, width=1280)
+        page.wait("document.querySelectorAll('#sensors .tile').length === 3", "tiles")
+        found = page.accessible()
+        unnamed = [role for role, name in found if role in ("button", "combobox", "checkbox", "slider", "image", "img") and not name.strip()]
+        self.assertEqual(unnamed, [])
+        names = {name for _, name in found}
+        for name in ("Scene", "Health", "Time", "Neighbors", "Sensors", "Robot whose view is shown", "Pause", "distance"):
+            self.assertIn(name, names)
+        self.assertTrue(any(name.startswith("Scene: r2: ") for name in names), names)
+
+    def test_nothing_overflows_from_a_phone_to_a_wall(self):
+        page = self.open(self.viewer)
+        for width, height in ((360, 640), (768, 1024), (1280, 720), (3840, 2160)):
+            page.size(width, height)
+            for key in "231":
+                page.key(key)
+                page.wait(f"innerWidth === {width}")
+                self.assertLessEqual(page.value("document.documentElement.scrollWidth"), width, f"{width}, panel {key}")
+                self.assertLessEqual(page.value("document.documentElement.scrollHeight"), height, f"{width}, panel {key}")
+
+    def test_dark_and_light_follow_the_system_and_the_user(self):
+        page = self.open(self.viewer, dark=True)
+        self.assertEqual(page.value("document.documentElement.dataset.theme"), "dark")
+        page.key("d")
+        self.assertEqual(page.value("document.documentElement.dataset.theme"), "light")
+
+    def test_twenty_robots_are_drawn_fluently(self):
+        self.viewer.stop()
+        self.daemon.stop()
+        self.daemon = FakeDaemon(neighbors=19)
+        self.viewer = Viewer("--port", self.daemon.port)
+        page = self.open(self.viewer)
+        page.wait("crepes.scene.robots.length === 19", "all robots")
+        milliseconds = page.value("""(() => { const start = performance.now(); const t = crepes.store.now(start / 1000);
+            for (let i = 0; i < 20; ++i) crepes.scene.draw(t); return (performance.now() - start) / 20; })()""")
+        print(f"a scene of 20 robots is drawn in {milliseconds:.1f} ms", file=sys.stderr)
+
+
+class Replay(PageTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.directory = tempfile.TemporaryDirectory()
+        cls.viewer = Viewer(replayed(cls.directory.name), "--truth", RECORDING)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.viewer.stop()
+        cls.directory.cleanup()
+        super().tearDownClass()
+
+    def test_the_slider_moves_robots_and_truth(self):
+        page = self.open(self.viewer)
+        shown = []
+        for t in (5, 15):
+            page.value(f"""(() => {{ const slider = document.getElementById('slider'); slider.value = {t};
+                slider.dispatchEvent(new Event('input', {{ bubbles: true }})); }})()""")
+            page.wait(f"crepes.scene.time === {t} && crepes.scene.robots[0].error !== undefined", "the slider's instant")
+            shown.append(page.value("({ p: crepes.scene.robots[0].position, error: crepes.scene.robots[0].error })"))
+        self.assertGreater(math.dist(shown[0]["p"], shown[1]["p"]), 0.1)
+        # What the recording is good for: `crepesctl evaluate` says at most 0.07 m.
+        self.assertLess(max(each["error"] for each in shown), 0.1)
+
+    def test_play_moves_the_slider(self):
+        page = self.open(self.viewer)
+        page.value("crepes.seek(3)")
+        page.key(" ")
+        page.wait("crepes.store.cursor > 3.2", "a later instant")
+
+    def test_a_click_on_a_robot_shows_its_own_view(self):
+        page = self.open(self.viewer)
+        page.value("crepes.seek(10)")
+        page.wait("crepes.scene.time === 10 && crepes.scene.robots[0].pixel[0] > 0", "a robot in the picture")
+        box = page.value("(({ x, y }) => [x, y])(document.getElementById('scene-canvas').getBoundingClientRect())")
+        pixel = page.value("crepes.scene.robots[0].pixel")
+        page.click(box[0] + pixel[0], box[1] + pixel[1])
+        page.wait("document.getElementById('robot').selectedOptions[0].text === 'r2' && crepes.scene.robots[0]?.name === 'r1'", "the other's view")
+
+    def test_what_is_shown_can_be_saved(self):
+        page = self.open(self.viewer)
+        page.wait("crepes.charts.figures[0].lines?.length > 0", "charts")
+        lines = page.value("crepes.charts.csv(crepes.store.now(0))").splitlines()
+        self.assertEqual(lines[0], "t_s,neighbor,panel,unit,line,value")
+        self.assertGreater(len(lines), 1000)
+        self.assertTrue(all(math.isfinite(float(line.rsplit(",", 1)[1])) for line in lines[1:]))
+        everything = len(lines)
+        page.value("crepes.charts.zoom(0.2)")
+        self.assertLess(len(page.value("crepes.charts.csv(crepes.store.now(0))").splitlines()), everything / 3)
+
+    def test_innovations_and_biases_have_charts(self):
+        page = self.open(self.viewer)
+        page.value("crepes.charts.setFocus('r2'); crepes.seek(10)")
+        page.wait("crepes.charts.figures.length > 10 && crepes.charts.figures.every(({ lines }) => lines?.some(({ points }) => points.length > 100))",
+                  "charts of all records")
+
+    def test_the_outline_of_an_ellipsoid_is_that_of_its_points(self):
+        page = self.open(self.viewer)
+        # The farthest point of the ellipsoid's surface in any direction of the picture lies on the outline.
+        worst = page.value("""(async () => {
+            const { Camera } = await import('/geometry.js');
+            const camera = new Camera();
+            camera.resize(800, 600);
+            [camera.azimuth, camera.elevation, camera.distance] = [0.4, 0.5, 6];
+            camera.update();
+            const P = [[0.09, 0.02, 0], [0.02, 0.04, 0.01], [0, 0.01, 0.02]];
+            // Cholesky: the surface is p + 2 L u for unit u.
+            const a = Math.sqrt(P[0][0]), b = P[1][0] / a, c = Math.sqrt(P[1][1] - b * b), d = P[2][0] / a;
+            const e = (P[2][1] - d * b) / c, f = Math.sqrt(P[2][2] - d * d - e * e);
+            const p = [1, 0.5, 0.3];
+            const outline = camera.ellipse(p, P, 2);
+            let worst = 0;
+            for (let k = 0; k < 16; ++k) {
+              const [dx, dy] = [Math.cos(k * Math.PI / 8), Math.sin(k * Math.PI / 8)];
+              let reach = -Infinity;
+              for (let i = 0; i <= 400; ++i) for (let j = 0; j < 800; ++j) {
+                const z = 1 - i / 200, r = Math.sqrt(Math.max(0, 1 - z * z)), u = [r * Math.cos(j * Math.PI / 400), r * Math.sin(j * Math.PI / 400), z];
+                const q = [p[0] + 2 * a * u[0], p[1] + 2 * (b * u[0] + c * u[1]), p[2] + 2 * (d * u[0] + e * u[1] + f * u[2])];
+                const [x, y] = camera.pixel(camera.see(q));
+                reach = Math.max(reach, (x - outline.x) * dx + (y - outline.y) * dy);
+              }
+              const [ca, sa] = [Math.cos(outline.angle), Math.sin(outline.angle)];
+              const support = Math.hypot(outline.a * (ca * dx + sa * dy), outline.b * (ca * dy - sa * dx));
+              worst = Math.max(worst, Math.abs(reach - support));
+            }
+            return worst; })()""")
+        self.assertLess(worst, 0.05)  # px; the sampling of the surface
+
+
+if __name__ == "__main__":
+    try:
+        Browser().close()
+    except CannotStart as why:
+        print(f"skipped: {why}")
+        sys.exit(77)  # as ctest knows it
+    unittest.main(verbosity=2)
