@@ -8,13 +8,13 @@
 namespace crepes {
 namespace {
 
-constexpr double kPeakAtOneMeter = 7500.0;  // gray levels
-constexpr double kFaintest = 0.1;           // gray levels; fainter light is ignored
-constexpr std::size_t kGrain = 1U << 16U;   // a power of two
-constexpr int kStepsPerExposure = 12;       // when it is long
-constexpr double kShortExposure = 0.0003;   // s
-constexpr double kEdge = 0.5;               // px, softness of a disc
-constexpr double kGlare = 3000.0;           // gray levels
+constexpr double kLedPeakAtOneMeter = 7500.0;   // gray levels
+constexpr double kFaintestLight = 0.1;          // gray levels; fainter light is ignored
+constexpr std::size_t kNoiseDraws = 1U << 16U;  // a power of two
+constexpr int kStepsPerExposure = 12;           // when it is long
+constexpr double kShortExposure = 0.0003;       // s
+constexpr double kEdge = 0.5;                   // px, softness of a disc
+constexpr double kGlare = 3000.0;               // gray levels
 
 std::uint8_t to_gray(double level) {
   return static_cast<std::uint8_t>(std::clamp(level + 0.5, 0.0, 255.0));
@@ -36,7 +36,8 @@ class PointImage {
   }
   [[nodiscard]] int reach(double peak) const {
     if (radius_ > 0.0) return static_cast<int>(std::ceil(radius_ + 10.0 * kEdge));
-    return static_cast<int>(std::ceil(sigma_ * std::sqrt(2.0 * std::log(peak / kFaintest)))) + 1;
+    return static_cast<int>(std::ceil(sigma_ * std::sqrt(2.0 * std::log(peak / kFaintestLight)))) +
+           1;
   }
 
  private:
@@ -63,7 +64,7 @@ Eigen::Vector3d LedBoard::p_M_led(int led) const {
 BoardRenderer::BoardRenderer(CameraModel camera, const PictureEffects& effects, std::uint64_t seed)
     : camera_(std::move(camera)), effects_(effects), noise_{0x73656eU, seed} {
   light_.assign(static_cast<std::size_t>(camera_.width() * camera_.height()), 0.0F);
-  for (std::size_t i = 0; i < kGrain; ++i)
+  for (std::size_t i = 0; i < kNoiseDraws; ++i)
     grain_.push_back(
         static_cast<std::int8_t>(std::lround(effects_.read_noise * noise_.gaussian(i))));
   add_background();
@@ -81,7 +82,7 @@ void BoardRenderer::add_background() {
     for (int u = 0; u < camera_.width(); ++u)
       background_.push_back(to_gray(effects_.background + (glare ? glare_at(u, v) : 0.0)));
   for (int i = 0; i < effects_.hot_pixels; ++i) {
-    const auto k = kGrain + 3 * static_cast<std::uint64_t>(i);
+    const auto k = kNoiseDraws + 3 * static_cast<std::uint64_t>(i);
     const auto place =
         static_cast<std::size_t>(noise_.uniform(k) * static_cast<double>(background_.size()));
     background_[place] = to_gray(30.0 + 220.0 * noise_.uniform(k + 1));
@@ -97,8 +98,8 @@ const std::vector<std::uint8_t>& BoardRenderer::render(double t_s) {
   const auto width = static_cast<std::size_t>(camera_.width());
   for (std::size_t v = 0; v < static_cast<std::size_t>(camera_.height()); ++v) {
     const int shift = static_cast<int>(std::lround(effects_.row_noise * noise.gaussian(v)));
-    const auto from =
-        static_cast<std::size_t>(noise.uniform(v + 10'000) * static_cast<double>(kGrain - width));
+    const auto from = static_cast<std::size_t>(noise.uniform(v + 10'000) *
+                                               static_cast<double>(kNoiseDraws - width));
     std::uint8_t* row = pixels_.data() + v * width;
     const std::int8_t* grain = grain_.data() + from;
     const float* light = light_.data() + v * width;
@@ -144,14 +145,14 @@ void BoardRenderer::expose(const MovingBoard& moving, std::uint64_t index, doubl
       const double of_led =
           is_veil ? board.veil
                   : 1.0 + board.led_spread * gain.gaussian(static_cast<std::uint64_t>(led));
-      add_point(*uv, of_led * effects_.light * kPeakAtOneMeter * cosine /
+      add_point(*uv, of_led * effects_.light * kLedPeakAtOneMeter * cosine /
                          (std::max(p_C.squaredNorm(), 0.01) * steps));
     }
   }
 }
 
 void BoardRenderer::add_point(const Eigen::Vector2d& uv, double peak) {
-  if (peak <= kFaintest) return;
+  if (peak <= kFaintestLight) return;
   const PointImage image(effects_);
   const int reach = image.reach(peak);
   const auto u0 = static_cast<int>(std::lround(uv.x()));
