@@ -252,7 +252,7 @@ void code_imu(Stream& stream, CodedImu& imu) {
   }
 }
 
-/// A component of a direction, extrapolated to `ages[2]` from those of the ages before.
+/// A component of the direction of bearing `i`, extrapolated from the two before it.
 [[nodiscard]] inline std::int64_t extrapolated(const std::vector<CodedBearing>& bearings,
                                                std::size_t i, std::size_t component) {
   constexpr std::int64_t kMaxRatio = 4;

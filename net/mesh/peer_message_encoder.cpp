@@ -153,7 +153,7 @@ class Quantizer {
  private:
   [[nodiscard]] std::int64_t age_of(Timestamp stamp) const { return base_tick_ - tick_of(stamp); }
 
-  /// What can be written and is not older than its last copy.
+  /// What can be written and is not too old.
   template <class Item>
   std::vector<const Item*> newest_first(const std::vector<Item>& items) {
     std::vector<const Item*> chosen;
