@@ -19,7 +19,8 @@ void append_rows(std::string& text, const ImuSample& sample);
 void append_rows(std::string& text, const UwbRange& range);
 /// One row per spot. A frame without spots is one row.
 void append_rows(std::string& text, const SpotFrame& frame);
-/// A bearing in the picture of `frame`, at the pixel `u_px`, `v_px`. `how`: read or predicted.
+/// A bearing in the picture of `frame`, at the pixel `u_px`, `v_px`. `how` is always read: the
+/// tracker reports a robot only while its blinking is read.
 void append_bearing_row(std::string& text, Timestamp frame, const Bearing& bearing, double u_px,
                         double v_px);
 

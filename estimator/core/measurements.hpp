@@ -44,7 +44,6 @@ struct BasicBearing {
   Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();   ///< unit direction, observer's body axes
   Eigen::Vector3d p_B_C = Eigen::Vector3d::Zero();  ///< the camera's optical center in the body [m]
   double sigma_rad = 0.0;                           ///< one sigma across the direction
-  bool is_predicted = false;  ///< named by where and when it blinks, not by its code alone
 };
 
 /// The direction of up. Gravity determines roll and pitch only.
