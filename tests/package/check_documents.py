@@ -24,7 +24,8 @@ tools = {command: told(crepesctl, command, "--help") for command in commands_in(
 for command in list(tools):
     if "Subcommands:" in tools[command]:
         tools[command] += "".join(told(crepesctl, command, inner, "--help") for inner in commands_in(tools[command]))
-pages = [source / "README.md", *sorted(source.glob("config/docs/**/*.md")), *sorted(source.glob("systemd/*.md"))]
+pages = [source / "README.md", *sorted(source.glob("config/docs/**/*.md")), *sorted(source.glob("systemd/*.md")),
+         source / "firmware/HARDWARE.md", *sorted(source.glob("config/examples/*/README.md"))]
 keys = {key.path for key in keys_of((source / "config/crepesd.yaml").read_text())}
 sections = {key.split(".")[0] for key in keys}
 keys_named = calls = 0

@@ -91,8 +91,8 @@ def give_key():
     """Follows systemd/MESH.md for this robot and its neighbor."""
     made = run("crepesctl", "keygen", "/crepes/mesh.key")
     run("install", "-m640", "-gcrepes", "/crepes/mesh.key", "/etc/crepes/")
+    pathlib.Path("/crepes/r2.d").mkdir()
     for fragments in (pathlib.Path("/etc/crepes/crepesd.d"), pathlib.Path("/crepes/r2.d")):
-        fragments.mkdir(exist_ok=True)
         (fragments / "20-key.yaml").write_text("net: {key_file: /etc/crepes/mesh.key}\n")
     return made.stdout.split()[-1]
 
