@@ -123,18 +123,20 @@ def board(robot):
 
 
 def cameras(robot):
-    """Each camera's fragment is laid over the two robots' configuration."""
-    files = sorted((robot.root / "usr/share/doc/crepes/examples/cameras").glob("*.yaml"))
-    expect("no cameras", len(files) >= 4)
-    fragment = robot.root / "etc/crepes/crepesd.d/10-camera.yaml"
-    fragment.parent.mkdir(exist_ok=True)
-    for file in files:
-        fragment.write_text(file.read_text())
+    """Each camera's files are laid over the two robots' configuration, and all that they say is in force."""
+    folders = sorted(file.parent for file in (robot.root / "usr/share/doc/crepes/examples/cameras").glob("*/10-camera.yaml"))
+    expect("no cameras", len(folders) >= 4)
+    (robot.root / "etc/crepes/crepesd.d").mkdir(exist_ok=True)
+    for folder in folders:
+        texts = {place: (folder / pathlib.Path(place).name).read_text() for place in ("crepesd.d/10-camera.yaml", "camchain-imucam.yaml")}
+        for place, text in texts.items():
+            (robot.root / "etc/crepes" / place).write_text(text)
         dump = robot.configuration()
-        driver = re.search(r"^    driver: (\w+)", file.read_text(), re.MULTILINE)[1]
-        expect(f"{file.name}: its driver is not in force", f"    driver: {driver}\n" in dump)
-        expect(f"{file.name}: more than one camera", dump.count("    camera_model: ") == 1)
-        fragment.unlink()
+        settings = re.findall(r"^ +((?:driver|rate_hz|exposure_us|intrinsics|resolution): .*)$", "\n".join(texts.values()), re.MULTILINE)
+        expect(f"{folder.name}: says too little", len(settings) >= 4)
+        for setting in settings:
+            expect(f"{folder.name}: not in force: {setting}", f"    {setting}\n" in dump)
+        expect(f"{folder.name}: more than one camera", dump.count("    camera_model: ") == 1)
 
 
 def main():
