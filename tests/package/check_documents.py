@@ -52,10 +52,13 @@ readme = (source / "README.md").read_text()
 faults += [f"README.md: nothing of crepesctl {command}" for command in tools if not re.search(rf"^(eval .*)?crepesctl {command}\b", readme, re.MULTILINE)]
 rows = (source / "daemon/ctl/README.md").read_text()
 faults += [f"daemon/ctl/README.md: nothing of {command}" for command in tools if f"`{command}`" not in rows]
+pins = set(re.findall(r"\bPA\d+\b", (source / "firmware/led_board/README.md").read_text()))
+for file in ("firmware/HARDWARE.md", "firmware/pictures/led_board.svg"):
+    faults += [f"{file}: nothing of {pin}, which the firmware uses" for pin in sorted(pins) if not re.search(rf"\b{pin}\b", (source / file).read_text())]
 completion, manual = told(crepesctl, "completion", "bash"), "\n".join(tool(crepesctl)).replace("\\-", "-")
 for command, text in tools.items():
     faults += [f"completion: nothing of {option} of {command}" for option in sorted(options_in(text)) if option not in completion]
     faults += [f"crepesctl.1: nothing of {option} of {command}" for option in sorted(options_in(text)) if option not in manual]
-assert len(pages) > 10 and keys_named > 50 and len(options) > 4 and len(tools) > 15 and calls > 30, "looked at too little to mean anything"
+assert len(pins) == 8 and len(pages) > 10 and keys_named > 50 and len(options) > 4 and len(tools) > 15 and calls > 30, "looked at too little to mean anything"
 print("\n".join(faults) or f"{len(pages)} pages, {keys_named} keys, {len(options)} options, {len(tools)} commands, {calls} calls: all as they are")
 sys.exit(bool(faults))
