@@ -585,13 +585,16 @@ bool TeamFilter::correct(const TeamInterval& interval, Stage stage, Readings rea
   Trajectories paths = trajectories(interval);
   gate(interval, paths, readings);
   std::vector<TeamRow> linearized = rows(interval, paths, readings);
-  if (linearized.empty()) return true;
-
   const std::vector<bool> corrected = corrected_states(stage);
   const std::map<RobotId, TeamRobot> robots = robots_;
   const std::map<Pair, TeamRangeBias> ranges = ranges_;
   Eigen::VectorXd dx = Eigen::VectorXd::Zero(P_.rows());
   for (int iteration = 1;; ++iteration) {
+    if (linearized.empty()) {  // the last step may have made all ranges unlikely
+      robots_ = robots;
+      ranges_ = ranges;
+      return true;
+    }
     const TeamUpdate update(linearized, P_);
     if (!update.is_valid()) return false;
     Eigen::VectorXd next = update.correction(linearized, dx);
