@@ -9,11 +9,10 @@
 
 namespace crepes {
 
-/// Writes a random key to a new file that only its owner may read and write. An existing file is
-/// never changed. An incompletely written file is removed.
+/// Writes a random key to a new file (`write_key_file`).
 [[nodiscard]] Result<MeshKey> write_mesh_key(const std::filesystem::path& file);
 
-/// Refuses a file that is not a key, and a file that every user of the robot may read or write.
+/// Refuses what `read_key_file` refuses.
 [[nodiscard]] Result<MeshKey> read_mesh_key(const std::filesystem::path& file);
 
 /// Eight hexadecimal digits by which people see that two robots have the same key. The key cannot

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <tuple>
 
+#include "config/keys/robot_key.hpp"
 #include "config/reading/config_reader.hpp"
 #include "config/reading/config_sources.hpp"
 #include "config/schema/plausibility.hpp"
@@ -28,6 +29,21 @@ void add_rule_faults(const Config& config, ReadLog& log) {
       return is_inside(path, rule.key) || is_inside(rule.key, path);
     });
     if (!is_reported) log.fault(rule.key, std::move(rule.reason));
+  }
+}
+
+/// Adds a fault if the robot's key is not the one that the others know. `config` keeps all rules.
+void add_key_fault(const Config& config, ReadLog& log) {
+  const std::vector<MemberConfig>& members = config.swarm.members;
+  const auto own = std::ranges::find(members, config.robot.id, &MemberConfig::id);
+  if (config.net.robot_key_file.empty() || own == members.end() || !own->public_key) return;
+  const Result<RobotKey> key = read_robot_key(config.net.robot_key_file);
+  if (!key) return log.fault("net.robot_key_file", key.error().message);
+  const std::string known = to_text(public_key_of(*key));
+  if (known != *own->public_key) {
+    log.fault("net.robot_key_file",
+              fmt::format("its public key is {}, swarm.members has another one for this robot: {}",
+                          known, *own->public_key));
   }
 }
 
@@ -64,6 +80,7 @@ CheckedConfig read_config(const ConfigNode& root, std::vector<ConfigFault> fault
     checked.config.visit(reader);
     reader.finish();
     if (root.is_mapping()) add_rule_faults(checked.config, log);
+    if (log.faults.empty() && faults.empty()) add_key_fault(checked.config, log);
   }
   std::ranges::move(log.faults, std::back_inserter(faults));
   std::ranges::stable_sort(

@@ -10,6 +10,7 @@
 
 #include "config/calibration/imported_calibration.hpp"
 #include "config/keys/mesh_key.hpp"
+#include "config/keys/robot_key.hpp"
 #include "drivers/base/text_file.hpp"
 #include "estimator/core/result.hpp"
 
@@ -168,21 +169,24 @@ void add_imu_calibration(ConfigNode& root, ConfigFaults& faults) {
   add_missing_keys(*imu, has_imu ? sections.extract("imu") : ConfigNode{});
 }
 
-/// The key stays in its file. Whether it can be read is checked before the daemon starts.
-void place_key_file(ConfigNode& root, ConfigFaults& faults) {
+/// Keys stay in their files. Whether they can be read is checked before the daemon starts.
+template <class Key>
+void place_key_file(ConfigNode& root, std::string_view key, Result<Key> (*read)(const fs::path&),
+                    ConfigFaults& faults) {
   ConfigNode* const net = root.find("net");
-  ConfigNode* const name = net == nullptr ? nullptr : net->find("key_file");
+  ConfigNode* const name = net == nullptr ? nullptr : net->find(key);
   if (name == nullptr || !name->is_text() || name->text.empty()) return;
   const fs::path file = fs::path(name->place.file).parent_path() / name->text;
-  const Result<MeshKey> key = read_mesh_key(file);
-  if (!key) return add_fault(name->place, "net.key_file", key.error().message, faults);
+  if (const Result<Key> found = read(file); !found)
+    return add_fault(name->place, fmt::format("net.{}", key), found.error().message, faults);
   name->text = file.string();
 }
 
 ConfigNode with_references(ConfigNode root, ConfigFaults& faults) {
   add_members(root, faults);
   add_imu_calibration(root, faults);
-  place_key_file(root, faults);
+  place_key_file(root, "key_file", read_mesh_key, faults);
+  place_key_file(root, "robot_key_file", read_robot_key, faults);
   if (ConfigNode* const cameras = root.find("cameras"); cameras != nullptr && cameras->is_list()) {
     for (std::size_t i = 0; i < cameras->items.size(); ++i)
       add_camera_calibration(cameras->items[i], fmt::format("cameras[{}]", i), faults);

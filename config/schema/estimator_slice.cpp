@@ -15,6 +15,10 @@ EstimatorSettings estimator_settings(const Config& config) {
                              .graph_rate_hz = config.graph.rate_hz,
                              .uses_team_filter = config.graph.method == TeamMethod::kTeamFilter,
                              .team_size = static_cast<std::size_t>(config.graph.team_size)};
+  for (MemberConfig& member : settings.swarm.members) {
+    member.public_key.reset();  // estimation does not depend on who may speak
+    member.excluded = false;
+  }
   for (const CameraConfig& camera : config.cameras) settings.cameras.push_back(camera.calibration);
   return settings;
 }

@@ -14,4 +14,14 @@ SendSettings send_settings(const Config& config) {
           .session_salt = 0};
 }
 
+MeshTrust mesh_trust(const Config& config) {
+  MeshTrust trust;
+  for (const MemberConfig& member : config.swarm.members) {
+    if (member.excluded) trust.excluded.insert(member.id);
+    if (member.excluded || !member.public_key) continue;
+    if (const auto key = parse_public_key(*member.public_key)) trust.keys.emplace(member.id, *key);
+  }
+  return trust;
+}
+
 }  // namespace crepes

@@ -1,7 +1,8 @@
-/// The part of a configuration that decides what is sent to peers.
+/// The parts of a configuration that decide what is sent to peers, and what of theirs is believed.
 #pragma once
 
 #include "config/schema/config.hpp"
+#include "net/mesh/mesh_trust.hpp"
 #include "net/mesh/send_pacing.hpp"
 
 namespace crepes {
@@ -9,5 +10,8 @@ namespace crepes {
 /// Inertial samples are rounded to half of their noise, which adds 2 % to its variance. Without a
 /// salt.
 [[nodiscard]] SendSettings send_settings(const Config& config);
+
+/// Of a valid configuration. This robot is listed like every other.
+[[nodiscard]] MeshTrust mesh_trust(const Config& config);
 
 }  // namespace crepes

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <net/if.h>
 
+#include <algorithm>
 #include <filesystem>
 
 namespace crepes {
@@ -53,17 +54,46 @@ void doubt_cameras(const Config& config, Doubts& doubts) {
   }
 }
 
+void doubt_keys(const Config& config, Doubts& doubts) {
+  const std::vector<MemberConfig>& members = config.swarm.members;
+  const bool has_keys = std::ranges::any_of(
+      members, [](const MemberConfig& m) { return m.public_key && !m.excluded; });
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const MemberConfig& member = members[i];
+    const auto doubt = [&](const char* key, const char* reason) {
+      doubts.push_back({fmt::format("swarm.members[{}].{}", i, key), reason});
+    };
+    const bool is_own = member.id == config.robot.id;
+    if (member.excluded && is_own) doubt("excluded", "is this robot: no other reads what it sends");
+    if (member.excluded && !has_keys)
+      doubt("excluded", "without public_key of the others, it can speak for any of them");
+    if (member.public_key || member.excluded) continue;
+    if (has_keys) {
+      doubt("public_key", "is missing: any robot of the swarm could speak for it");
+    } else if (is_own && !config.net.robot_key_file.empty()) {
+      doubt("public_key", "is missing: nobody can verify what net.robot_key_file signs");
+    }
+  }
+  if (config.net.interface == "lo") return;
+  if (config.net.key_file.empty()) {
+    doubts.push_back(
+        {"net.key_file", "is empty: whoever is on the mesh can read and forge; crepesctl keygen"});
+  } else if (!has_keys && config.net.robot_key_file.empty()) {
+    doubts.push_back(
+        {"net.robot_key_file",
+         "is empty: any robot of the swarm could speak for another; crepesctl keygen"});
+  }
+}
+
 }  // namespace
 
 std::vector<RuleFault> doubtful_settings(const Config& config) {
   Doubts doubts;
   doubt_members(config.swarm, doubts);
   doubt_cameras(config, doubts);
+  doubt_keys(config, doubts);
   if (::if_nametoindex(config.net.interface.c_str()) == 0)
     doubts.push_back({"net.interface", "there is no such interface now"});
-  if (config.net.key_file.empty() && config.net.interface != "lo")
-    doubts.push_back(
-        {"net.key_file", "is empty: whoever is on the mesh can read and forge; crepesctl keygen"});
   return doubts;
 }
 

@@ -14,6 +14,7 @@
 
 #include "estimator/vision/camera_model.hpp"
 #include "net/endpoint.hpp"
+#include "net/mesh/packet_signature.hpp"
 
 namespace crepes {
 namespace {
@@ -146,6 +147,29 @@ void check_members(const Config& config, RuleFaults& faults) {
   }
 }
 
+void check_keys(const Config& config, RuleFaults& faults) {
+  const std::vector<MemberConfig>& members = config.swarm.members;
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const MemberConfig& member = members[i];
+    if (!member.public_key) continue;
+    if (!parse_public_key(*member.public_key)) {
+      faults.push_back({item("swarm.members", i) + ".public_key",
+                        fmt::format("expected a public key as crepesctl keygen prints it, found "
+                                    "\"{}\"",
+                                    *member.public_key)});
+    }
+    if (member.id == config.robot.id && config.net.robot_key_file.empty()) {
+      faults.push_back({"net.robot_key_file",
+                        fmt::format("is empty, and {} has a public_key: nobody would believe this "
+                                    "robot",
+                                    item("swarm.members", i))});
+    }
+  }
+  check_unique(
+      "swarm.members", ".public_key", members,
+      [](const MemberConfig& m) { return m.public_key.value_or(""); }, faults);
+}
+
 constexpr double kMostArm_m = 5.0;  // as of the members' lever arms
 
 void check_driver(const std::string& key, const CameraConfig& camera, RuleFaults& faults) {
@@ -263,6 +287,7 @@ void check_network(const Config& config, RuleFaults& faults) {
 std::vector<RuleFault> validate(const Config& config) {
   RuleFaults faults;
   check_members(config, faults);
+  check_keys(config, faults);
   check_cameras(config.cameras, faults);
   check_imu(config.imu.device, faults);
   check_network(config, faults);

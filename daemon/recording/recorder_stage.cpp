@@ -39,9 +39,11 @@ std::string picture_block(const Frame& frame) {
   return block;
 }
 
-/// For a replay, which seals nothing and may not have the key.
-Config without_key(Config config) {
+/// For a replay, which may not have the keys.
+Config without_keys(Config config) {
   config.net.key_file.clear();
+  config.net.robot_key_file.clear();
+  for (MemberConfig& member : config.swarm.members) member.public_key.reset();
   return config;
 }
 
@@ -168,7 +170,7 @@ class Recorder {
   void hand_over() {
     std::string text;
     if (!std::exchange(is_config_sent_, true))
-      append_block(text, "config", write_config(without_key(config_)));
+      append_block(text, "config", write_config(without_keys(config_)));
     const std::uint64_t missed = stage_.events.dropped();
     const std::uint64_t gap = missed - std::exchange(missed_before_, missed);
     if (gap > 0) append_block(text, "gap", fmt::format("{}", gap));

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "config/keys/mesh_key.hpp"
+#include "config/keys/robot_key.hpp"
 #include "daemon/service/logging.hpp"
 
 namespace crepes {
@@ -26,17 +27,30 @@ UdpSocket* MeshSocket::get(Timestamp now) {
 }
 
 Result<UdpSocket> MeshSocket::open() {
-  const auto open_socket = [this] {
-    return UdpSocket::open_broadcast(config_.interface, static_cast<std::uint16_t>(config_.port));
-  };
-  if (config_.key_file.empty()) return open_socket();
-  const Result<MeshKey> key = read_mesh_key(config_.key_file);
-  if (!key) return tl::unexpected(key.error());
-  seal_.emplace(*key);
-  return open_socket().map([&](UdpSocket&& socket) {
-    log_message(LogLevel::kInfo, "mesh: sealed with the key " + fingerprint(*key));
-    return std::move(socket);
-  });
+  const Result<std::string> keys = read_keys();
+  if (!keys) return tl::unexpected(keys.error());
+  auto socket =
+      UdpSocket::open_broadcast(config_.interface, static_cast<std::uint16_t>(config_.port));
+  if (socket && !keys->empty()) log_message(LogLevel::kInfo, "mesh: " + *keys);
+  return socket;
+}
+
+Result<std::string> MeshSocket::read_keys() {
+  std::string text;
+  if (!config_.key_file.empty()) {
+    const Result<MeshKey> key = read_mesh_key(config_.key_file);
+    if (!key) return tl::unexpected(key.error());
+    seal_.emplace(*key);
+    text = "sealed with the key " + fingerprint(*key);
+  }
+  if (!config_.robot_key_file.empty()) {
+    const Result<RobotKey> key = read_robot_key(config_.robot_key_file);
+    if (!key) return tl::unexpected(key.error());
+    signer_.emplace(*key);
+    text += fmt::format("{}signed with the key {}", text.empty() ? "" : ", ",
+                        to_text(public_key_of(*key)));
+  }
+  return text;
 }
 
 void MeshSocket::close_for_retry(const Error& error, Timestamp now) {
@@ -51,12 +65,21 @@ void MeshSocket::close_for_retry(const Error& error, Timestamp now) {
 void KeyMismatchMonitor::update(const PeerLink& link) {
   constexpr const char* kOtherKey =
       "no datagram that comes can be opened: net.key_file is not the same on all robots";
-  const std::uint64_t total_received = link.counters()[MeshCounter::kReceived];
-  const std::uint64_t total_unopened = link.counters().seal_refusals();
-  const std::uint64_t received = total_received - std::exchange(received_, total_received);
-  const std::uint64_t unopened = total_unopened - std::exchange(unopened_, total_unopened);
-  const std::string before =
-      std::exchange(fault_, received > 0 && unopened == received ? kOtherKey : "");
+  constexpr const char* kOtherSigner =
+      "no datagram that comes is signed by its sender: swarm.members[].public_key is not the same "
+      "on all robots, or net.robot_key_file of the others is another";
+  const MeshCounters& totals = link.counters();
+  const auto since = [](std::uint64_t& last, std::uint64_t total) {
+    return total - std::exchange(last, total);
+  };
+  const std::uint64_t received = since(received_, totals[MeshCounter::kReceived]);
+  const std::uint64_t unopened = since(unopened_, totals.seal_refusals());
+  const std::uint64_t wrong = since(unsigned_, totals.signature_refusals());
+  const char* const fault = received == 0          ? ""
+                            : unopened == received ? kOtherKey
+                            : wrong == received    ? kOtherSigner
+                                                   : "";
+  const std::string before = std::exchange(fault_, fault);
   if (!fault_.empty() && before.empty()) log_message(LogLevel::kWarning, "mesh: " + fault_);
 }
 

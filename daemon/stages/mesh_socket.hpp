@@ -12,13 +12,14 @@
 #include "net/endpoint.hpp"
 #include "net/mesh/mesh_config.hpp"
 #include "net/mesh/packet_seal.hpp"
+#include "net/mesh/packet_signature.hpp"
 #include "net/mesh/peer_link.hpp"
 #include "net/udp_socket.hpp"
 
 namespace crepes {
 
-/// A socket and its seal, reopened when the interface disappears and returns. While the key cannot
-/// be read there is no socket, so nothing leaves unsealed by mistake. Changes are logged.
+/// A socket and its keys, reopened when the interface disappears and returns. While a key cannot be
+/// read there is no socket, so nothing leaves unsealed or unsigned by mistake. Changes are logged.
 class MeshSocket {
  public:
   explicit MeshSocket(NetConfig config) : config_(std::move(config)) {}
@@ -29,6 +30,7 @@ class MeshSocket {
   void close_for_retry(const Error& error, Timestamp now);
 
   [[nodiscard]] const std::optional<PacketSeal>& seal() const { return seal_; }
+  [[nodiscard]] const std::optional<PacketSigner>& signer() const { return signer_; }
   /// The current fault; empty without one.
   [[nodiscard]] const std::string& fault() const { return fault_; }
   [[nodiscard]] int descriptor() const { return socket_ ? socket_->descriptor() : -1; }
@@ -37,16 +39,19 @@ class MeshSocket {
   static constexpr Duration kFirstRetry = std::chrono::milliseconds{100};
 
   [[nodiscard]] Result<UdpSocket> open();
+  /// Returns what the log says of the keys; empty without any.
+  [[nodiscard]] Result<std::string> read_keys();
 
   NetConfig config_;
   std::optional<PacketSeal> seal_;
+  std::optional<PacketSigner> signer_;
   std::optional<UdpSocket> socket_;
   std::string fault_;
   Timestamp retry_at_{};
   Duration retry_ = kFirstRetry;
 };
 
-/// Detects that datagrams arrive but none of them can be opened.
+/// Detects that datagrams arrive but none of them is believed.
 class KeyMismatchMonitor {
  public:
   /// Checks the datagrams since the last update; once a second is enough.
@@ -57,6 +62,7 @@ class KeyMismatchMonitor {
  private:
   std::uint64_t received_ = 0;
   std::uint64_t unopened_ = 0;
+  std::uint64_t unsigned_ = 0;
   std::string fault_;
 };
 

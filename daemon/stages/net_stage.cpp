@@ -1,14 +1,17 @@
 #include "daemon/stages/net_stage.hpp"
 
+#include <fmt/core.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <string>
 #include <utility>
 
 #include "config/keys/mesh_key.hpp"
+#include "config/keys/robot_key.hpp"
 #include "daemon/service/logging.hpp"
 #include "daemon/service/process_load.hpp"
 #include "daemon/service/systemd_status.hpp"
@@ -24,15 +27,40 @@ namespace {
 constexpr int kMaxDatagramsAtOnce = 256;
 constexpr int kPollTimeoutMs = 100;
 
+/// Those that are heard.
 std::vector<RobotId> ids_of(const NetSettings& settings) {
   std::vector<RobotId> ids;
-  for (const auto& [id, name] : settings.members) ids.push_back(id);
+  for (const auto& [id, name] : settings.members)
+    if (!settings.trust.excluded.contains(id)) ids.push_back(id);
   return ids;
 }
 
 SendSettings salted(SendSettings settings) {
   settings.session_salt = random_salt();
   return settings;
+}
+
+/// Who could speak for whom; empty if each robot only for itself.
+std::string key_warning(const NetSettings& settings) {
+  const std::vector<RobotId> ids = ids_of(settings);
+  const auto signing = static_cast<std::size_t>(
+      std::ranges::count_if(ids, [&](RobotId id) { return settings.trust.keys.contains(id); }));
+  if (signing == ids.size()) return "";
+  const char* const who =
+      settings.net.key_file.empty() ? "anybody on the mesh" : "any robot of the swarm";
+  if (signing == 0) return fmt::format("{} could speak for another robot: crepesctl keygen", who);
+  return fmt::format("{} could speak for {} of {} robots, which have no public_key", who,
+                     ids.size() - signing, ids.size());
+}
+
+AirTotals air_totals(const PeerLink& link, Timestamp now) {
+  AirTotals totals{.at = now,
+                   .sent = link.counters()[MeshCounter::kSent],
+                   .sent_bytes = link.counters()[MeshCounter::kSentBytes],
+                   .received = link.counters()[MeshCounter::kReceived],
+                   .received_bytes = link.counters()[MeshCounter::kReceivedBytes]};
+  for (const PeerTraffic& traffic : link.traffic(now)) totals.lost += traffic.lost;
+  return totals;
 }
 
 /// The net thread's state.
@@ -46,15 +74,19 @@ class NetLoop {
         link_(settings_.self, ids_of(settings_), salted(settings_.send)),
         mesh_(settings_.net) {
     config_status_.since = start_;
+    link_.set_trust(settings_.trust);
+    air_totals_.at = start_;
     open_server();
   }
 
   void reconfigure(const NetSettings& settings) {
     const NetSettings before = std::exchange(settings_, settings);
     link_.set_members(ids_of(settings_));
+    link_.set_trust(settings_.trust);
     link_.set_pacing(settings_.send);
     if (before.net.interface != settings_.net.interface || before.net.port != settings_.net.port ||
         before.net.key_file != settings_.net.key_file ||
+        before.net.robot_key_file != settings_.net.robot_key_file ||
         before.key_identity != settings_.key_identity) {
       mesh_ = MeshSocket(settings_.net);
     }
@@ -83,6 +115,8 @@ class NetLoop {
   void every_second() {
     next_second_ = clock_.now() + std::chrono::seconds{1};
     key_monitor_.update(link_);
+    const AirTotals before = std::exchange(air_totals_, air_totals(link_, clock_.now()));
+    air_ = air_share(before, air_totals_, settings_.net.broadcast_mbps);
     notify_service();
   }
 
@@ -125,7 +159,7 @@ class NetLoop {
       const Timestamp arrival = clock_.now();
       if (!datagram) return mesh_.close_for_retry(datagram.error(), arrival);
       if (!*datagram) return;
-      if (auto report = link_.receive((*datagram)->bytes, arrival, mesh_.seal()))
+      if (auto report = link_.receive((*datagram)->bytes, arrival, mesh_.seal(), (*datagram)->from))
         stage_.on_report(std::move(*report));
       doubled_ids_.update(link_, (*datagram)->from, arrival);
     }
@@ -142,7 +176,8 @@ class NetLoop {
   void broadcast(const Report& report, Timestamp now) {
     UdpSocket* socket = mesh_.get(now);
     if (socket == nullptr) return;
-    const Result<void> sent = socket->broadcast(link_.compose(report, now, mesh_.seal()));
+    const Result<void> sent =
+        socket->broadcast(link_.compose(report, now, mesh_.seal(), mesh_.signer()));
     if (sent) return;
     ++unsent_;
     // A congested mesh is no reason to close the socket, which may hold datagrams to be read.
@@ -165,6 +200,10 @@ class NetLoop {
     status.estimator = estimator_;
     status.clocks = link_.clocks();
     status.traffic = link_.traffic(status.stamp);
+    status.mesh = {.is_sealed = mesh_.seal().has_value(),
+                   .is_signed = mesh_.signer().has_value(),
+                   .warning = key_warning(settings_),
+                   .air = air_};
     status.queues = stage_.queues();
     status.network = link_.counters().totals();
     status.network.emplace_back("reports_unsent", unsent_);
@@ -181,6 +220,8 @@ class NetLoop {
   MeshSocket mesh_;
   KeyMismatchMonitor key_monitor_;
   DoubledIdMonitor doubled_ids_;
+  AirTotals air_totals_;
+  AirShare air_;
   std::uint64_t unsent_ = 0;
   std::optional<SubscriptionServer> server_;
   EstimatorStatus estimator_;
@@ -194,6 +235,7 @@ class NetLoop {
 NetSettings net_settings(const Config& config) {
   NetSettings settings{.self = config.robot.id,
                        .members = {},
+                       .trust = mesh_trust(config),
                        .net = config.net,
                        .send = send_settings(config),
                        .subscription = config.subscription,
@@ -202,6 +244,10 @@ NetSettings net_settings(const Config& config) {
   if (!config.net.key_file.empty()) {
     const Result<MeshKey> key = read_mesh_key(config.net.key_file);
     settings.key_identity = key ? fingerprint(*key) : key.error().message;
+  }
+  if (!config.net.robot_key_file.empty()) {
+    const Result<RobotKey> key = read_robot_key(config.net.robot_key_file);
+    settings.key_identity += key ? to_text(public_key_of(*key)) : key.error().message;
   }
   return settings;
 }

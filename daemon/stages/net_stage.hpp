@@ -48,16 +48,17 @@ class NetInbox {
 struct NetSettings {
   RobotId self{};
   std::map<RobotId, std::string> members;  ///< names, this robot's included
+  MeshTrust trust;
   NetConfig net;
   SendSettings send;
   SubscriptionConfig subscription;
-  std::string key_identity;  ///< fingerprint of the key in `net.key_file`: the same file may hold
-                             ///< another key later
+  std::string key_identity;  ///< of the keys in the files that `net` names: the same files may
+                             ///< hold others later
 
   [[nodiscard]] bool operator==(const NetSettings&) const = default;
 };
 
-/// Reads the key file.
+/// Reads the key files.
 [[nodiscard]] NetSettings net_settings(const Config& config);
 
 /// The inputs and outputs of the net thread. All references must outlive it.

@@ -11,7 +11,8 @@
 
 namespace crepes {
 
-/// One robot of the swarm: how it blinks and where its LED ring and antenna are mounted.
+/// One robot of the swarm: how it blinks, where its LED ring and antenna are mounted, and how it
+/// proves on the mesh that it is itself.
 struct MemberConfig {
   RobotId id{};
   std::string name;
@@ -20,6 +21,8 @@ struct MemberConfig {
   std::optional<int> uwb_id;
   Eigen::Vector3d p_body_led = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_body_uwb = Eigen::Vector3d::Zero();
+  std::optional<std::string> public_key;
+  bool excluded = false;
 
   [[nodiscard]] bool operator==(const MemberConfig&) const = default;
 
@@ -36,6 +39,11 @@ struct MemberConfig {
     v.field("p_body_led", p_body_led, Bounds{-5, 5},
             "center of the LED ring in the body frame [m]");
     v.field("p_body_uwb", p_body_uwb, Bounds{-5, 5}, "UWB antenna in the body frame [m]");
+    v.field("public_key", public_key,
+            "as crepesctl keygen prints it: only what this robot has signed is believed to be from "
+            "it; if omitted: anybody with the swarm's key can speak for it");
+    v.field("excluded", excluded,
+            "a lost robot: nothing that it sends is read, and its key is believed no more");
   }
 };
 

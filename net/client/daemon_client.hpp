@@ -36,6 +36,7 @@ struct StatusMessage {
     std::uint64_t lost = 0;
     std::uint64_t restarts = 0;
     double age_s = 0.0;
+    double loss = 0.0;  ///< of the last seconds
   };
   struct Neighbor {
     RobotId neighbor{};
@@ -62,6 +63,13 @@ struct StatusMessage {
     double skew_ppm = 0.0;
     double sigma_s = 0.0;
   };
+  struct Mesh {
+    bool sealed = false;
+    bool signs = false;
+    std::string warning;  ///< who could speak for whom
+    double airtime = 0.0;
+    double airtime_of_all = 0.0;
+  };
   RobotId self{};
   std::string name;
   double uptime_s = 0.0;
@@ -73,6 +81,7 @@ struct StatusMessage {
   std::vector<Clock> clocks;
   Totals queues;
   Totals network;
+  std::optional<Mesh> mesh;
 };
 
 /// A remote daemon requires it in every further request.

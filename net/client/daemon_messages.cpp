@@ -73,7 +73,8 @@ StatusMessage::Neighbor neighbor_from(const ParsedJson& json) {
     neighbor.reports = {.received = reports->value("received", std::uint64_t{0}),
                         .lost = reports->value("lost", std::uint64_t{0}),
                         .restarts = reports->value("restarts", std::uint64_t{0}),
-                        .age_s = reports->value("age_s", 0.0)};
+                        .age_s = reports->value("age_s", 0.0),
+                        .loss = reports->value("loss", 0.0)};
   }
   return neighbor;
 }
@@ -106,6 +107,13 @@ StatusMessage status_from(const ParsedJson& json) {
   }
   status.queues = totals_from(json, "queues");
   status.network = totals_from(json, "network");
+  if (const auto mesh = json.find("mesh"); mesh != json.end()) {
+    status.mesh = {.sealed = mesh->value("sealed", false),
+                   .signs = mesh->value("signed", false),
+                   .warning = mesh->value("warning", ""),
+                   .airtime = mesh->value("airtime", 0.0),
+                   .airtime_of_all = mesh->value("airtime_of_all", 0.0)};
+  }
   return status;
 }
 

@@ -8,7 +8,9 @@ namespace {
 using enum MeshCounter;
 
 constexpr auto kNames = std::to_array<std::string_view>({"held_clock_unknown",
+                                                         "left_out_copies",
                                                          "left_out_of_datagrams",
+                                                         "left_out_samples",
                                                          "received",
                                                          "received_bytes",
                                                          "refused_bad_covariance",
@@ -20,6 +22,7 @@ constexpr auto kNames = std::to_array<std::string_view>({"held_clock_unknown",
                                                          "refused_doubled_id",
                                                          "refused_duplicate",
                                                          "refused_echo",
+                                                         "refused_excluded",
                                                          "refused_foreign",
                                                          "refused_not_unit",
                                                          "refused_old_session",
@@ -30,6 +33,9 @@ constexpr auto kNames = std::to_array<std::string_view>({"held_clock_unknown",
                                                          "refused_seal_missing",
                                                          "refused_seal_unexpected",
                                                          "refused_seal_version",
+                                                         "refused_signature_missing",
+                                                         "refused_signature_unchecked",
+                                                         "refused_signature_wrong",
                                                          "refused_to_send",
                                                          "refused_too_far_ahead",
                                                          "refused_too_long",
@@ -72,6 +78,12 @@ std::uint64_t MeshCounters::seal_refusals() const {
   const MeshCounters& totals = *this;
   return totals[kRefusedSealBroken] + totals[kRefusedSealMissing] + totals[kRefusedSealUnexpected] +
          totals[kRefusedSealVersion];
+}
+
+std::uint64_t MeshCounters::signature_refusals() const {
+  const MeshCounters& totals = *this;
+  return totals[kRefusedSignatureMissing] + totals[kRefusedSignatureUnchecked] +
+         totals[kRefusedSignatureWrong];
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> MeshCounters::totals() const {

@@ -16,7 +16,9 @@ namespace crepes {
 /// What is counted, in the order of the names.
 enum class MeshCounter : std::uint8_t {
   kHeldClockUnknown,      ///< reports of a peer whose clock is not known yet
-  kLeftOutOfDatagrams,    ///< measurements for which a datagram had no room
+  kLeftOutCopies,         ///< bearings and ranges that were to be repeated and had no room
+  kLeftOutOfDatagrams,    ///< neighbors whose newest measurements had no room
+  kLeftOutSamples,        ///< inertial samples that were to be repeated and had no room
   kReceived,              ///< datagrams of other robots
   kReceivedBytes,         ///< of those
   kRefusedBadCovariance,  ///< this and the following: datagrams, by the reason for the refusal
@@ -27,7 +29,8 @@ enum class MeshCounter : std::uint8_t {
   kRefusedDamaged,
   kRefusedDoubledId,  ///< of a second robot that uses a peer's id
   kRefusedDuplicate,
-  kRefusedEcho,  ///< echoes, not datagrams: of a datagram that we never sent
+  kRefusedEcho,      ///< echoes, not datagrams: of a datagram that we never sent
+  kRefusedExcluded,  ///< the configuration excludes the sender
   kRefusedForeign,
   kRefusedNotUnit,
   kRefusedOldSession,  ///< of a session that a newer one has replaced
@@ -38,6 +41,9 @@ enum class MeshCounter : std::uint8_t {
   kRefusedSealMissing,
   kRefusedSealUnexpected,  ///< sealed, and we have no key
   kRefusedSealVersion,
+  kRefusedSignatureMissing,
+  kRefusedSignatureUnchecked,  ///< its address has sent too many in vain
+  kRefusedSignatureWrong,
   kRefusedToSend,       ///< measurements of ours that cannot be encoded
   kRefusedTooFarAhead,  ///< its number is further ahead than time has passed
   kRefusedTooLong,
@@ -49,7 +55,7 @@ enum class MeshCounter : std::uint8_t {
   kSent,       ///< datagrams
   kSentBytes,  ///< of those
 };
-inline constexpr std::size_t kMeshCounterCount = 33;
+inline constexpr std::size_t kMeshCounterCount = 39;
 
 /// As STATUS and report.json call it.
 [[nodiscard]] std::string_view name_of(MeshCounter counter);
@@ -66,6 +72,8 @@ class MeshCounters {
   }
   /// Datagrams that were refused because of their seal or for want of one.
   [[nodiscard]] std::uint64_t seal_refusals() const;
+  /// The same for their signature.
+  [[nodiscard]] std::uint64_t signature_refusals() const;
   /// By name; counters at zero are left out.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> totals() const;
 

@@ -3,9 +3,9 @@
 #include <sodium.h>
 
 #include <algorithm>
-#include <new>
 
 #include "estimator/core/contract.hpp"
+#include "net/mesh/locked_key.hpp"
 #include "net/mesh/peer_message.hpp"
 
 namespace crepes {
@@ -20,13 +20,6 @@ constexpr std::size_t kTag = crypto_aead_xchacha20poly1305_ietf_ABYTES;
 static_assert(kTag == PacketSeal::kOverhead);
 static_assert(kClearHeader - kMark.size() <= kNonce);
 static_assert(crypto_aead_xchacha20poly1305_ietf_KEYBYTES == MeshKey::kSize);
-
-std::shared_ptr<const MeshKey> locked(const MeshKey& key) {
-  CREPES_EXPECT(sodium_init() >= 0, "the system has random numbers");
-  void* const memory = sodium_malloc(sizeof(MeshKey));
-  CREPES_EXPECT(memory != nullptr, "there is memory for a key");
-  return {new (memory) MeshKey(key), sodium_free};
-}
 
 /// Sender, session and sequence number.
 std::array<std::uint8_t, kNonce> nonce_of(std::span<const std::uint8_t> header) {
@@ -65,7 +58,8 @@ std::vector<std::uint8_t> PacketSeal::seal(std::span<const std::uint8_t> plain) 
 tl::expected<std::vector<std::uint8_t>, UnsealError> PacketSeal::open(
     std::span<const std::uint8_t> sealed) const {
   if (!is_sealed(sealed)) return tl::unexpected(UnsealError::kNotSealed);
-  if (sealed[kMagic] != kMark[kMagic]) return tl::unexpected(UnsealError::kOtherVersion);
+  if ((sealed[kMagic] & ~kSignedMark) != kMark[kMagic])
+    return tl::unexpected(UnsealError::kOtherVersion);
   if (sealed.size() < kClearHeader + kTag) return tl::unexpected(UnsealError::kNotAuthentic);
   const auto header = sealed.first(kClearHeader);
   const auto secret = sealed.subspan(kClearHeader);

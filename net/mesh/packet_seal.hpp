@@ -6,7 +6,8 @@
 /// sessions are random. The 18 bytes are authenticated with the rest.
 ///
 /// All robots share one key: a valid seal proves that the sender belongs to the swarm, but not
-/// which robot it is. Replays are detected by `PeerLink`.
+/// which robot it is: for that there are signatures (`packet_signature.hpp`). Replays are detected
+/// by `PeerLink`.
 #pragma once
 
 #include <array>
@@ -20,6 +21,7 @@
 namespace crepes {
 
 /// The secret that all robots of a swarm share. Every copy is overwritten when it ends.
+// NOLINTNEXTLINE(cppcoreguidelines-special-member-functions): a copy needs nothing but its end
 struct MeshKey {
   static constexpr std::size_t kSize = 32;
 

@@ -38,15 +38,29 @@ std::uint32_t max_ahead(Duration silence) {
   return SequenceWindow::kSize - 1 + static_cast<std::uint32_t>(std::min(kMost, missed));
 }
 
-/// The message, or the counter of the reason why there is none.
-tl::expected<PeerMessage, MeshCounter> decode(std::span<const std::uint8_t> datagram,
-                                              const std::optional<PacketSeal>& seal) {
-  constexpr auto kCounter = [](auto error) { return counter_of(error); };
-  if (!seal && PacketSeal::is_sealed(datagram))
-    return tl::unexpected(MeshCounter::kRefusedSealUnexpected);
-  if (!seal) return decode_peer_message(datagram).map_error(kCounter);
-  return seal->open(datagram).map_error(kCounter).and_then(
-      [&](const auto& plain) { return decode_peer_message(plain).map_error(kCounter); });
+constexpr auto kCounterOf = [](auto error) { return counter_of(error); };
+
+/// The counter of datagrams that are refused by their number; empty if it is new.
+std::optional<MeshCounter> refusal_of(SequenceWindow::Verdict verdict) {
+  switch (verdict) {
+    case SequenceWindow::Verdict::kNew:
+      return std::nullopt;
+    case SequenceWindow::Verdict::kDuplicate:
+      return MeshCounter::kRefusedDuplicate;
+    case SequenceWindow::Verdict::kTooOld:
+      return MeshCounter::kRefusedTooOld;
+    case SequenceWindow::Verdict::kTooFarAhead:
+      return MeshCounter::kRefusedTooFarAhead;
+  }
+  return std::nullopt;
+}
+
+/// The datagram without its seal, or the counter of the reason why it cannot be opened.
+tl::expected<std::vector<std::uint8_t>, MeshCounter> unsealed(
+    std::span<const std::uint8_t> datagram, const std::optional<PacketSeal>& seal) {
+  if (seal) return seal->open(datagram).map_error(kCounterOf);
+  if (PacketSeal::is_sealed(datagram)) return tl::unexpected(MeshCounter::kRefusedSealUnexpected);
+  return std::vector<std::uint8_t>(datagram.begin(), datagram.end());
 }
 
 }  // namespace
@@ -72,23 +86,18 @@ void PeerLink::set_members(const std::vector<RobotId>& members) {
 
 std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> datagram,
                                                 Timestamp arrival,
-                                                const std::optional<PacketSeal>& seal) {
-  auto message = open(datagram, arrival, seal);
+                                                const std::optional<PacketSeal>& seal,
+                                                const Endpoint& from) {
+  auto message = open(datagram, arrival, seal, from);
   if (!message) return std::nullopt;
-  const auto found = peers_.find(message->report.sender);
-  if (found == peers_.end()) {
-    counters_.add(MeshCounter::kRefusedUnknownSender);
-    return std::nullopt;
+  const RobotId sender = message->report.sender;
+  Peer& peer = peers_.at(sender);
+  Session* const session = accept(peer, *message, arrival);
+  if (trust_.keys.contains(sender)) {
+    const bool is_of_use = session != nullptr && peer.live && session == &*peer.live;
+    is_of_use ? limiter_.count_accepted(from, arrival) : limiter_.count_in_vain(from, arrival);
   }
-  Peer& peer = found->second;
-  Session* session = admit(peer, *message, arrival);
   if (session == nullptr) return std::nullopt;
-  session->last_arrival = arrival;
-  if (!update_clock(*session, *message, arrival)) return std::nullopt;
-  if (peer.candidate && peer.candidate->has_echoed_us) {
-    replace_session(peer, arrival);
-    session = &*peer.live;
-  }
   if (!session->clock.is_usable()) {
     counters_.add(MeshCounter::kHeldClockUnknown);
     return std::nullopt;
@@ -98,13 +107,18 @@ std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> da
                         session->clock.estimate()->sigma_s};
 }
 
-/// Decodes and counts a datagram; empty if it is our own or refused.
+/// Reads and counts a datagram of a peer; empty if it is our own or refused.
 std::optional<PeerMessage> PeerLink::open(std::span<const std::uint8_t> datagram, Timestamp arrival,
-                                          const std::optional<PacketSeal>& seal) {
-  auto message = decode(datagram, seal);
+                                          const std::optional<PacketSeal>& seal,
+                                          const Endpoint& from) {
+  const auto plain = unsealed(datagram, seal);
+  const auto header =
+      plain ? decode_peer_header(*plain).map_error(kCounterOf) : tl::unexpected(plain.error());
+  if (header && is_our_own(*header)) return std::nullopt;
+  auto message = header.and_then([&](const PeerHeader&) { return read(*plain, arrival, from); });
   if (message && message->report.sender == self_) {
-    const bool is_ours = first_sent_ && message->session == own_session();
-    if (!is_ours) count_doubled(MeshCounter::kRefusedOwnId, self_, arrival);
+    if (trust_.keys.contains(self_)) limiter_.count_in_vain(from, arrival);
+    count_doubled(MeshCounter::kRefusedOwnId, self_, arrival);
     return std::nullopt;
   }
   counters_.add(MeshCounter::kReceived);
@@ -112,6 +126,66 @@ std::optional<PeerMessage> PeerLink::open(std::span<const std::uint8_t> datagram
   if (message) return std::move(*message);
   counters_.add(message.error());
   return std::nullopt;
+}
+
+/// The message of a member, or the counter of the reason why it is refused.
+tl::expected<PeerMessage, MeshCounter> PeerLink::read(std::span<const std::uint8_t> plain,
+                                                      Timestamp arrival, const Endpoint& from) {
+  if (is_signed(plain)) {
+    if (const auto refusal = refusal_of(plain, *decode_peer_header(plain), arrival, from))
+      return tl::unexpected(*refusal);
+    return decode_peer_message(without_signature(plain)).map_error(kCounterOf);
+  }
+  auto message = decode_peer_message(plain).map_error(kCounterOf);
+  if (!message) return message;
+  if (const auto refusal = refusal_of(message->report.sender)) return tl::unexpected(*refusal);
+  if (trust_.keys.contains(message->report.sender))
+    return tl::unexpected(MeshCounter::kRefusedSignatureMissing);
+  return message;
+}
+
+std::optional<MeshCounter> PeerLink::refusal_of(RobotId sender) const {
+  if (trust_.excluded.contains(sender)) return MeshCounter::kRefusedExcluded;
+  if (sender != self_ && !peers_.contains(sender)) return MeshCounter::kRefusedUnknownSender;
+  return std::nullopt;
+}
+
+/// Cheap checks first: to verify a signature is by far the most expensive one.
+std::optional<MeshCounter> PeerLink::refusal_of(std::span<const std::uint8_t> plain,
+                                                const PeerHeader& header, Timestamp arrival,
+                                                const Endpoint& from) {
+  if (const auto refusal = refusal_of(header.sender)) return refusal;
+  const auto key = trust_.keys.find(header.sender);
+  if (key == trust_.keys.end()) return std::nullopt;
+  if (const auto peer = peers_.find(header.sender); peer != peers_.end()) {
+    for (const std::optional<Session>* known : {&peer->second.live, &peer->second.candidate}) {
+      if (!*known || (*known)->id != header.session) continue;
+      const Session& session = **known;
+      const auto refusal = crepes::refusal_of(
+          session.sequence.judge(header.sequence, max_ahead(arrival - session.last_arrival)));
+      if (refusal) return refusal;
+    }
+  }
+  if (!limiter_.allows(from, arrival)) return MeshCounter::kRefusedSignatureUnchecked;
+  if (is_authentic(plain, key->second)) return std::nullopt;
+  limiter_.count_in_vain(from, arrival);
+  return MeshCounter::kRefusedSignatureWrong;
+}
+
+bool PeerLink::is_our_own(const PeerHeader& header) const {
+  return header.sender == self_ && first_sent_ && header.session == own_session();
+}
+
+/// The session of the message, if the message is new in it and its stamps agree with it. A session
+/// that has echoed us is the live one now.
+PeerLink::Session* PeerLink::accept(Peer& peer, const PeerMessage& message, Timestamp arrival) {
+  Session* const session = admit(peer, message, arrival);
+  if (session == nullptr) return nullptr;
+  session->last_arrival = arrival;
+  if (!update_clock(*session, message, arrival)) return nullptr;
+  if (!peer.candidate || !peer.candidate->has_echoed_us) return session;
+  replace_session(peer, arrival);
+  return &*peer.live;
 }
 
 void PeerLink::count_doubled(MeshCounter counter, RobotId robot, Timestamp now) {
@@ -133,21 +207,14 @@ PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message, Times
     peer.candidate = std::move(fresh);
   }
   Session& session = is_it(peer.live) ? *peer.live : *peer.candidate;
-  switch (session.sequence.accept(message.sequence, max_ahead(arrival - session.last_arrival))) {
-    case SequenceWindow::Verdict::kNew:
-      update_loss(session);
-      return &session;
-    case SequenceWindow::Verdict::kDuplicate:
-      counters_.add(MeshCounter::kRefusedDuplicate);
-      return nullptr;
-    case SequenceWindow::Verdict::kTooOld:
-      counters_.add(MeshCounter::kRefusedTooOld);
-      return nullptr;
-    case SequenceWindow::Verdict::kTooFarAhead:
-      counters_.add(MeshCounter::kRefusedTooFarAhead);
-      return nullptr;
+  const auto refusal = crepes::refusal_of(
+      session.sequence.accept(message.sequence, max_ahead(arrival - session.last_arrival)));
+  if (refusal) {
+    counters_.add(*refusal);
+    return nullptr;
   }
-  return nullptr;
+  update_loss(session);
+  return &session;
 }
 
 /// False if the message is of a session that was replaced and may not return. A message that echoes
@@ -264,7 +331,8 @@ WireLimits PeerLink::limits(Timestamp now, std::size_t overhead) const {
 }
 
 std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,
-                                            const std::optional<PacketSeal>& seal) {
+                                            const std::optional<PacketSeal>& seal,
+                                            const std::optional<PacketSigner>& signer) {
   CREPES_EXPECT(report.sender == self_, "a robot reports for itself");
   if (!first_sent_) first_sent_ = now;
   sent_.push_back(now);
@@ -277,18 +345,25 @@ std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,
   for (const auto& [id, peer] : peers_) {
     for (const std::optional<Session>* known : {&peer.live, &peer.candidate}) {
       const auto packet = *known ? (*known)->clock.fastest_recent_packet() : std::nullopt;
-      if (packet && packet->arrival <= now && packet->arrival > now - kEchoAge)
-        message.echoes.push_back(
-            {id, echo_code(to_ns(packet->sent)), to_ns(packet->arrival), (*known)->loss.of_theirs});
+      if (!packet || packet->arrival > now || packet->arrival <= now - kEchoAge) continue;
+      message.echoes.push_back(
+          {id, echo_code(to_ns(packet->sent)), to_ns(packet->arrival), (*known)->loss.of_theirs});
     }
   }
-  EncodedPeerMessage encoded =
-      encode_peer_message(message, limits(now, seal ? PacketSeal::kOverhead : 0));
+  const std::size_t overhead =
+      (seal ? PacketSeal::kOverhead : 0) + (signer ? PacketSigner::kOverhead : 0);
+  EncodedPeerMessage encoded = encode_peer_message(message, limits(now, overhead));
+  if (signer) encoded.bytes = signer->sign(encoded.bytes);
   if (seal) encoded.bytes = seal->seal(encoded.bytes);
-  counters_.add(MeshCounter::kSent);
-  counters_.add(MeshCounter::kSentBytes, encoded.bytes.size());
-  if (encoded.left_out > 0) counters_.add(MeshCounter::kLeftOutOfDatagrams, encoded.left_out);
-  if (encoded.refused > 0) counters_.add(MeshCounter::kRefusedToSend, encoded.refused);
+  const auto count = [&](MeshCounter counter, std::size_t n) {
+    if (n > 0) counters_.add(counter, n);
+  };
+  count(MeshCounter::kSent, 1);
+  count(MeshCounter::kSentBytes, encoded.bytes.size());
+  count(MeshCounter::kLeftOutOfDatagrams, encoded.left_out);
+  count(MeshCounter::kLeftOutCopies, encoded.left_out_copies);
+  count(MeshCounter::kLeftOutSamples, encoded.left_out_samples);
+  count(MeshCounter::kRefusedToSend, encoded.refused);
   return std::move(encoded.bytes);
 }
 

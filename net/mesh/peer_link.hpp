@@ -4,6 +4,9 @@
 /// echoed a recent datagram of ours. Recorded datagrams that are replayed cannot do so. A session
 /// that was replaced returns if it echoes what we sent after that, and the other one is silent:
 /// then a second robot with the peer's id was there for a while.
+///
+/// What a member with a key sends must be signed. A signature is verified last, when the seal, the
+/// sender and the sequence number are right, and nothing that it protects is used before.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +17,18 @@
 #include <vector>
 
 #include "estimator/core/outputs.hpp"
+#include "net/endpoint.hpp"
 #include "net/mesh/clock_offset.hpp"
 #include "net/mesh/mesh_counters.hpp"
+#include "net/mesh/mesh_trust.hpp"
 #include "net/mesh/packet_seal.hpp"
+#include "net/mesh/packet_signature.hpp"
 #include "net/mesh/peer_message.hpp"
 #include "net/mesh/peer_status.hpp"
 #include "net/mesh/redundancy_filter.hpp"
 #include "net/mesh/send_pacing.hpp"
 #include "net/mesh/sequence_window.hpp"
+#include "net/mesh/signature_limiter.hpp"
 
 namespace crepes {
 
@@ -32,19 +39,22 @@ class PeerLink {
 
   /// Removes peers that are no longer members; adds the new ones.
   void set_members(const std::vector<RobotId>& members);
+  /// From now on. Sessions remain.
+  void set_trust(const MeshTrust& trust) { trust_ = trust; }
   /// The session remains.
   void set_pacing(const SendSettings& settings);
 
   /// The report of a peer. Measurements that it repeats are returned once. Empty when the datagram
   /// is refused (see `counters`), is our own, or the peer's clock is not known yet. With `seal`,
-  /// unsealed datagrams are refused; without it, sealed ones are.
+  /// unsealed datagrams are refused; without it, sealed ones are. `from` is the datagram's source.
   [[nodiscard]] std::optional<ReceivedReport> receive(
       std::span<const std::uint8_t> datagram, Timestamp arrival,
-      const std::optional<PacketSeal>& seal = std::nullopt);
+      const std::optional<PacketSeal>& seal = std::nullopt, const Endpoint& from = {});
 
   /// The datagram to broadcast immediately; `now` is the time of sending.
   [[nodiscard]] std::vector<std::uint8_t> compose(
-      const Report& report, Timestamp now, const std::optional<PacketSeal>& seal = std::nullopt);
+      const Report& report, Timestamp now, const std::optional<PacketSeal>& seal = std::nullopt,
+      const std::optional<PacketSigner>& signer = std::nullopt);
 
   /// Peers whose clock is known, ordered by id.
   [[nodiscard]] std::vector<ClockStatus> clocks() const;
@@ -87,7 +97,17 @@ class PeerLink {
 
   [[nodiscard]] std::optional<PeerMessage> open(std::span<const std::uint8_t> datagram,
                                                 Timestamp arrival,
-                                                const std::optional<PacketSeal>& seal);
+                                                const std::optional<PacketSeal>& seal,
+                                                const Endpoint& from);
+  [[nodiscard]] tl::expected<PeerMessage, MeshCounter> read(std::span<const std::uint8_t> plain,
+                                                            Timestamp arrival,
+                                                            const Endpoint& from);
+  [[nodiscard]] std::optional<MeshCounter> refusal_of(RobotId sender) const;
+  [[nodiscard]] std::optional<MeshCounter> refusal_of(std::span<const std::uint8_t> plain,
+                                                      const PeerHeader& header, Timestamp arrival,
+                                                      const Endpoint& from);
+  [[nodiscard]] bool is_our_own(const PeerHeader& header) const;
+  [[nodiscard]] Session* accept(Peer& peer, const PeerMessage& message, Timestamp arrival);
   [[nodiscard]] Session* admit(Peer& peer, const PeerMessage& message, Timestamp arrival);
   [[nodiscard]] bool readmit(Peer& peer, const PeerMessage& message, Timestamp arrival);
   [[nodiscard]] bool update_clock(Session& session, const PeerMessage& message, Timestamp arrival);
@@ -101,6 +121,8 @@ class PeerLink {
   RobotId self_;
   SendSettings settings_;
   std::map<RobotId, Peer> peers_;  ///< all members except us
+  MeshTrust trust_;
+  SignatureLimiter limiter_;
   MeshCounters counters_;
   std::optional<DoubledId> doubled_;
   std::optional<Timestamp> first_sent_;

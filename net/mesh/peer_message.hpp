@@ -2,7 +2,9 @@
 ///
 /// It begins with 18 bytes in the clear, little endian:
 ///   "CRP", version u8, sender u16, session u64, sequence u32
-/// Then follow bits (`peer_message_code.hpp`) and, last, the CRC-32 of all bytes before.
+/// Then follow bits (`peer_message_code.hpp`) and, last, the CRC-32 of all bytes before. A
+/// signature
+/// (`packet_signature.hpp`) and a seal (`packet_seal.hpp`) may be put around that.
 ///
 /// A tick is 10 us of the sender's clock. Measurements carry their age in ticks before the
 /// datagram's own, so every copy of a measurement decodes to the same stamp. Directions are rounded
@@ -22,6 +24,7 @@ namespace crepes {
 inline constexpr std::size_t kMaxPeerMessage = 1400;  ///< bytes of a datagram, sealed or plain
 inline constexpr std::size_t kMinPeerMessage = 320;   ///< the least that a sender may be limited to
 inline constexpr std::size_t kClearHeader = 18;       ///< bytes that a seal does not hide
+inline constexpr std::uint8_t kSignedMark = 0x80;     ///< bit of the version: a signature follows
 
 /// "I received at `received` the datagram that you sent": half of a clock comparison.
 struct ClockEcho {
@@ -62,15 +65,24 @@ struct WireLimits {
 
 struct EncodedPeerMessage {
   std::vector<std::uint8_t> bytes;
-  std::size_t left_out = 0;  ///< neighbors whose newest measurements had no room
-  std::size_t refused = 0;   ///< measurements that are not finite or cannot be encoded
+  std::size_t left_out = 0;          ///< neighbors whose newest measurements had no room
+  std::size_t left_out_copies = 0;   ///< bearings and ranges without room, of the other neighbors
+  std::size_t left_out_samples = 0;  ///< inertial samples without room
+  std::size_t refused = 0;           ///< measurements that are not finite or cannot be encoded
 };
 
 /// Encodes what fits. What must give, in this order: the older copies of bearings and ranges, those
-/// of inertial samples, one neighbor in two, in three and so on, by turns. Each datagram carries
+/// of inertial samples, then as many neighbors as necessary, by turns. Each datagram carries
 /// the next one of the estimates and the next three of the echoes.
 [[nodiscard]] EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
                                                      const WireLimits& limits = {});
+
+/// What a datagram's first bytes say of it.
+struct PeerHeader {
+  RobotId sender{};
+  std::uint64_t session = 0;
+  std::uint32_t sequence = 0;
+};
 
 /// Why bytes cannot be decoded.
 enum class PeerMessageError : std::uint8_t {
@@ -90,7 +102,12 @@ enum class PeerMessageError : std::uint8_t {
 };
 inline constexpr std::size_t kPeerMessageErrorCount = 13;
 
-/// The message, with finite values only, or the first error.
+/// Of a datagram that is not sealed, signed or not.
+[[nodiscard]] tl::expected<PeerHeader, PeerMessageError> decode_peer_header(
+    std::span<const std::uint8_t> datagram);
+
+/// The message, with finite values only, or the first error. The datagram has neither seal nor
+/// signature.
 [[nodiscard]] tl::expected<PeerMessage, PeerMessageError> decode_peer_message(
     std::span<const std::uint8_t> datagram);
 

@@ -123,12 +123,9 @@ class Dequantizer {
   std::int64_t base_tick_;
 };
 
-tl::expected<PeerMessage, PeerMessageError> read(std::span<const std::uint8_t> datagram) {
-  BitReader header(datagram.subspan(kMagic.size() + 1));
-  const RobotId sender{static_cast<std::uint16_t>(header.bits(16))};
-  const std::uint64_t session = header.bits(64);
-  const auto sequence = static_cast<std::uint32_t>(header.bits(32));
-  if (!is_robot(sender)) return tl::unexpected(PeerMessageError::kBadId);
+tl::expected<PeerMessage, PeerMessageError> read(std::span<const std::uint8_t> datagram,
+                                                 const PeerHeader& header) {
+  if (!is_robot(header.sender)) return tl::unexpected(PeerMessageError::kBadId);
 
   BodyReader stream(datagram.subspan(kClearHeader, datagram.size() - kClearHeader - kChecksum));
   CodedBody body;
@@ -136,9 +133,9 @@ tl::expected<PeerMessage, PeerMessageError> read(std::span<const std::uint8_t> d
   if (const auto fault = stream.fault()) return tl::unexpected(*fault);
   if (!stream.at_end()) return tl::unexpected(PeerMessageError::kTrailingBytes);
   return Dequantizer(body).message().map([&](PeerMessage message) {
-    message.report.sender = sender;
-    message.session = session;
-    message.sequence = sequence;
+    message.report.sender = header.sender;
+    message.session = header.session;
+    message.sequence = header.sequence;
     return message;
   });
 }
@@ -146,20 +143,35 @@ tl::expected<PeerMessage, PeerMessageError> read(std::span<const std::uint8_t> d
 }  // namespace
 }  // namespace wire
 
-tl::expected<PeerMessage, PeerMessageError> decode_peer_message(
+tl::expected<PeerHeader, PeerMessageError> decode_peer_header(
     std::span<const std::uint8_t> datagram) {
   using Fault = PeerMessageError;
-  constexpr std::size_t kPreamble = wire::kMagic.size() + 1;
+  constexpr std::size_t kVersionAt = wire::kMagic.size();
   if (datagram.size() > kMaxPeerMessage) return tl::unexpected(Fault::kTooLong);
-  if (datagram.size() < kPreamble + wire::kChecksum) return tl::unexpected(Fault::kTooShort);
+  if (datagram.size() < kVersionAt + 1 + wire::kChecksum) return tl::unexpected(Fault::kTooShort);
   if (!std::equal(wire::kMagic.begin(), wire::kMagic.end(), datagram.begin()))
     return tl::unexpected(Fault::kForeign);
-  if (datagram[wire::kMagic.size()] != wire::kVersion) return tl::unexpected(Fault::kOtherVersion);
+  if ((datagram[kVersionAt] & ~kSignedMark) != wire::kVersion)
+    return tl::unexpected(Fault::kOtherVersion);
   if (datagram.size() < kClearHeader + wire::kChecksum) return tl::unexpected(Fault::kTooShort);
+  BitReader fields(datagram.subspan(kVersionAt + 1));
+  PeerHeader header;
+  header.sender = RobotId{static_cast<std::uint16_t>(fields.bits(16))};
+  header.session = fields.bits(64);
+  header.sequence = static_cast<std::uint32_t>(fields.bits(32));
+  return header;
+}
+
+tl::expected<PeerMessage, PeerMessageError> decode_peer_message(
+    std::span<const std::uint8_t> datagram) {
+  const auto header = decode_peer_header(datagram);
+  if (!header) return tl::unexpected(header.error());
+  if (datagram[wire::kMagic.size()] != wire::kVersion)
+    return tl::unexpected(PeerMessageError::kOtherVersion);
   if (crc32(datagram.first(datagram.size() - wire::kChecksum)) !=
       BitReader(datagram.last(wire::kChecksum)).bits(32))
-    return tl::unexpected(Fault::kDamaged);
-  return wire::read(datagram);
+    return tl::unexpected(PeerMessageError::kDamaged);
+  return wire::read(datagram, *header);
 }
 
 }  // namespace crepes

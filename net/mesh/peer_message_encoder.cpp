@@ -269,9 +269,9 @@ class Quantizer {
 
 /// What a datagram leaves out so that it fits.
 struct Omission {
-  std::size_t copies;   ///< of bearings and ranges that remain
-  std::size_t samples;  ///< of the IMU that remain
-  std::size_t stride;   ///< one neighbor in so many remains
+  std::size_t copies;     ///< of bearings and ranges that remain
+  std::size_t samples;    ///< of the IMU that remain
+  std::size_t neighbors;  ///< that remain
 };
 
 /// The omissions in the order in which they are tried.
@@ -279,11 +279,12 @@ std::vector<Omission> omissions(const CodedBody& body, std::size_t copies) {
   constexpr std::size_t kNewestSamples = 6;
   std::vector<Omission> all;
   const std::size_t samples = body.imu.samples.size();
-  for (std::size_t n = copies; n > 0; --n) all.push_back({n, samples, 1});
+  const std::size_t neighbors = std::min(body.sources.size(), kMaxItems);
+  for (std::size_t n = copies; n > 0; --n) all.push_back({n, samples, neighbors});
   for (std::size_t n = samples; n > kNewestSamples; n -= std::min<std::size_t>(4, n))
-    all.push_back({1, n, 1});
-  for (std::size_t stride = 1; stride <= std::max<std::size_t>(body.sources.size(), 1); ++stride)
-    all.push_back({1, kNewestSamples, stride});
+    all.push_back({1, n, neighbors});
+  for (std::size_t n = neighbors; n > 0; n -= std::max<std::size_t>(n / 10, 1))
+    all.push_back({1, kNewestSamples, n});
   return all;
 }
 
@@ -291,8 +292,11 @@ CodedBody without(CodedBody body, const Omission& omission, std::uint32_t sequen
   const auto shorten = [](auto& items, std::size_t n) { items.resize(std::min(items.size(), n)); };
   shorten(body.imu.samples, omission.samples);
   std::vector<CodedSource> remaining;
-  for (std::size_t i = 0; i < body.sources.size(); ++i) {
-    if ((i + sequence) % omission.stride != 0 || remaining.size() == kMaxItems) continue;
+  const std::size_t count = body.sources.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    // Each datagram continues where the last one of this size ended.
+    const std::size_t turn = (i + count - sequence * omission.neighbors % count) % count;
+    if (turn >= omission.neighbors) continue;
     CodedSource& source = remaining.emplace_back(std::move(body.sources[i]));
     shorten(source.ranges, omission.copies);
     // Two of one stamp are a board and its mirror image, or two cameras: they stay together.
@@ -304,6 +308,17 @@ CodedBody without(CodedBody body, const Omission& omission, std::uint32_t sequen
   }
   body.sources = std::move(remaining);
   return body;
+}
+
+/// Bearings and ranges that `body` lacks, of the neighbors that it has.
+std::size_t copies_without_room(const CodedBody& wanted, const CodedBody& body) {
+  std::size_t count = 0;
+  for (const CodedSource& kept : body.sources) {
+    const auto source = std::ranges::find(wanted.sources, kept.neighbor, &CodedSource::neighbor);
+    count += source->bearings.size() - kept.bearings.size();
+    count += source->ranges.size() - kept.ranges.size();
+  }
+  return count;
 }
 
 std::vector<std::uint8_t> written(const OutgoingPeerMessage& message, CodedBody& body) {
@@ -339,9 +354,15 @@ EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
   const std::size_t refused = quantizer.refused();
   const wire::CodedBody whole = std::move(quantizer).body();
   EncodedPeerMessage encoded;
+  encoded.refused = refused;
+  std::optional<wire::CodedBody> wanted;  // the first that is tried
   for (const wire::Omission& omission : wire::omissions(whole, limits.copies)) {
     wire::CodedBody body = wire::without(whole, omission, message.sequence);
-    encoded = {wire::written(message, body), whole.sources.size() - body.sources.size(), refused};
+    encoded.bytes = wire::written(message, body);
+    if (!wanted) wanted = body;
+    encoded.left_out = whole.sources.size() - body.sources.size();
+    encoded.left_out_copies = wire::copies_without_room(*wanted, body);
+    encoded.left_out_samples = whole.imu.samples.size() - body.imu.samples.size();
     if (encoded.bytes.size() <= limits.bytes) break;
   }
   CREPES_EXPECT(encoded.bytes.size() <= kMaxPeerMessage, "the least fits into a datagram");

@@ -1,7 +1,8 @@
-/// The state of the traffic with one peer.
+/// The state of the mesh and of the traffic with one peer.
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "estimator/core/measurements.hpp"
 
@@ -29,6 +30,20 @@ struct PeerTraffic {
   std::uint64_t restarts = 0;  ///< of the peer or of its clock
   double age_s = 0.0;          ///< since the last datagram
   double loss = 0.0;           ///< share of the recent datagrams
+};
+
+/// Shares of the channel's time (`airtime` in send_pacing.hpp), over the last second.
+struct AirShare {
+  double own = 0.0;  ///< what this robot sends
+  double all = 0.0;  ///< that, and what the robots send that it hears; without what they forward
+};
+
+/// How this robot's datagrams are protected, and what they cost.
+struct MeshStatus {
+  bool is_sealed = false;
+  bool is_signed = false;
+  std::string warning;  ///< who could speak for whom; empty if each robot only for itself
+  AirShare air;
 };
 
 }  // namespace crepes

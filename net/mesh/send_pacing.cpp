@@ -39,4 +39,21 @@ double airtime(double datagrams_per_s, double bytes_per_datagram, double rate_mb
   return 1e-6 * frame_us * kRepeats * datagrams_per_s;
 }
 
+AirShare air_share(const AirTotals& before, const AirTotals& after, double rate_mbps) {
+  const double dt = to_seconds(after.at - before.at);
+  const auto difference = [](std::uint64_t from, std::uint64_t to) {
+    return to > from ? static_cast<double>(to - from) : 0.0;
+  };
+  const auto share = [&](double datagrams, double bytes, double unheard) {
+    if (dt <= 0 || datagrams <= 0) return 0.0;
+    return airtime((datagrams + unheard) / dt, bytes / datagrams, rate_mbps);
+  };
+  const double own = share(difference(before.sent, after.sent),
+                           difference(before.sent_bytes, after.sent_bytes), 0.0);
+  const double theirs = share(difference(before.received, after.received),
+                              difference(before.received_bytes, after.received_bytes),
+                              difference(before.lost, after.lost));
+  return {own, own + theirs};
+}
+
 }  // namespace crepes

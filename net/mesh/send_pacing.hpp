@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "net/mesh/peer_status.hpp"
+
 namespace crepes {
 
 struct SendSettings {
@@ -29,5 +31,18 @@ struct SendSettings {
 /// 20 MHz): preamble and symbols, mean backoff, and the repeats of batman-adv, which sends each
 /// broadcast three times. Headers of UDP, IP, batman-adv, LLC and MAC are added to `bytes`.
 [[nodiscard]] double airtime(double datagrams_per_s, double bytes_per_datagram, double rate_mbps);
+
+/// Totals of what was on the air since the start.
+struct AirTotals {
+  Timestamp at{};
+  std::uint64_t sent = 0;
+  std::uint64_t sent_bytes = 0;
+  std::uint64_t received = 0;
+  std::uint64_t received_bytes = 0;
+  std::uint64_t lost = 0;  ///< datagrams of peers
+};
+
+/// The shares of the channel between two instants. Lost datagrams are as long as those received.
+[[nodiscard]] AirShare air_share(const AirTotals& before, const AirTotals& after, double rate_mbps);
 
 }  // namespace crepes

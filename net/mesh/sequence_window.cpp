@@ -4,21 +4,26 @@
 
 namespace crepes {
 
+SequenceWindow::Verdict SequenceWindow::judge(std::uint32_t sequence,
+                                              std::uint32_t max_ahead) const {
+  if (!first_) return Verdict::kNew;
+  if (sequence > newest_)
+    return sequence - newest_ > max_ahead ? Verdict::kTooFarAhead : Verdict::kNew;
+  const std::uint32_t behind = newest_ - sequence;
+  if (behind >= kSize) return Verdict::kTooOld;
+  return (seen_ & std::uint64_t{1} << behind) != 0 ? Verdict::kDuplicate : Verdict::kNew;
+}
+
 SequenceWindow::Verdict SequenceWindow::accept(std::uint32_t sequence, std::uint32_t max_ahead) {
-  if (!first_) {
-    first_ = newest_ = sequence;
-  } else if (sequence > newest_) {
+  const Verdict verdict = judge(sequence, max_ahead);
+  if (verdict != Verdict::kNew) return verdict;
+  if (!first_) first_ = newest_ = sequence;
+  if (sequence > newest_) {
     const std::uint32_t ahead = sequence - newest_;
-    if (ahead > max_ahead) return Verdict::kTooFarAhead;
     seen_ = ahead < kSize ? seen_ << ahead : 0;
     newest_ = sequence;
   }
-  const std::uint32_t behind = newest_ - sequence;
-  if (behind >= kSize) return Verdict::kTooOld;
-  const std::uint64_t bit = std::uint64_t{1} << behind;
-  if ((seen_ & bit) != 0) return Verdict::kDuplicate;
-
-  seen_ |= bit;
+  seen_ |= std::uint64_t{1} << (newest_ - sequence);
   first_ = std::min(*first_, sequence);
   ++received_;
   return Verdict::kNew;

@@ -15,6 +15,8 @@ class SequenceWindow {
 
   /// `max_ahead` bounds a jump forward: one forged number must not make all true ones too old.
   [[nodiscard]] Verdict accept(std::uint32_t sequence, std::uint32_t max_ahead);
+  /// What `accept` would return. Changes nothing.
+  [[nodiscard]] Verdict judge(std::uint32_t sequence, std::uint32_t max_ahead) const;
 
   [[nodiscard]] std::uint64_t received() const { return received_; }
   /// Missing between the first and the newest. A datagram that arrives late no longer counts.

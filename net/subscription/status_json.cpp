@@ -123,6 +123,14 @@ void put_sensors(Json& json, const SystemStatus& status) {
   for (const SensorStatus& sensor : status.sensors) json["sensors"].push_back(sensor_json(sensor));
 }
 
+Json mesh_json(const MeshStatus& mesh) {
+  Json json{{"sealed", mesh.is_sealed}, {"signed", mesh.is_signed}};
+  if (!mesh.warning.empty()) json["warning"] = truncated_utf8(mesh.warning, kMaxText);
+  put(json, "airtime", mesh.air.own, 3);
+  put(json, "airtime_of_all", mesh.air.all, 3);
+  return json;
+}
+
 void put_network(Json& json, const SystemStatus& status) {
   json["queues"] = Json::object();
   for (const QueueStatus& queue : status.queues)
@@ -130,6 +138,7 @@ void put_network(Json& json, const SystemStatus& status) {
   json["estimator"] = totals_json({{"unknown_senders", status.estimator.unknown_senders},
                                    {"refused_samples", status.estimator.refused_samples}});
   put_refused_imu(json["estimator"], status.estimator.refused_imu);
+  json["mesh"] = mesh_json(status.mesh);
   json["network"] = totals_json(status.network);
 }
 
@@ -181,10 +190,11 @@ bool drop_last_neighbor(Json& status) {
 /// long.
 std::string fitted(Json status) {
   using Cut = void (*)(Json&);
-  constexpr std::array<Cut, 13> kCuts{
+  constexpr std::array<Cut, 14> kCuts{
       [](Json& s) { erase_in_each(s, "sensors", "counts"); },
       [](Json& s) { erase_in_each(s, "neighbors", "measurements"); },
       [](Json& s) { s.erase("network"); },
+      [](Json& s) { s.erase("mesh"); },
       [](Json& s) {
         erase_in_each(s, "neighbors", "id_decodes");
         erase_in_each(s, "neighbors", "refused_imu");

@@ -48,6 +48,7 @@ struct SystemStatus {
   EstimatorStatus estimator;
   std::vector<ClockStatus> clocks;
   std::vector<PeerTraffic> traffic;
+  MeshStatus mesh;
   std::vector<QueueStatus> queues;
   std::vector<std::pair<std::string, std::uint64_t>> network;  ///< datagrams and refusals by reason
 };

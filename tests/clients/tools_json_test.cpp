@@ -90,6 +90,12 @@ TEST(ToolsInJson, TellWhereAKeyIs) {
   EXPECT_EQ(again.how, "exit code 1");
   EXPECT_EQ(again.output, "");
   EXPECT_NE(again.errors.find("not overwritten"), std::string::npos) << again.errors;
+
+  const std::string own = scratch.path() / "robot.key";
+  const Json both = object_of({"keygen", file, own, "--json"});
+  EXPECT_EQ(both["fingerprint"], made["fingerprint"]);
+  EXPECT_EQ(both["robot_file"], own);
+  EXPECT_EQ(both["public_key"].get<std::string>().size(), 44U);
 }
 
 TEST(ToolsInJson, ListDevices) {

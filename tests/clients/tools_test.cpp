@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "config/keys/robot_key.hpp"
 #include "daemon/runtime.hpp"
 #include "tests/clients/tool_run.hpp"
 #include "tests/support/places.hpp"
@@ -134,6 +135,26 @@ TEST(ToolsAlone, MakeAKeyOnceOnly) {
   EXPECT_EQ(crepesctl({"keygen", file}).how, "exit code 0");
   EXPECT_EQ(crepesctl({"keygen", file}).how, "exit code 1");
   EXPECT_EQ(std::filesystem::file_size(file), 32U);
+}
+
+TEST(ToolsAlone, MakeKeysThatFitTogether) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const std::string swarm = scratch.path() / "mesh.key";
+  const std::string one = scratch.path() / "r1.key";
+  const std::string two = scratch.path() / "r2.key";
+
+  const Ending first = crepesctl({"keygen", swarm, one});
+  const Ending second = crepesctl({"keygen", swarm, two});
+
+  EXPECT_EQ(first.how, "exit code 0");
+  EXPECT_EQ(second.how, "exit code 0");
+  EXPECT_EQ(crepesctl({"keygen", swarm, two}).how, "exit code 1");
+  EXPECT_EQ(first.output.substr(0, first.output.find('\n')),
+            second.output.substr(0, second.output.find('\n')));  // the same swarm's key
+  const std::string known = to_text(public_key_of(read_robot_key(one).value()));
+  EXPECT_NE(first.output.find("\n  public_key: \"" + known + "\"\n"), std::string::npos)
+      << first.output;
+  EXPECT_EQ(second.output.find(known), std::string::npos);
 }
 
 TEST(ToolsAlone, CompleteTheirWordsInBash) {

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "config/keys/mesh_key.hpp"
+#include "config/keys/robot_key.hpp"
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/replay/swarm_replay.hpp"
@@ -70,6 +71,14 @@ TEST_F(Record, ReplaysTogetherWithTheOtherRobotsRecording) {
   Config first = recorded_config(1);
   Config second = recorded_config(2);
   first.net.key_file = second.net.key_file = key;
+  for (Config* config : {&first, &second}) {
+    config->net.robot_key_file =
+        folder_.path() / ("robot" + std::to_string(config->robot.id.value) + ".key");
+    const PublicKey own = public_key_of(write_robot_key(config->net.robot_key_file).value());
+    for (Config* knowing : {&first, &second})
+      std::ranges::find(knowing->swarm.members, config->robot.id, &MemberConfig::id)->public_key =
+          to_text(own);
+  }
   second.sim.clock_offset_s = 7.25;
   second.sim.clock_skew_ppm = 40.0;
   const auto runtime_1 = std::make_unique<Runtime>(first, machine_);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "config/keys/mesh_key.hpp"
+#include "config/keys/robot_key.hpp"
 #include "daemon/ctl/demo/child_process.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
@@ -141,6 +142,50 @@ TEST_F(Reload, TakesTheKeyThatHasTakenTheOldOnesPlace) {
   expect_true_poses(configs[0]);
   EXPECT_TRUE(Client(configs[0]).await_status([](const Json& status) {
     return sensor_of(status, "mesh").value("ok", false);
+  }));
+}
+
+TEST_F(Reload, ExcludesALostRobotByOneLine) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const std::filesystem::path swarm_key = scratch.path() / "mesh.key";
+  ASSERT_TRUE(write_mesh_key(swarm_key));
+  std::array<Config, 2> configs{pair_config(1, mesh_port_), pair_config(2, mesh_port_)};
+  std::array<std::string, 2> known;
+  for (std::size_t i = 0; i < 2; ++i) {
+    configs.at(i).net.key_file = swarm_key;
+    configs.at(i).net.robot_key_file = scratch.path() / ("robot" + std::to_string(i));
+    known.at(i) = to_text(public_key_of(write_robot_key(configs.at(i).net.robot_key_file).value()));
+  }
+  for (Config& config : configs) {
+    for (std::size_t i = 0; i < 2; ++i) config.swarm.members.at(i).public_key = known.at(i);
+  }
+  Runtime one(configs[0], machine_);
+  const Runtime two(configs[1], machine_);
+  Client client(configs[0]);
+  expect_true_poses(configs[0]);
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    const Json mesh = status.value("mesh", Json::object());
+    return mesh.value("signed", false) && mesh.value("sealed", false) &&
+           !mesh.contains("warning") && mesh.value("airtime_of_all", 0.0) > 0.01;
+  }));
+
+  Config excluding = configs[0];
+  excluding.swarm.members.at(1).excluded = true;
+  ASSERT_TRUE(one.reconfigure(excluding));
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    return status["neighbors"][0].value("state", "") == "none" &&
+           status["network"].value("refused_excluded", 0) > 50;
+  }));
+
+  ASSERT_TRUE(one.reconfigure(configs[0]));
+  expect_true_poses(configs[0]);
+
+  Config mistaken = configs[0];  // of another robot
+  std::swap(mistaken.swarm.members.at(0).public_key, mistaken.swarm.members.at(1).public_key);
+  ASSERT_TRUE(one.reconfigure(mistaken));
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    return tells(sensor_of(status, "mesh"), "public_key") &&
+           status["network"].value("refused_signature_wrong", 0) > 50;
   }));
 }
 

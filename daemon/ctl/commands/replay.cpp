@@ -54,6 +54,16 @@ void add_replay(CommandLine& line) {
   sub->add_option_function<std::uint64_t>(
       "--seed", [&options](std::uint64_t seed) { options.seed = seed; },
       "seed of the simulated network; overrides swarm.yaml");
+  sub->add_option_function<double>(
+         "--loss", [&options](double loss) { options.loss = loss; },
+         "share of datagrams that are lost; overrides swarm.yaml")
+      ->check(CLI::Range(0.0, 0.99));
+  sub->add_option("--burst", options.burst_s,
+                  "seconds for which a link loses everything; without it, datagrams are lost one "
+                  "by one")
+      ->check(CLI::Range(0.0, 60.0));
+  sub->add_flag("--sealed", options.sealed,
+                "seal and sign the datagrams, with keys made for the replay");
   sub->add_flag(
       "--debug-innovations", options.records,
       "also write <neighbor>.innovations.csv and .calibration.csv: every measurement's residual, "

@@ -74,7 +74,7 @@ Result<void> ask_part(DaemonClient& client, std::string_view part, const char* m
       client, [&](DaemonClient& c) { return c.poll(part); },
       [&](const Json& json) { return json.contains(mark) && !json.contains("neighbors"); });
   if (!answer) return tl::unexpected(answer.error());
-  if (*answer) replace(whole, **answer, {"sensors", "queues", "estimator", "network"});
+  if (*answer) replace(whole, **answer, {"sensors", "queues", "estimator", "mesh", "network"});
   return {};
 }
 

@@ -39,7 +39,8 @@ std::string sensors_of(const StatusMessage& status) {
 }
 
 std::string neighbors_of(const StatusMessage& status) {
-  Rows rows{{"neighbor", "state", "heard ms ago", "lost %", "clock s", "+- ms", "ppm", "why not"}};
+  Rows rows{{"neighbor", "state", "heard ms ago", "lost %", "lost now %", "clock s", "+- ms", "ppm",
+             "why not"}};
   for (const auto& neighbor : status.neighbors) {
     std::vector<std::string> row{
         neighbor.name.empty() ? std::to_string(neighbor.neighbor.value) : neighbor.name,
@@ -48,6 +49,7 @@ std::string neighbors_of(const StatusMessage& status) {
     const double sent = reports ? static_cast<double>(reports->received + reports->lost) : 0.0;
     row.push_back(reports ? fixed(1e3 * reports->age_s, 0) : "-");
     row.push_back(sent > 0 ? fixed(100.0 * static_cast<double>(reports->lost) / sent, 1) : "-");
+    row.push_back(reports ? fixed(100.0 * reports->loss, 1) : "-");
     const auto clock =
         std::ranges::find(status.clocks, neighbor.neighbor, &StatusMessage::Clock::peer);
     const bool known = clock != status.clocks.end();
@@ -71,6 +73,34 @@ std::string faults_of(const StatusMessage& status) {
   return text;
 }
 
+std::string mesh_of(const StatusMessage& status) {
+  if (!status.mesh) return "";
+  const StatusMessage::Mesh& mesh = *status.mesh;
+  const std::string keys = mesh.sealed ? (mesh.signs ? "sealed and signed" : "sealed, not signed")
+                                       : (mesh.signs ? "signed, not sealed" : "open");
+  std::string text =
+      fmt::format("mesh: {}; {} % of the air, {} % with all that are heard\n", keys,
+                  fixed(100.0 * mesh.airtime, 1), fixed(100.0 * mesh.airtime_of_all, 1));
+  if (!mesh.warning.empty()) text += fmt::format("mesh: {}\n", mesh.warning);
+  return text;
+}
+
+/// What had no room in this robot's share of the air.
+std::string thinned_of(const StatusMessage& status) {
+  const auto total = [&](const char* name) {
+    const auto found = status.network.find(name);
+    return found == status.network.end() ? std::uint64_t{0} : found->second;
+  };
+  const std::uint64_t copies = total("left_out_copies");
+  const std::uint64_t samples = total("left_out_samples");
+  const std::uint64_t newest = total("left_out_of_datagrams");
+  if (copies + samples + newest == 0) return "";
+  return fmt::format(
+      "thinned out: {} repeats of bearings and ranges, {} of inertial samples, {} times a "
+      "neighbor's newest\n",
+      copies, samples, newest);
+}
+
 /// Everything refused, lost or dropped; on a healthy robot this is short.
 std::string totals_of(const StatusMessage& status) {
   std::string text;
@@ -83,8 +113,9 @@ std::string totals_of(const StatusMessage& status) {
 }  // namespace
 
 std::string status_text(const StatusMessage& status) {
-  return fmt::format("{}\n{}\n{}\n{}{}", head_of(status), sensors_of(status), neighbors_of(status),
-                     faults_of(status), totals_of(status));
+  return fmt::format("{}\n{}\n{}\n{}{}{}{}", head_of(status), sensors_of(status),
+                     neighbors_of(status), faults_of(status), mesh_of(status), thinned_of(status),
+                     totals_of(status));
 }
 
 Result<std::string> status(const StatusOptions& options) {

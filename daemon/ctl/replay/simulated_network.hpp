@@ -1,30 +1,55 @@
 /// The mesh of a replay: datagrams are delayed, reordered and lost.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <random>
+#include <utility>
 
 #include "daemon/ctl/dataset/swarm_manifest.hpp"
+#include "estimator/core/measurements.hpp"
 
 namespace crepes {
 
 class SimulatedNetwork {
  public:
-  SimulatedNetwork(const NetworkModel& model, std::uint64_t seed) : model_(model), random_(seed) {}
+  /// With `burst_s`, a link loses everything for so long, then nothing for a time with an
+  /// exponential distribution, so that the share that is lost is the model's (Gilbert 1960).
+  SimulatedNetwork(const NetworkModel& model, std::uint64_t seed, double burst_s = 0.0)
+      : model_(model), burst_s_(burst_s), random_(seed) {}
 
   /// The delay of one datagram to one receiver [s]; empty if it is lost.
-  [[nodiscard]] std::optional<double> delay_s() {
-    const bool lost = uniform() < model_.loss;
+  [[nodiscard]] std::optional<double> delay_s(RobotId from, RobotId to, double sent_s) {
+    const bool lost =
+        burst_s_ > 0 ? is_in_burst(bursts_[{from, to}], sent_s) : uniform() < model_.loss;
     const double delay_ms = model_.latency_ms + uniform() * model_.jitter_ms;
     return lost ? std::nullopt : std::optional(delay_ms * 1e-3);
   }
 
  private:
+  struct Burst {
+    double from_s = 0.0;
+    double to_s = 0.0;
+  };
+
+  [[nodiscard]] bool is_in_burst(Burst& burst, double sent_s) {
+    if (model_.loss <= 0) return false;
+    const double mean_gap_s = burst_s_ * (1 - model_.loss) / model_.loss;
+    while (burst.to_s <= sent_s) {
+      burst.from_s = burst.to_s - mean_gap_s * std::log(1 - uniform());
+      burst.to_s = burst.from_s + burst_s_;
+    }
+    return sent_s >= burst.from_s;
+  }
+
   // In [0, 1). Unlike the distributions of std, it gives the same values everywhere.
   double uniform() { return static_cast<double>(random_() >> 11U) * 0x1.0p-53; }
 
   NetworkModel model_;
+  double burst_s_;
+  std::map<std::pair<RobotId, RobotId>, Burst> bursts_;  ///< by sender and receiver
   std::mt19937_64 random_;
 };
 

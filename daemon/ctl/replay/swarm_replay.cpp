@@ -1,6 +1,7 @@
 #include "daemon/ctl/replay/swarm_replay.hpp"
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 #include <deque>
 #include <map>
@@ -29,7 +30,10 @@ constexpr double kGraphLatency = 0.005;  // s
 constexpr double kMaxIdError = 0.05;  // rad; a bearing with a larger error belongs to another robot
 constexpr double kClockSamplePeriod = 1.0;  // s
 
-using Datagram = std::vector<std::uint8_t>;
+struct Datagram {
+  std::vector<std::uint8_t> bytes;
+  Endpoint from;
+};
 // Only the name of an image; it is decoded when it is due.
 struct PendingImage {
   std::uint8_t camera = 0;
@@ -87,23 +91,39 @@ std::vector<RobotId> member_ids(const Config& config) {
 
 /// The state that the daemon's threads own, for one robot.
 struct Robot {
-  explicit Robot(RobotRecording recorded)
+  Robot(RobotRecording recorded, bool sealed)
       : recording(std::move(recorded)),
         estimator(estimator_settings(recording.config)),
-        link(recording.robot.id, member_ids(recording.config), send_settings(recording.config)),
+        link(new_link()),
         detector(recording.config.vision),
-        period(from_seconds(1.0 / recording.config.estimator.output_rate_hz)) {}
+        period(from_seconds(1.0 / recording.config.estimator.output_rate_hz)) {
+    if (!sealed) return;
+    seal.emplace(replay_swarm_key());
+    signer.emplace(replay_robot_key(recording.robot.id));
+    for (const RobotId id : member_ids(recording.config))
+      trust.keys.emplace(id, public_key_of(replay_robot_key(id)));
+    link.set_trust(trust);
+  }
+
+  [[nodiscard]] PeerLink new_link() const {
+    PeerLink fresh(recording.robot.id, member_ids(recording.config),
+                   send_settings(recording.config));
+    fresh.set_trust(trust);
+    return fresh;
+  }
 
   void restart() {
     estimator = Estimator(estimator_settings(recording.config));
     team = TeamSolver();
-    link =
-        PeerLink(recording.robot.id, member_ids(recording.config), send_settings(recording.config));
+    link = new_link();
   }
 
   RobotRecording recording;
   Estimator estimator;
   TeamSolver team;
+  std::optional<PacketSeal> seal;
+  std::optional<PacketSigner> signer;
+  MeshTrust trust;
   PeerLink link;
   SpotDetector detector;
   Duration period;
@@ -117,6 +137,11 @@ struct Robot {
   [[nodiscard]] const RobotClock& clock() const { return recording.robot.clock; }
 };
 
+NetworkModel network_model(NetworkModel recorded, const ReplayOptions& options) {
+  recorded.loss = options.loss.value_or(recorded.loss);
+  return recorded;
+}
+
 class SwarmReplay {
  public:
   SwarmReplay(SwarmDataset dataset, const std::optional<SwarmTruth>& truth,
@@ -125,12 +150,13 @@ class SwarmReplay {
         truth_(truth),
         sinks_(sinks),
         faults_(std::move(dataset.faults)),
-        network_(manifest_.network, options.seed.value_or(manifest_.network.seed)),
+        network_(network_model(manifest_.network, options),
+                 options.seed.value_or(manifest_.network.seed), options.burst_s),
         outages_(options.outages) {
     for (RobotRecording& recording : dataset.robots) {
       recording.config.graph.enabled &= options.graph;
       if (options.profile) recording.config.estimator.profile = *options.profile;
-      robots_.emplace_back(std::move(recording));
+      robots_.emplace_back(std::move(recording), options.sealed);
       if (sinks.on_records) robots_.back().estimator.keep_records();
     }
     for (std::size_t i = 0; i < robots_.size(); ++i) schedule_recording(i);
@@ -232,7 +258,8 @@ Result<void> SwarmReplay::deliver(const Arrival& arrival) {
     std::optional<ReceivedReport> received;
     {
       const CpuTimer timer(robot.cpu.net_s);
-      received = robot.link.receive(*datagram, robot.clock().local(arrival.true_s));
+      received = robot.link.receive(datagram->bytes, robot.clock().local(arrival.true_s),
+                                    robot.seal, datagram->from);
     }
     if (received) step(arrival, Event(std::move(*received)));
   } else {
@@ -284,22 +311,24 @@ void SwarmReplay::handle_outputs(const Arrival& arrival, const Outputs& outputs)
 
 void SwarmReplay::broadcast(const Arrival& arrival, const Report& report) {
   Robot& robot = robots_[arrival.robot];
-  Datagram datagram;
+  std::vector<std::uint8_t> datagram;
   {
     const CpuTimer timer(robot.cpu.net_s);
-    datagram = robot.link.compose(report, robot.clock().local(arrival.true_s));
+    datagram =
+        robot.link.compose(report, robot.clock().local(arrival.true_s), robot.seal, robot.signer);
   }
   ++robot.datagrams_sent;
   robot.bytes_sent += datagram.size();
   for (std::size_t i = 0; i < robots_.size(); ++i) {
     if (i == arrival.robot) continue;
     std::vector<Delivery> deliveries;
-    if (const auto delay_s = network_.delay_s())
-      deliveries.push_back({arrival.true_s + *delay_s, datagram});
+    if (const auto delay_s = network_.delay_s(robot.id(), robots_[i].id(), arrival.true_s))
+      deliveries.push_back({arrival.true_s + *delay_s, datagram, replay_address(robot.id())});
     if (sinks_.on_delivery)
       sinks_.on_delivery(robot.id(), robots_[i].id(), arrival.true_s, deliveries);
     for (Delivery& delivery : deliveries)
-      schedule(std::max(arrival.true_s, delivery.arrives_s), i, std::move(delivery.bytes));
+      schedule(std::max(arrival.true_s, delivery.arrives_s), i,
+               Datagram{std::move(delivery.bytes), delivery.from});
   }
 }
 
@@ -355,6 +384,20 @@ ReplayReport SwarmReplay::report(const ReplayOptions& options) const {
 }
 
 }  // namespace
+
+Endpoint replay_address(RobotId robot) {
+  constexpr std::uint16_t kPort = 47474;
+  const auto high = static_cast<std::uint8_t>(robot.value >> 8U);
+  return Endpoint::ipv4({10, 0, high, static_cast<std::uint8_t>(robot.value & 0xFFU)}, kPort);
+}
+
+MeshKey replay_swarm_key() { return MeshKey{{7}}; }
+
+RobotKey replay_robot_key(RobotId robot) {
+  const std::array<std::uint8_t, 32> seed{static_cast<std::uint8_t>(robot.value & 0xFFU),
+                                          static_cast<std::uint8_t>(robot.value >> 8U)};
+  return robot_key_of(seed);
+}
 
 Result<ReplayReport> replay_dataset(SwarmDataset dataset, const std::optional<SwarmTruth>& truth,
                                     const ReplayOptions& options, const ReplaySinks& sinks) {

@@ -13,6 +13,9 @@
 #include "daemon/ctl/replay/replay_output.hpp"
 #include "drivers/dataset/dataset_faults.hpp"
 #include "estimator/core/result.hpp"
+#include "net/endpoint.hpp"
+#include "net/mesh/packet_seal.hpp"
+#include "net/mesh/packet_signature.hpp"
 
 namespace crepes {
 
@@ -31,6 +34,9 @@ struct ReplayOptions {
   bool graph = true;                  ///< false: no pose graph, even if the files enable it
   bool records = false;               ///< also writes the residual and verdict of every measurement
   std::optional<std::uint64_t> seed;  ///< seed of the network; overrides swarm.yaml
+  std::optional<double> loss;         ///< share of lost datagrams; overrides swarm.yaml
+  double burst_s = 0.0;               ///< losses of a link come together for so long; 0: one by one
+  bool sealed = false;                ///< datagrams are sealed and signed, with keys for the replay
   std::vector<Outage> outages;
   std::function<void(double)> on_progress;  ///< progress, 0..1, called regularly
 };
@@ -39,7 +45,14 @@ struct ReplayOptions {
 struct Delivery {
   double arrives_s = 0.0;  ///< true time
   std::vector<std::uint8_t> bytes;
+  Endpoint from{};
 };
+
+/// Of a robot in a replay.
+[[nodiscard]] Endpoint replay_address(RobotId robot);
+/// What a robot has if `ReplayOptions::sealed` is set: the swarm's key, and a key of its own.
+[[nodiscard]] MeshKey replay_swarm_key();
+[[nodiscard]] RobotKey replay_robot_key(RobotId robot);
 
 struct ReplaySummary {
   std::size_t robots = 0;

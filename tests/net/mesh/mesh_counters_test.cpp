@@ -31,7 +31,7 @@ TEST(MeshCounters, NameEachErrorOfAMessageAfterIt) {
   EXPECT_EQ(name_of(counter_of(PeerMessageError::kBadCovariance)), "refused_bad_covariance");
 }
 
-TEST(MeshCounters, AddUpWhatWasRefusedForItsSeal) {
+TEST(MeshCounters, AddUpWhatWasRefusedForItsSealOrItsSignature) {
   MeshCounters counters;
   for (const UnsealError error :
        {UnsealError::kNotSealed, UnsealError::kOtherVersion, UnsealError::kNotAuthentic})
@@ -39,7 +39,11 @@ TEST(MeshCounters, AddUpWhatWasRefusedForItsSeal) {
   counters.add(MeshCounter::kRefusedSealUnexpected);
   counters.add(MeshCounter::kRefusedDamaged);
 
+  counters.add(MeshCounter::kRefusedSignatureWrong);
+  counters.add(MeshCounter::kRefusedSignatureMissing);
+
   EXPECT_EQ(counters.seal_refusals(), 4U);
+  EXPECT_EQ(counters.signature_refusals(), 2U);
   EXPECT_EQ(name_of(counter_of(UnsealError::kNotSealed)), "refused_seal_missing");
   EXPECT_EQ(name_of(counter_of(UnsealError::kOtherVersion)), "refused_seal_version");
   EXPECT_EQ(name_of(counter_of(UnsealError::kNotAuthentic)), "refused_seal_broken");

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+
 #include "net/mesh/peer_message.hpp"
 
 namespace crepes {
@@ -28,6 +30,24 @@ TEST(SendPacing, CountsTheAirOfThreeBroadcastsADatagram) {
   // 400 bytes and 92 of headers at 6 Mbit/s: 660 us of symbols, 20 of preamble, 101.5 of waiting.
   EXPECT_NEAR(airtime(25, 400, 6), 25 * 3 * (660 + 20 + 101.5) * 1e-6, 1e-9);
   EXPECT_LT(airtime(25, 400, 24), 0.5 * airtime(25, 400, 6));
+}
+
+TEST(SendPacing, AddsUpTheSharesOfAllThatIsHeardOrLost) {
+  const AirTotals before{.at = Timestamp{}, .sent = 10, .sent_bytes = 5000, .received = 100};
+  AirTotals after = before;
+  after.at += std::chrono::seconds{2};
+  EXPECT_EQ(air_share(before, after, 6).all, 0.0);
+  after.sent += 50;
+  after.sent_bytes += 50 * 400;
+  after.received += 75;
+  after.received_bytes += 75 * 300;
+  after.lost += 25;
+
+  const AirShare share = air_share(before, after, 6);
+
+  EXPECT_DOUBLE_EQ(share.own, airtime(25, 400, 6));
+  EXPECT_DOUBLE_EQ(share.all, airtime(25, 400, 6) + airtime(50, 300, 6));
+  EXPECT_EQ(air_share(after, after, 6).all, 0.0);
 }
 
 }  // namespace

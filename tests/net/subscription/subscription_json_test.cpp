@@ -185,6 +185,10 @@ TEST(SubscriptionJson, ReportsAllOfASmallStatus) {
   status.network.resize(2);
   for (auto& sensor : status.sensors) sensor.message.resize(10);
   status.estimator.neighbors[0].measurements = {};
+  status.mesh = {.is_sealed = true,
+                 .is_signed = false,
+                 .warning = "any robot of the swarm could speak for another",
+                 .air = {0.012, 0.2345}};
 
   const Json json = Json::parse(status_json(status));
 
@@ -195,6 +199,11 @@ TEST(SubscriptionJson, ReportsAllOfASmallStatus) {
   EXPECT_NEAR(json["clocks"][0]["offset_s"].get<double>(), 993.638158694, 1e-8);
   EXPECT_EQ(json["queues"]["events"], 42);
   EXPECT_EQ(json["network"]["refused_1"], 1001);
+  EXPECT_EQ(json["mesh"], Json({{"sealed", true},
+                                {"signed", false},
+                                {"warning", status.mesh.warning},
+                                {"airtime", 0.012},
+                                {"airtime_of_all", 0.235}}));
 }
 
 TEST(SubscriptionJson, ReportsEightNeighborsAndTheirClocksInOneStatus) {

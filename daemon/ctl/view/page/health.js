@@ -64,6 +64,11 @@ function drawSpark(canvas, { points, from, to }) {
   pen.stroke();
 }
 
+/** The share of the channel, and whose datagrams could be forged. */
+const airOf = ({ mesh }) => mesh ? `, ${fixed(100 * mesh.airtime_of_all, 1)} % of the air with all that are heard${mesh.warning ? `; ${mesh.warning}` : ""}` : "";
+/** The share of a neighbor's datagrams that do not arrive. */
+const lossOf = (about) => about?.reports?.loss > 0 ? `, ${fixed(100 * about.reports.loss, 0)} % of its datagrams lost` : "";
+
 const verdicts = (neighbor, kind, verdict) => neighbor.measurements?.[kind]?.[verdict] || 0;
 const allOf = (neighbor, verdict) => Object.values(neighbor.measurements || {}).reduce((sum, kind) => sum + (kind[verdict] || 0), 0);
 
@@ -116,7 +121,7 @@ export class Health {
     this.drawEvents();
     const { status } = this.store;
     const share = status.uptime_s > 0 ? (100 * status.cpu_s) / status.uptime_s : NaN;
-    setText(this.nodes.load, status.self ? `${status.name}: up ${fixed(status.uptime_s, 0)} s, ${fixed(share, 1)} % of a core, ${fixed(status.rss_mb, 0)} MB` : "");
+    setText(this.nodes.load, status.self ? `${status.name}: up ${fixed(status.uptime_s, 0)} s, ${fixed(share, 1)} % of a core, ${fixed(status.rss_mb, 0)} MB${airOf(status)}` : "");
   }
 
   drawNeighbors(t) {
@@ -132,7 +137,7 @@ export class Health {
         state: row ? MODES[row[MODE]] : reason,
         isBad: !row || faults !== "",
         advice: faults || (row ? "" : ADVICE[reason] || ""),
-        numbers: row ? `${length(norm(positionOf(row)))} away, σ ${length(row[SIGMA])}, ${fixed(degrees(row[SIGMA_ROTATION]), 2)} deg${this.store.isLive ? `, measured ${fixed(1000 * row[AGE], 0)} ms ago` : ""}` : "",
+        numbers: row ? `${length(norm(positionOf(row)))} away, σ ${length(row[SIGMA])}, ${fixed(degrees(row[SIGMA_ROTATION]), 2)} deg${this.store.isLive ? `, measured ${fixed(1000 * row[AGE], 0)} ms ago${lossOf(about)}` : ""}` : "",
         spark: { points: rows.map((each) => [each[T], each[SIGMA]]), from, to: t },
       });
     }
