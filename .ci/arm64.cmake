@@ -30,7 +30,7 @@ set(ENV{PKG_CONFIG_SYSROOT_DIR} ${CMAKE_SYSROOT})
 set(ENV{PKG_CONFIG_LIBDIR} ${CMAKE_SYSROOT}/usr/lib/aarch64-linux-gnu/pkgconfig:${CMAKE_SYSROOT}/usr/share/pkgconfig)
 
 # Runs what was built, for the manuals and the tests; the kernel need not know of it (binfmt).
-find_program(QEMU_AARCH64 NAMES qemu-aarch64-static qemu-aarch64)
+find_program(QEMU_AARCH64 NAMES qemu-aarch64 qemu-aarch64-static)
 if(QEMU_AARCH64)
   set(CMAKE_CROSSCOMPILING_EMULATOR ${QEMU_AARCH64};-L;${CMAKE_SYSROOT})
 endif()
