@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""Installs the documents: with the same relative paths as in the source, so that links work. A link to what is not installed
-becomes text.
+"""Installs the documents. Links between them work where they are; a link to what is not installed becomes text.
     documents.py SOURCE DIRECTORY"""
 import os
 import pathlib
@@ -8,40 +7,52 @@ import re
 import shutil
 import sys
 
-DOCUMENTS = ["README.md", "ARCHITECTURE.md", "CITATION.cff", "SECURITY.md", "config/README.md", "config/crepesd.yaml", "config/docs",
-             "config/examples", "config/libraries", "daemon/ctl/view/README.md", "estimator/vision/README.md",
+DOCUMENTS = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CITATION.cff", "SECURITY.md", "config/README.md", "config/crepesd.yaml",
+             "config/docs", "config/examples", "config/libraries", "daemon/ctl/view/README.md", "estimator/vision/README.md",
              "firmware/led_board/README.md", "systemd/MESH.md", "systemd/README.md", "systemd/mesh", "tests/bench/README.md",
              "tests/study/README.md"]
-ELSEWHERE = {"config/crepesd.yaml": "config/examples/crepesd.yaml", "systemd/mesh": "config/examples/mesh"}
+# Debian has its examples at one place; all else is as deep as in the source.
+MOVED = {"config/examples": "examples", "config/crepesd.yaml": "examples/crepesd.yaml", "systemd/mesh": "examples/mesh"}
 MAKERS = shutil.ignore_patterns("draw.py", "make_pictures.sh", "make_recording.sh", "__pycache__", "*.egg-info", "build")
+
+
+def installed(name):
+    """Where the package has a file or directory of the source, both relative."""
+    for old, new in MOVED.items():
+        if name == old or name.startswith(old + "/"):
+            return new + name[len(old):]
+    return name
 
 
 def copy(source, target):
     target.parent.mkdir(parents=True, exist_ok=True)
     if source.is_dir():
-        shutil.copytree(source, target, ignore=MAKERS, dirs_exist_ok=True)
+        shutil.copytree(source, target, ignore=MAKERS, copy_function=shutil.copyfile, dirs_exist_ok=True)
     else:
-        shutil.copy(source, target)
+        shutil.copyfile(source, target)
 
 
-def with_links_that_work(page, text):
+def with_links_that_work(place, name, text):
     def link(found):
-        target = found[2].replace("CHANGELOG.md", "changelog.gz")
-        is_there = ":" in target or not target or (page.parent / target).exists()
-        return f"[{found[1]}]({target}{found[3]})" if is_there else found[1]
+        text, target, anchor = found[1], found[2], found[3] or ""
+        if not target or ":" in target:
+            return found[0]
+        target = installed(os.path.normpath(os.path.join(os.path.dirname(name), target)))
+        if not (place / target).exists():
+            return text
+        return f"[{text}]({os.path.relpath(target, os.path.dirname(installed(name)))}{anchor})"
 
-    return re.sub(r"(?<!!)\[([^\]]*)\]\(([^)#]*)(#[^)]*)?\)", lambda found: link([*found.group(0, 1, 2), found[3] or ""]), text)
+    return re.sub(r"\[([^\]]*)\]\(([^)#\s]*)(#[^)]*)?\)", link, text)
 
 
 def main(source, place):
     for name in DOCUMENTS:
-        copy(source / name, place / name)
-    for name, other in ELSEWHERE.items():
-        copy(source / name, place / other)
-    if not (place / "examples").is_symlink():
-        os.symlink("config/examples", place / "examples")
-    for page in place.rglob("*.md"):
-        page.write_text(with_links_that_work(page, page.read_text()))
+        copy(source / name, place / installed(name))
+    for name in DOCUMENTS:
+        pages = [source / name] if name.endswith(".md") else (source / name).rglob("*.md")
+        for page in (str(page.relative_to(source)) for page in pages):
+            target = place / installed(page)
+            target.write_text(with_links_that_work(place, page, target.read_text()))
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ inside dpkg -i /tmp/crepes.deb
 step "use"
 inside crepesd --version
 inside crepesctl --help >/dev/null
-inside sh -c 'find /usr/share/doc/crepes/examples/ -name "r*.yaml" -path "*-*" -print0 | xargs -0 -n1 crepesd --check-config'
+inside sh -c 'find /usr/share/doc/crepes/examples -name "r*.yaml" -path "*-*" -print0 | xargs -0 -n1 crepesd --check-config'
 inside crepesd --check-config /usr/share/doc/crepes/examples/crepesd.yaml
 for page in crepesd.8 crepesctl.1 crepesd.yaml.5; do
   [ "$(inside man --warnings "${page##*.}" "${page%.*}" 2>&1 | tee "$scratch/$page" | wc -l)" -gt 20 ] ||
