@@ -2,11 +2,11 @@
 
 step() { printf '\n== %s  (%s s)\n' "$*" "$SECONDS"; }
 
-# Installs what packages.txt lists and is not there.
+# install_packages [PACKAGE...]: installs what packages.txt lists and is not there, and these.
 install_packages() {
   local wanted missing=() as_root=()
   mapfile -t wanted < <(grep -v -e '^#' -e '^$' packages.txt)
-  for package in "${wanted[@]}"; do
+  for package in "${wanted[@]}" "$@"; do
     dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
       missing+=("$package")
   done

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Makes the manuals: crepesd.yaml(5) from the reference configuration, crepesctl(1) from the tool's own help.
     manual.py configuration crepesd.yaml >crepesd.yaml.5
-    manual.py tool path/to/crepesctl >crepesctl.1"""
+    manual.py tool [EMULATOR...] path/to/crepesctl >crepesctl.1"""
 import re
 import subprocess
 import sys
@@ -63,9 +63,28 @@ def commands_in(help):
     return re.findall(r"^  ([a-z][\w-]*)  ", help.split("Subcommands:")[1], re.MULTILINE)
 
 
-def tool(program):
+def entries(help):
+    """The help of a command as roff that lines break in: what it is for, its usage, and each option as a tagged paragraph."""
+    about, *sections = re.split(r"\n\n+", re.sub(r"\nUsage:", r"\n\nUsage:", help, count=1))
+    out = [roff(about) + "."]
+    for section in sections:
+        title, *lines = section.splitlines()
+        if title.startswith("Usage: "):
+            out += [".PP", f".B {roff(title.removeprefix('Usage: '))}"]
+        for line in lines:
+            # The name, and its meaning behind it or in the next line.
+            entry = re.fullmatch(r"  (\S.{0,26}?)  +(\S.*)|  (\S.*)", line)
+            if entry:
+                out += [".TP", f".B {roff(entry[1] or entry[3])}"] + ([roff(entry[2])] if entry[2] else [])
+            else:
+                out += [roff(line.strip())]
+    return out
+
+
+def tool(*program):
     def help_of(*arguments):
-        return subprocess.run([program, *arguments, "--help"], check=True, capture_output=True, text=True).stdout.strip().replace(program, "crepesctl")
+        text = subprocess.run([*program, *arguments, "--help"], check=True, capture_output=True, text=True).stdout.strip()
+        return text.replace(program[-1], "crepesctl").split("\n\nExit codes:")[0]
 
     out = heading("crepesctl", 1, "User commands")
     out += ["crepesctl \\- watch, set up and replay robots that localize each other", ".SH SYNOPSIS", ".B crepesctl", ".I COMMAND",
@@ -73,10 +92,11 @@ def tool(program):
     commands = commands_in(help_of())
     assert commands
     for command in commands:
-        out += [f".SS {roff(command)}", ".EX", roff(help_of(command)), ".EE"]
-        if "Subcommands:" in help_of(command):
-            for inner in commands_in(help_of(command)):
-                out += [f".SS {roff(command)} {roff(inner)}", ".EX", roff(help_of(command, inner)), ".EE"]
+        help = help_of(command)
+        out += [f".SS {roff(command)}", *entries(help)]
+        if "Subcommands:" in help:
+            for inner in commands_in(help):
+                out += [f".SS {roff(command)} {roff(inner)}", *entries(help_of(command, inner))]
     return out + [".SH EXIT STATUS", "0 done; 1 wrong input, or no answer (the reason is on stderr); 2 wrong usage.",
                   ".SH JSON", "With \\-\\-json, standard output contains only JSON objects, one per line. Progress, refused input and",
                   "errors go to standard error.",
@@ -84,5 +104,5 @@ def tool(program):
 
 
 if __name__ == "__main__":
-    kind, source = sys.argv[1:]
-    print("\n".join({"configuration": configuration, "tool": tool}[kind](source)))
+    kind, *source = sys.argv[1:]
+    print("\n".join({"configuration": configuration, "tool": tool}[kind](*source)))

@@ -150,12 +150,14 @@ ObservationBuffer::mutual_initializations(const Bearing& peer_bearing, const Rob
 std::optional<Measurement> ObservationBuffer::one_way_initialization(
     const RobotState& self, const RobotState& neighbor) const {
   constexpr int kHeadings = 24;
-  if (own_.all().empty() || !is_confirmed(own_.all().back(), own_, self.imu)) return std::nullopt;
+  if (own_.all().empty()) return std::nullopt;
   const Bearing& bearing = own_.all().back();
   const auto tilt_B = self.tilt_at(bearing.stamp);
   const auto tilt_N = neighbor.tilt_at(bearing.stamp);
   const auto range = range_at(bearing.stamp);
   if (!tilt_B || !tilt_N || !range) return std::nullopt;
+  // Only now: without a tilt there may be no inertial sample either.
+  if (!is_confirmed(bearing, own_, self.imu)) return std::nullopt;
   auto poses = poses_by_heading(sighting(bearing, *tilt_B, self_), sighting({}, *tilt_N, neighbor_),
                                 range->range_m, range->sigma_m, kHeadings);
   if (poses.empty()) return std::nullopt;

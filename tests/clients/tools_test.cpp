@@ -122,7 +122,7 @@ TEST(ToolsAlone, EndWithTwoWhenTheyAreUsedWrongly) {
                                                 {"waitpose"},
                                                 {"status", "--nonsense"},
                                                 {"waitpose", "--peer", "70000"},
-                                                {"completion", "fish"},
+                                                {"completion", "csh"},
                                                 {"status", "--address", "home"}})
     EXPECT_EQ(crepesctl(words).how, "exit code 2") << (words.empty() ? "" : words.front());
   EXPECT_NE(crepesctl({"--help"}).output.find("Exit codes: 0"), std::string::npos);
@@ -168,6 +168,40 @@ TEST(ToolsAlone, CompleteTheirWordsInBash) {
 
   EXPECT_EQ(ending.how, "exit code 0");
   EXPECT_EQ(ending.output, "waitpose\n--timeout\nset\n--brightness\n");
+}
+
+TEST(ToolsAlone, CompleteTheirWordsInZsh) {
+  // zsh itself keeps of `found` what begins like the last word.
+  const std::string script =
+      "compdef() { :; }; _describe() { print -rl -- ${(P)2}; }; eval \"$(" + crepesctl_path() +
+      " completion zsh)\"; "
+      "try() { words=(crepesctl \"$@\"); CURRENT=$#words; _crepesctl; }; "
+      "try '' | grep ^wait; try waitpose - | grep ^--t; try led '' | grep ^set; "
+      "try led set - | grep ^--bri";
+
+  const Ending ending = run("/usr/bin/zsh", {"-fc", script});
+
+  EXPECT_EQ(ending.how, "exit code 0") << ending.errors;
+  EXPECT_EQ(
+      ending.output,
+      "waitpose:Wait for a neighbor's pose; exit code 1 and the reason if there is none in "
+      "time\n--timeout:seconds to wait\nset:Store a robot's pattern on the board and read it back\n"
+      "--brightness:in percent: one value for all LEDs, or one for each of six\n");
+}
+
+TEST(ToolsAlone, CompleteTheirWordsInFish) {
+  const std::string script = crepesctl_path() +
+                             " completion fish | source; for line in 'wait' 'waitpose --t' "
+                             "'led s' 'led set --bri'; complete -C \"crepesctl $line\"; end";
+
+  const Ending ending = run("/usr/bin/fish", {"--no-config", "-c", script});
+
+  EXPECT_EQ(ending.how, "exit code 0") << ending.errors;
+  EXPECT_EQ(ending.output,
+            "waitpose\tWait for a neighbor's pose; exit code 1 and the reason if there is none in "
+            "time\n--timeout\tseconds to wait\nset\tStore a robot's pattern on the board and read "
+            "it back\n"
+            "--brightness\tin percent: one value for all LEDs, or one for each of six\n");
 }
 
 }  // namespace

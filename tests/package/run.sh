@@ -43,8 +43,10 @@ inside crepesd --check-config /usr/share/doc/crepes/examples/crepesd.yaml
 for page in crepesd.8 crepesctl.1 crepesd.yaml.5; do
   [ "$(inside man --warnings "${page##*.}" "${page%.*}" 2>&1 | tee "$scratch/$page" | wc -l)" -gt 20 ] ||
     { cat "$scratch/$page"; echo "$page: no manual"; exit 1; }
+  ! grep -E '.{81}' "$scratch/$page" || { echo "$page: wider than 80 columns"; exit 1; }
 done
 inside bash -c '. /usr/share/bash-completion/bash_completion; _completion_loader crepesctl; complete -p crepesctl' | grep -v _minimal
+inside test -s /usr/share/zsh/vendor-completions/_crepesctl -a -s /usr/share/fish/vendor_completions.d/crepesctl.fish
 inside id crepes
 
 step "upgrade, remove, install again, purge"

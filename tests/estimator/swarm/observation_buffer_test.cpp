@@ -161,5 +161,13 @@ TEST_F(Sighted, ItsCovarianceIsPositiveDefinite) {
   EXPECT_EQ(raw.covariance.llt().info(), Eigen::Success);
 }
 
+TEST_F(Sighted, ARobotWithoutAnImuStartsNothingFromWhatItSees) {
+  buffer_.add_own_bearing(own(kNow));
+  add_range(kNow);
+  EXPECT_TRUE(buffer_.one_way_initialization(self_, neighbor_));
+
+  EXPECT_FALSE(buffer_.one_way_initialization({}, neighbor_));
+}
+
 }  // namespace
 }  // namespace crepes
