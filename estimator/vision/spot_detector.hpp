@@ -70,7 +70,7 @@ class SpotDetector {
   [[nodiscard]] bool is_news(const PixelBox& box) const;
   void find_lights(const GrayImage& image, int threshold);
   void split(const GrayImage& image, std::uint32_t index, int threshold);
-  [[nodiscard]] bool is_half(const GrayImage& image, int threshold, const Ring& ring) const;
+  [[nodiscard]] bool is_whole_blob(const Ring& ring) const;
   void take_ring(const GrayImage& image, int threshold, const Ring& ring);
   void join_fragments();
   [[nodiscard]] std::uint32_t group_of(std::uint32_t place);
