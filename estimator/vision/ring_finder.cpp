@@ -24,9 +24,10 @@ constexpr double kMaxRmsOfRadius = 0.02;
 constexpr double kPerspective = 1.0 / 250.0;  // of the radius squared: what it moves
 constexpr double kReach = 0.25;               // of the spacing: where a further LED is looked for
 
-constexpr double kMiddle = 0.4;  // of the radius: the lens of the board's camera
-constexpr double kAlone = 2.5;   // of the radius: few lights have no others nearer
-constexpr std::size_t kFew = 4;  // lights
+constexpr double kRowTolerance = 0.15;  // of the middle spacing, of four LEDs in a row
+constexpr double kMiddle = 0.4;         // of the radius: the lens of the board's camera
+constexpr double kAlone = 2.5;          // of the radius: few lights have no others nearer
+constexpr std::size_t kFew = 4;         // lights
 constexpr std::int32_t kLedArea = 8;
 constexpr int kLedPeak = 250;
 
@@ -117,12 +118,17 @@ std::span<const Ring> RingFinder::find(std::span<const Light> lights, const Gray
   link_neighbors();
   for (const Link& link : links_) join(link);
   accept();
+  candidates_.clear();
+  for (std::uint32_t i = 0; i < count; ++i)
+    if (is_taken_[i] == 0) grow_from(i);
+  accept();
   return rings_;
 }
 
 /// Every light with its nearest that are like it, the shortest links first.
 void RingFinder::link_neighbors() {
   links_.clear();
+  near_.resize(lights_.size());
   for (std::size_t place = 0; place < order_.size(); ++place) {
     const std::uint32_t a = order_[place];
     std::array<Link, kNeighbors> near{};
@@ -147,11 +153,48 @@ void RingFinder::link_neighbors() {
     }
     for (const Link& link : near)
       if (link.a != link.b) links_.push_back(link);
+    for (std::size_t k = 0; k < kNearest; ++k) near_[a][k] = near[k].b;
   }
   std::sort(links_.begin(), links_.end(), [](const Link& x, const Link& y) {
     if (x.length != y.length) return x.length < y.length;
     return x.a != y.a ? x.a < y.a : x.b < y.b;
   });
+}
+
+/// Rings that other lights are too near to: from four LEDs a, b, c, d in a row, of which d - a is
+/// parallel to c - b and 1 + 2 cos(360 deg / n) times as long.
+void RingFinder::grow_from(std::uint32_t b) {
+  const auto is_usable = [&](std::uint32_t i, std::uint32_t other) {
+    return i != other && is_taken_[i] == 0;
+  };
+  for (const std::uint32_t c : near_[b]) {
+    if (!is_usable(c, b)) continue;
+    const Eigen::Vector2d bc = place_of(lights_[c]) - place_of(lights_[b]);
+    for (const std::uint32_t a : near_[b]) {
+      if (!is_usable(a, b) || a == c) continue;
+      const Eigen::Vector2d ab = place_of(lights_[b]) - place_of(lights_[a]);
+      const double turn = cross(ab, bc);
+      for (const std::uint32_t d : near_[c]) {
+        if (!is_usable(d, c) || d == a || d == b) continue;
+        const Eigen::Vector2d cd = place_of(lights_[d]) - place_of(lights_[c]);
+        if (turn * cross(bc, cd) <= 0.0) continue;
+        const Eigen::Vector2d ad = ab + bc + cd;
+        const double ratio = ad.dot(bc) / bc.squaredNorm();
+        if (std::abs(cross(ad, bc)) > kRowTolerance * bc.squaredNorm()) continue;
+        const std::array row{a, b, c, d};
+        if (!are_alike(row, kRingArea)) continue;
+        for (const RingShape& shape : shapes_) {
+          const double wanted = 1.0 + 2.0 * shape.places[1].x();
+          if (shape.leds() == kMinRingLeds || !shape.is_round() ||
+              std::abs(wanted - ratio) > kRowTolerance)
+            continue;
+          Ring ring{.leds = shape.leds(), .count = row.size()};
+          std::copy(row.begin(), row.end(), ring.lights.begin());
+          if (complete(ring, shape, 0) && ring.count > kFew) candidates_.push_back(ring);
+        }
+      }
+    }
+  }
 }
 
 /// Makes two groups one and looks whether it is a ring.
@@ -215,8 +258,7 @@ std::optional<Ring> RingFinder::whole_ring(std::span<const std::uint32_t> member
   const auto leds = members.size();
   for (const RingShape& shape : shapes_) {
     if (shape.places.size() != leds) continue;
-    const bool is_round = shape.places[0].y() == 0.0;
-    for (std::size_t shift = 0; shift < (is_round ? 1 : leds / 4); ++shift) {
+    for (std::size_t shift = 0; shift < (shape.is_round() ? 1 : leds / 4); ++shift) {
       Ring ring{.leds = shape.leds(), .count = leds};
       std::copy(members.begin(), members.end(), ring.lights.begin());
       if (complete(ring, shape, shift) && (!best || ring.rms < best->rms)) best = ring;
@@ -271,8 +313,7 @@ std::optional<Ring> RingFinder::arc_after(std::span<const std::uint32_t> members
   for (const RingShape& shape : shapes_) {
     const std::size_t leds = shape.places.size();
     if (leds <= count || leds > 2 * count) continue;
-    const bool is_round = shape.places[0].y() == 0.0;
-    for (std::size_t shift = 0; shift < (is_round ? 1 : leds / 4); ++shift) {
+    for (std::size_t shift = 0; shift < (shape.is_round() ? 1 : leds / 4); ++shift) {
       Points places;
       for (std::size_t k = 0; k < count; ++k) places[k] = shape.places[(shift + k) % leds];
       const auto view = fit_from_afar(std::span(seen).first(count), std::span(places).first(count));

@@ -29,6 +29,7 @@ struct Ring {
   std::size_t count = 0;  ///< of lights
   double rms = 0.0;       ///< [px]
 
+  [[nodiscard]] bool is_whole() const { return count == static_cast<std::size_t>(leds); }
   [[nodiscard]] std::span<const std::uint32_t> members() const {
     return std::span(lights).first(count);
   }
@@ -59,9 +60,11 @@ class RingFinder {
     double length;
     std::uint32_t a, b;
   };
+  static constexpr std::size_t kNearest = 3;
   using Members = std::array<std::uint32_t, kMaxRingLeds + 1>;
 
   void link_neighbors();
+  void grow_from(std::uint32_t b);
   void join(const Link& link);
   void judge(std::span<const std::uint32_t> members, double longest_link);
   [[nodiscard]] std::optional<Ring> whole_ring(std::span<const std::uint32_t> members) const;
@@ -82,9 +85,10 @@ class RingFinder {
   std::vector<RingShape> shapes_;     ///< by number of LEDs
   std::vector<std::uint32_t> order_;  ///< lights by u
   std::vector<Link> links_;
-  std::vector<std::uint32_t> parent_;  ///< union-find over lights
-  std::vector<std::uint32_t> next_;    ///< the groups as cycles
-  std::vector<std::uint32_t> size_;    ///< of the group, at its root
+  std::vector<std::array<std::uint32_t, kNearest>> near_;  ///< of each light; itself for none
+  std::vector<std::uint32_t> parent_;                      ///< union-find over lights
+  std::vector<std::uint32_t> next_;                        ///< the groups as cycles
+  std::vector<std::uint32_t> size_;                        ///< of the group, at its root
   std::vector<Ring> candidates_;
   std::vector<std::uint8_t> is_taken_;
   std::vector<Ring> rings_;

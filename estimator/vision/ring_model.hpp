@@ -20,6 +20,7 @@ struct RingShape {
   /// The first LED is in a corner. `leds` is a multiple of four.
   [[nodiscard]] static RingShape square(int leds);
 
+  [[nodiscard]] bool is_round() const { return places[0].y() == 0.0; }
   [[nodiscard]] int leds() const { return static_cast<int>(places.size()); }
 };
 

@@ -29,7 +29,8 @@ constexpr int kSplitMaxSide = 100;  // px; LEDs of larger rings do not touch
 
 constexpr double kRim = 1.25;       // of a ring's radius: what is nearer belongs to it
 constexpr double kSmallRing = 5.0;  // px radius; the center of its light is surer than that of LEDs
-constexpr double kSmallRingShift = 0.3;  // of its radius; if they differ more, LEDs are hidden
+constexpr double kSharpRing = 0.04;      // of its radius, the error of LEDs that stand apart
+constexpr double kSmallRingShift = 0.3;  // of its radius; an arc's light is further away
 
 int longer_side(const PixelBox& box) { return std::max(box.width(), box.height()); }
 int shorter_side(const PixelBox& box) { return std::min(box.width(), box.height()); }
@@ -233,12 +234,14 @@ void SpotDetector::split(const GrayImage& image, std::uint32_t index, int thresh
   }
 }
 
-/// Whether it is half a ring in a blob too round for that.
+/// Whether it is an arc that is one blob, too round for that.
 bool SpotDetector::is_whole_blob(const Ring& ring) const {
   constexpr double kLong = 1.4;  // half a ring is longer than wide
   const std::uint32_t blob = lights_[ring.lights[0]].blob;
-  return ring.count == 3 && blob == lights_[ring.lights[1]].blob &&
-         blobs_[blob].elongation() < kLong;
+  const auto members = ring.members();
+  return !ring.is_whole() && blobs_[blob].elongation() < kLong &&
+         std::all_of(members.begin(), members.end(),
+                     [&](std::uint32_t light) { return lights_[light].blob == blob; });
 }
 
 /// The blobs of a ring, and what else is in it, are accounted for.
@@ -259,7 +262,9 @@ void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& 
   const Eigen::Vector2d& center = ring.view.center;
   const double radius = ring.view.radius();
   const double shift = distance(spot.u_px - center.x(), spot.v_px - center.y());
-  if (radius > kSmallRing || shift > kSmallRingShift * radius) {
+  const bool is_cut = !ring.is_whole() && shift > kSmallRingShift * radius;
+  const bool is_sharp = radius > kSmallRing && ring.rms < kSharpRing * radius;
+  if (is_sharp || is_cut) {
     spot.u_px = center.x();
     spot.v_px = center.y();
   }
