@@ -113,9 +113,10 @@ std::optional<RingView> fit_perspective(std::span<const Eigen::Vector2d> seen,
   RingView view;
   view.slant = x.tail<2>();
   view.axes << x(1), x(2), x(4), x(5);
-  // w = (u - c0) / r, so u (1 + g q) = c0 (1 + g q) + r (c + A q).
-  view.axes = radius * view.axes + from_afar->center * view.slant.transpose();
-  view.center = from_afar->center + radius * Eigen::Vector2d(x(0), x(3));
+  const Eigen::Vector2d c(x(0), x(3));
+  // (c + A q) / (1 + g q)  =  c + (A - c g) q / (1 + g q)
+  view.axes = radius * (view.axes - c * view.slant.transpose());
+  view.center = from_afar->center + radius * c;
   if (!x.allFinite() || view.slant.norm() > kMaxSlant) return std::nullopt;
   return view;
 }

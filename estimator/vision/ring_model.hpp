@@ -24,15 +24,15 @@ struct RingShape {
   [[nodiscard]] int leds() const { return static_cast<int>(places.size()); }
 };
 
-/// A view of a board's plane: the place q appears at (center + axes q) / (1 + slant q). It maps the
-/// board's center to `center`, perspective or not.
+/// A view of a board's plane: the place q appears at center + axes q / (1 + slant q), which is any
+/// perspective view of a plane.
 struct RingView {
   Eigen::Vector2d center = Eigen::Vector2d::Zero();    ///< [px]
   Eigen::Matrix2d axes = Eigen::Matrix2d::Identity();  ///< [px]
   Eigen::Vector2d slant = Eigen::Vector2d::Zero();     ///< 0 for a view from afar
 
   [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& place) const {
-    return (center + axes * place) / (1.0 + slant.dot(place));
+    return center + axes * place / (1.0 + slant.dot(place));
   }
   /// The place that appears at `uv`, from afar.
   [[nodiscard]] Eigen::Vector2d place_near(const Eigen::Vector2d& uv) const;
