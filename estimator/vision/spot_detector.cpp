@@ -31,6 +31,7 @@ constexpr double kRim = 1.25;       // of a ring's radius: what is nearer belong
 constexpr double kSmallRing = 5.0;  // px radius; the center of its light is surer than that of LEDs
 constexpr double kSharpRing = 0.04;      // of its radius, the error of LEDs that stand apart
 constexpr double kSmallRingShift = 0.3;  // of its radius; an arc's light is further away
+constexpr double kOtherLight = 0.6;      // of its radius; light of another board is in its blob
 
 int longer_side(const PixelBox& box) { return std::max(box.width(), box.height()); }
 int shorter_side(const PixelBox& box) { return std::min(box.width(), box.height()); }
@@ -262,7 +263,7 @@ void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& 
   const Eigen::Vector2d& center = ring.view.center;
   const double radius = ring.view.radius();
   const double shift = distance(spot.u_px - center.x(), spot.v_px - center.y());
-  const bool is_cut = !ring.is_whole() && shift > kSmallRingShift * radius;
+  const bool is_cut = shift > (ring.is_whole() ? kOtherLight : kSmallRingShift) * radius;
   const bool is_sharp = radius > kSmallRing && ring.rms < kSharpRing * radius;
   if (is_sharp || is_cut) {
     spot.u_px = center.x();
