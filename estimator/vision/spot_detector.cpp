@@ -134,7 +134,13 @@ bool SpotDetector::search(const GrayImage& image, int threshold, double contrast
   find_lights(image, threshold);
   for (const Ring& ring : ring_finder_.find(lights_, image, threshold))
     if (!is_whole_blob(ring)) take_ring(image, threshold, ring);
-  std::erase_if(open_, [&](std::uint32_t i) { return is_open_[i] == 0; });
+  const auto close = [&] {
+    std::erase_if(open_, [&](std::uint32_t i) { return is_open_[i] == 0; });
+  };
+  close();
+  for (const JoinedArcs& arcs : arc_joiner_.join(blobs_, open_, finder_))
+    take_arcs(image, threshold, arcs);
+  close();
   join_fragments();
   for (const std::uint32_t i : open_) {
     if (is_open_[i] == 0) continue;
@@ -245,8 +251,8 @@ bool SpotDetector::is_whole_blob(const Ring& ring) const {
                      [&](std::uint32_t light) { return lights_[light].blob == blob; });
 }
 
-/// The blobs of a ring, and what else is in it, are accounted for.
-void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& ring) {
+/// Blobs of a ring, and what else is in it, are accounted for. Returns their sum.
+Blob SpotDetector::take_blobs(std::span<const std::uint32_t> blobs, const RingView& view) {
   Blob whole;
   const auto take = [&](std::uint32_t i) {
     if (is_open_[i] == 0) return;
@@ -254,10 +260,28 @@ void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& 
     if (whole.area == 0) whole.box = blobs_[i].box;
     whole.absorb(blobs_[i]);
   };
-  for (const std::uint32_t light : ring.members()) take(lights_[light].blob);
-  if (whole.area == 0) return;  // its blobs went into another ring
+  for (const std::uint32_t i : blobs) take(i);
+  if (whole.area == 0) return whole;  // its blobs went into another ring
   for (const std::uint32_t i : open_)
-    if (ring.view.place_near({blobs_[i].mean_u(), blobs_[i].mean_v()}).norm() < kRim) take(i);
+    if (view.place_near({blobs_[i].mean_u(), blobs_[i].mean_v()}).norm() < kRim) take(i);
+  return whole;
+}
+
+void SpotDetector::take_arcs(const GrayImage& image, int threshold, const JoinedArcs& arcs) {
+  const Blob whole = take_blobs(arcs.members(), arcs.view);
+  if (whole.area == 0) return;
+  const Surroundings around = surroundings_of(image, whole.box, threshold);
+  Spot spot = measure_spot(image, whole, threshold, around);
+  spot.u_px = arcs.view.center.x();
+  spot.v_px = arcs.view.center.y();
+  candidates_.push_back({spot, whole.box});
+}
+
+void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& ring) {
+  of_ring_.clear();
+  for (const std::uint32_t light : ring.members()) of_ring_.push_back(lights_[light].blob);
+  const Blob whole = take_blobs(of_ring_, ring.view);
+  if (whole.area == 0) return;
   const Surroundings around = surroundings_of(image, whole.box, threshold);
   Spot spot = measure_spot(image, whole, threshold, around);
   const Eigen::Vector2d& center = ring.view.center;
