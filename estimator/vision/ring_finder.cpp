@@ -8,7 +8,7 @@ namespace crepes {
 namespace {
 
 constexpr std::size_t kMaxLights = 1024;  // more is a scene of lights, searched for no rings
-constexpr std::size_t kNeighbors = 6;
+constexpr std::size_t kNeighbors = 4;
 constexpr double kMaxSpacing = 110.0;   // px between LEDs: four of a board of 12 cm at 0.4 m
 constexpr double kMinSpacing = 2.5;     // px; closer ones are one light
 constexpr double kFarSpacing = 24.0;    // px; two robots 5 m away would be 30 cm apart
@@ -106,19 +106,16 @@ std::span<const Ring> RingFinder::find(std::span<const Light> lights, const Gray
   threshold_ = threshold;
   const auto count = static_cast<std::uint32_t>(lights.size());
   order_.resize(count);
-  parent_.resize(count);
-  next_.resize(count);
-  for (std::uint32_t i = 0; i < count; ++i) order_[i] = parent_[i] = next_[i] = i;
-  size_.assign(count, 1);
+  for (std::uint32_t i = 0; i < count; ++i) order_[i] = i;
   std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
     return lights[a].u != lights[b].u ? lights[a].u < lights[b].u : a < b;
   });
-  candidates_.clear();
   is_taken_.assign(count, 0);
   link_neighbors();
-  for (const Link& link : links_) join(link);
+  join_all([&](std::span<const std::uint32_t> group, double) { judge_whole(group); });
   accept();
-  candidates_.clear();
+  join_all([&](std::span<const std::uint32_t> group, double link) { judge_part(group, link); });
+  accept();
   for (std::uint32_t i = 0; i < count; ++i)
     if (is_taken_[i] == 0) grow_from(i);
   accept();
@@ -138,7 +135,7 @@ void RingFinder::link_neighbors() {
       const double dv = lights_[b].v - lights_[a].v;
       if (std::abs(du) >= near.back().length) return false;
       if (std::abs(dv) >= near.back().length) return true;
-      const double length = std::hypot(du, dv);
+      const double length = std::sqrt(du * du + dv * dv);
       const std::array pair{a, b};
       if (length < kMinSpacing || length >= near.back().length || !are_alike(pair, kSimilarArea))
         return true;
@@ -197,59 +194,72 @@ void RingFinder::grow_from(std::uint32_t b) {
   }
 }
 
-/// Makes two groups one and looks whether it is a ring.
-void RingFinder::join(const Link& link) {
+/// Joins what is free, link by link, and calls judge(group, longest link) for each group that may
+/// be a ring.
+template <class Judge>
+void RingFinder::join_all(const Judge& judge) {
+  const auto count = static_cast<std::uint32_t>(lights_.size());
+  parent_.resize(count);
+  next_.resize(count);
+  for (std::uint32_t i = 0; i < count; ++i) parent_[i] = next_[i] = i;
+  size_.assign(count, 1);
   const auto root_of = [&](std::uint32_t i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
   };
-  const std::uint32_t a = root_of(link.a);
-  const std::uint32_t b = root_of(link.b);
-  if (a == b) return;
-  parent_[b] = a;
-  size_[a] += size_[b];
-  std::swap(next_[a], next_[b]);
-  Members members{};
-  if (size_[a] < 3 || size_[a] > members.size()) return;
-  std::uint32_t i = a;
-  for (std::size_t k = 0; k < size_[a]; ++k, i = next_[i]) members[k] = i;
-  judge(std::span(members).first(size_[a]), link.length);
+  for (const Link& link : links_) {
+    if (is_taken_[link.a] != 0 || is_taken_[link.b] != 0) continue;
+    const std::uint32_t a = root_of(link.a);
+    const std::uint32_t b = root_of(link.b);
+    if (a == b) continue;
+    parent_[b] = a;
+    size_[a] += size_[b];
+    std::swap(next_[a], next_[b]);
+    Members members{};
+    if (size_[a] < 3 || size_[a] > members.size()) continue;
+    std::uint32_t i = a;
+    for (std::size_t k = 0; k < size_[a]; ++k, i = next_[i]) members[k] = i;
+    const auto group = std::span(members).first(size_[a]);
+    if (are_alike(group, kRingArea)) judge(group, link.length);
+  }
 }
 
-/// Puts the ring that these lights are among the candidates.
-void RingFinder::judge(std::span<const std::uint32_t> members, double longest_link) {
-  if (!are_alike(members, kRingArea)) return;
-  if (members.size() <= kMaxRingLeds) {
-    Members ordered{};
-    std::copy(members.begin(), members.end(), ordered.begin());
-    const auto around = std::span(ordered).first(members.size());
+/// Puts the ring whose LEDs are all of these lights, but for a lens, among the candidates.
+void RingFinder::judge_whole(std::span<const std::uint32_t> group) {
+  if (group.size() < kMinRingLeds) return;
+  Members members{};
+  std::copy(group.begin(), group.end(), members.begin());
+  if (group.size() <= kMaxRingLeds) {
+    const auto around = std::span(members).first(group.size());
     if (order_around(lights_, around)) {
-      auto ring = members.size() == 3 ? half_ring(around) : whole_ring(around);
-      if (!ring && members.size() > 3) ring = arc(around, longest_link);
-      if (ring) {
-        candidates_.push_back(*ring);
-        return;
-      }
+      if (const auto ring = whole_ring(around)) candidates_.push_back(*ring);
+      return;
     }
   }
-  if (members.size() <= kFew) return;
-  // Perhaps one of them is the lens in the middle.
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  for (const std::uint32_t i : members) middle += place_of(lights_[i]);
-  middle /= static_cast<double>(members.size());
-  const auto off = [&](std::uint32_t i) { return (place_of(lights_[i]) - middle).norm(); };
-  const std::uint32_t lens =
-      *std::min_element(members.begin(), members.end(),
-                        [&](std::uint32_t a, std::uint32_t b) { return off(a) < off(b); });
-  Members others{};
-  std::size_t count = 0;
-  for (const std::uint32_t i : members)
-    if (i != lens) others[count++] = i;
-  const auto around = std::span(others).first(count);
-  if (!order_around(lights_, around)) return;
+  for (const std::uint32_t i : group) middle += place_of(lights_[i]);
+  middle /= static_cast<double>(group.size());
+  const auto off = [&](std::uint32_t i) { return (place_of(lights_[i]) - middle).squaredNorm(); };
+  const auto lens =
+      std::min_element(members.begin(), members.begin() + static_cast<std::ptrdiff_t>(group.size()),
+                       [&](std::uint32_t a, std::uint32_t b) { return off(a) < off(b); });
+  std::swap(*lens, members[group.size() - 1]);
+  const auto around = std::span(members).first(group.size() - 1);
+  if (around.size() < kMinRingLeds || !order_around(lights_, around)) return;
   const auto ring = whole_ring(around);
-  if (ring && ring->view.place_near(place_of(lights_[lens])).norm() < kMiddle)
-    candidates_.push_back(*ring);
+  const Eigen::Vector2d of_lens = place_of(lights_[members[group.size() - 1]]);
+  if (ring && ring->view.place_near(of_lens).norm() < kMiddle) candidates_.push_back(*ring);
+}
+
+/// Puts the ring of which these lights are an arc among the candidates.
+void RingFinder::judge_part(std::span<const std::uint32_t> group, double longest_link) {
+  if (group.size() > kMaxRingLeds) return;
+  Members members{};
+  std::copy(group.begin(), group.end(), members.begin());
+  const auto around = std::span(members).first(group.size());
+  if (!order_around(lights_, around)) return;
+  const auto ring = group.size() == 3 ? half_ring(around) : arc(around, longest_link);
+  if (ring) candidates_.push_back(*ring);
 }
 
 /// All LEDs of a board, in their order.
@@ -347,7 +357,7 @@ bool RingFinder::complete(Ring& ring, const RingShape& shape, std::size_t shift)
     if (!from_afar || from_afar->roundness() < kMinRoundness) return false;
     const double radius = from_afar->radius();
     if (from_afar->rms(s, p) > tolerance(radius) + kPerspective * radius * radius) return false;
-    const auto view = fit_perspective(s, p);
+    const auto view = fit_perspective(*from_afar, s, p);
     if (!view || view->slant.norm() > kPerspective * radius) return false;
     ring.view = *view;
     ring.rms = view->rms(s, p);
@@ -465,7 +475,7 @@ bool RingFinder::is_alone(const Ring& ring) const {
   return true;
 }
 
-/// The rings of most lights first.
+/// The rings of most lights among the candidates first.
 void RingFinder::accept() {
   std::sort(candidates_.begin(), candidates_.end(), [](const Ring& a, const Ring& b) {
     if (a.count != b.count) return a.count > b.count;
@@ -480,6 +490,7 @@ void RingFinder::accept() {
     for (const std::uint32_t i : members) is_taken_[i] = 1;
     rings_.push_back(ring);
   }
+  candidates_.clear();
 }
 
 }  // namespace crepes

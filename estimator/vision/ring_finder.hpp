@@ -41,7 +41,9 @@ struct Ring {
 /// Lights are joined, the nearest first, into a tree of groups: the LEDs of a ring are a group of
 /// it, and where another light is too near, some arcs are. Each group is held against every shape
 /// with as many LEDs or, as an arc, with more. An arc tells where the others should be: they are
-/// added where there is light, and must be dark else. The rings of most lights are taken first.
+/// added where there is light, and must be dark else. Whole rings are taken before arcs, and those
+/// of most lights first. What is left has other lights too near to it: four LEDs in a row tell the
+/// rest of their ring as well.
 ///
 /// Many things look like few LEDs. Four lights are a ring, and four of more an arc, where they are
 /// alike, and alone. Three are where they are the half of six, and parts of one blob, or bright and
@@ -65,8 +67,10 @@ class RingFinder {
 
   void link_neighbors();
   void grow_from(std::uint32_t b);
-  void join(const Link& link);
-  void judge(std::span<const std::uint32_t> members, double longest_link);
+  template <class Judge>
+  void join_all(const Judge& judge);
+  void judge_whole(std::span<const std::uint32_t> group);
+  void judge_part(std::span<const std::uint32_t> group, double longest_link);
   [[nodiscard]] std::optional<Ring> whole_ring(std::span<const std::uint32_t> members) const;
   [[nodiscard]] std::optional<Ring> arc(std::span<const std::uint32_t> members,
                                         double longest_link) const;

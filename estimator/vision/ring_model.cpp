@@ -1,8 +1,8 @@
 #include "estimator/vision/ring_model.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -84,40 +84,49 @@ std::optional<RingView> fit_from_afar(std::span<const Eigen::Vector2d> seen,
   return view;
 }
 
-/// Least squares over  u (1 + g q) = c + A q,  which is linear in c, A and g, with
-/// g ~ N(0, (radius / f)^2): without it, a few LEDs in a short arc would tell any perspective.
-std::optional<RingView> fit_perspective(std::span<const Eigen::Vector2d> seen,
+/// Least squares over  w (1 + g q) = x p,  p = (1, q), in which w is what is seen and x are the
+/// coefficients of either coordinate. It is linear in x and g, and x is eliminated; beforehand
+/// g ~ N(0, (radius / f)^2), without which a few LEDs in a short arc would tell any perspective.
+std::optional<RingView> fit_perspective(const RingView& from_afar,
+                                        std::span<const Eigen::Vector2d> seen,
                                         std::span<const Eigen::Vector2d> places) {
-  const auto from_afar = fit_from_afar(seen, places);
-  if (!from_afar) return std::nullopt;
-  const double radius = from_afar->radius();
+  const double radius = from_afar.radius();
   if (!(radius > 0.0)) return std::nullopt;
-  using Matrix8 = Eigen::Matrix<double, 8, 8>;
-  using Vector8 = Eigen::Matrix<double, 8, 1>;
-  Matrix8 normal = Matrix8::Zero();
-  Vector8 right = Vector8::Zero();
+  using Matrix32 = Eigen::Matrix<double, 3, 2>;
+  const double ridge = std::pow(kLightSigma * kFocalLength / (radius * radius), 2);
+  Eigen::Matrix3d S = Eigen::Matrix3d::Zero();
+  Matrix32 b = Matrix32::Zero();  // a column for each coordinate
+  std::array<Matrix32, 2> M{Matrix32::Zero(), Matrix32::Zero()};
+  Eigen::Matrix2d G = ridge * Eigen::Matrix2d::Identity();
+  Eigen::Vector2d h = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    const Eigen::Vector2d w = (seen[i] - from_afar->center) / radius;
+    const Eigen::Vector2d w = (seen[i] - from_afar.center) / radius;
     const Eigen::Vector2d& q = places[i];
-    Vector8 row_u;
-    Vector8 row_v;
-    row_u << 1.0, q.x(), q.y(), 0.0, 0.0, 0.0, -w.x() * q.x(), -w.x() * q.y();
-    row_v << 0.0, 0.0, 0.0, 1.0, q.x(), q.y(), -w.y() * q.x(), -w.y() * q.y();
-    normal.noalias() += row_u * row_u.transpose() + row_v * row_v.transpose();
-    right += row_u * w.x() + row_v * w.y();
+    const Eigen::Vector3d p(1.0, q.x(), q.y());
+    const Matrix32 pq = p * q.transpose();
+    S += p * p.transpose();
+    b += p * w.transpose();
+    M[0] += w.x() * pq;
+    M[1] += w.y() * pq;
+    G += w.squaredNorm() * q * q.transpose();
+    h -= w.squaredNorm() * q;
   }
-  const double ridge = std::pow(kLightSigma / radius / (radius / kFocalLength), 2);
-  normal(6, 6) += ridge;
-  normal(7, 7) += ridge;
-  const Vector8 x = normal.ldlt().solve(right);
+  const Eigen::Matrix3d S_inverse = S.inverse();
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Eigen::Matrix<double, 2, 3> MS = M[k].transpose() * S_inverse;
+    G -= MS * M[k];
+    h += MS * b.col(static_cast<Eigen::Index>(k));
+  }
   RingView view;
-  view.slant = x.tail<2>();
-  view.axes << x(1), x(2), x(4), x(5);
-  const Eigen::Vector2d c(x(0), x(3));
+  view.slant = G.inverse() * h;
+  const Eigen::Vector3d x_u = S_inverse * (b.col(0) + M[0] * view.slant);
+  const Eigen::Vector3d x_v = S_inverse * (b.col(1) + M[1] * view.slant);
+  if (!x_u.allFinite() || !x_v.allFinite() || view.slant.norm() > kMaxSlant) return std::nullopt;
+  const Eigen::Vector2d c(x_u(0), x_v(0));
   // (c + A q) / (1 + g q)  =  c + (A - c g) q / (1 + g q)
+  view.axes << x_u(1), x_u(2), x_v(1), x_v(2);
   view.axes = radius * (view.axes - c * view.slant.transpose());
-  view.center = from_afar->center + radius * c;
-  if (!x.allFinite() || view.slant.norm() > kMaxSlant) return std::nullopt;
+  view.center = from_afar.center + radius * c;
   return view;
 }
 

@@ -51,7 +51,8 @@ struct RingView {
                                                     std::span<const Eigen::Vector2d> places);
 
 /// The same with perspective, whose extent is known beforehand from the ring's size in the picture.
-[[nodiscard]] std::optional<RingView> fit_perspective(std::span<const Eigen::Vector2d> seen,
+[[nodiscard]] std::optional<RingView> fit_perspective(const RingView& from_afar,
+                                                      std::span<const Eigen::Vector2d> seen,
                                                       std::span<const Eigen::Vector2d> places);
 
 }  // namespace crepes
