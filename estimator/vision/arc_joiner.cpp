@@ -111,14 +111,25 @@ bool ArcJoiner::gather(std::uint32_t arc, std::span<const Blob> blobs,
 }
 
 bool ArcJoiner::is_ring(std::span<const Blob> blobs, const BlobFinder& finder) {
-  std::int32_t led = blobs[ring_.blobs[0]].area;
-  pixels_.clear();
-  for (const std::uint32_t i : ring_.members()) {
-    led = std::min(led, blobs[i].area);
-    finder.visit(i, blobs[i].box, [&](int u, int v) { pixels_.emplace_back(u, v); });
-  }
-  const auto view = fit_ellipse(pixels_);
+  const auto fit = [&] {
+    pixels_.clear();
+    for (const std::uint32_t i : ring_.members())
+      finder.visit(i, blobs[i].box, [&](int u, int v) { pixels_.emplace_back(u, v); });
+    return fit_ellipse(pixels_);
+  };
+  auto view = fit();
   if (!view || view->roundness() < kMinArcRoundness) return false;
+  auto* const last = ring_.blobs.begin() + static_cast<std::ptrdiff_t>(ring_.count);
+  auto* const lens = std::find_if(ring_.blobs.begin(), last, [&](std::uint32_t i) {
+    return view->place_near({blobs[i].mean_u(), blobs[i].mean_v()}).norm() < kHole;
+  });
+  if (lens != last && ring_.count > 2) {
+    std::swap(*lens, ring_.blobs[--ring_.count]);
+    view = fit();
+    if (!view || view->roundness() < kMinArcRoundness) return false;
+  }
+  std::int32_t led = blobs[ring_.blobs[0]].area;
+  for (const std::uint32_t i : ring_.members()) led = std::min(led, blobs[i].area);
   ring_.view = *view;
   const double width = std::sqrt(4.0 * led / std::numbers::pi);
   const double radius = view->radius();

@@ -28,6 +28,7 @@ constexpr double kRowTolerance = 0.15;  // of the middle spacing, of four LEDs i
 constexpr double kMiddle = 0.4;         // of the radius: the lens of the board's camera
 constexpr double kAlone = 2.5;          // of the radius: few lights have no others nearer
 constexpr std::size_t kFew = 4;         // lights
+constexpr double kFewRms = 0.5;         // of what is allowed to more
 constexpr std::int32_t kLedArea = 8;
 constexpr int kLedPeak = 250;
 
@@ -135,10 +136,13 @@ void RingFinder::link_neighbors() {
       const double dv = lights_[b].v - lights_[a].v;
       if (std::abs(du) >= near.back().length) return false;
       if (std::abs(dv) >= near.back().length) return true;
-      const double length = std::sqrt(du * du + dv * dv);
-      const std::array pair{a, b};
-      if (length < kMinSpacing || length >= near.back().length || !are_alike(pair, kSimilarArea))
+      const double squared = du * du + dv * dv;
+      if (squared < kMinSpacing * kMinSpacing ||
+          squared >= near.back().length * near.back().length ||
+          std::max(lights_[a].area, lights_[b].area) >
+              kSimilarArea * std::min(lights_[a].area, lights_[b].area))
         return true;
+      const double length = std::sqrt(squared);
       std::size_t k = kNeighbors - 1;
       for (; k > 0 && near[k - 1].length > length; --k) near[k] = near[k - 1];
       near[k] = {length, a, b};
@@ -281,7 +285,9 @@ std::optional<Ring> RingFinder::whole_ring(std::span<const std::uint32_t> member
 std::optional<Ring> RingFinder::arc(std::span<const std::uint32_t> members,
                                     double longest_link) const {
   const bool is_few = members.size() <= kFew;
-  if (is_few && (longest_link > kFarSpacing || !are_alike(members, kFewArea))) return std::nullopt;
+  if (is_few &&
+      (!are_alike(members, kFewArea) || (longest_link > kFarSpacing && !are_leds(members))))
+    return std::nullopt;
   struct Gap {
     double length = 0.0;
     std::size_t after = 0;
@@ -416,11 +422,8 @@ std::optional<Ring> RingFinder::half_ring(std::span<const std::uint32_t> members
     if (longer > form.spacing_tolerance * shorter || cosine < form.min_cosine ||
         cosine > form.max_cosine || -cosine < widest)
       continue;
-    const bool are_leds = std::all_of(lights.begin(), lights.end(), [&](std::uint32_t i) {
-      return lights_[i].peak >= kLedPeak && lights_[i].area >= kLedArea;
-    });
     if (is_one_blob ? shorter < kHalfMinSpacing
-                    : longer > kFarSpacing || !are_leds || !are_alike(lights, kHalfArea))
+                    : longer > kFarSpacing || !are_leds(lights) || !are_alike(lights, kHalfArea))
       continue;
     widest = -cosine;
     Points seen;
@@ -450,6 +453,12 @@ bool RingFinder::are_alike(std::span<const std::uint32_t> members, double factor
     most = std::max(most, lights_[i].area);
   }
   return most <= factor * least;
+}
+
+bool RingFinder::are_leds(std::span<const std::uint32_t> members) const {
+  return std::all_of(members.begin(), members.end(), [&](std::uint32_t i) {
+    return lights_[i].peak >= kLedPeak && lights_[i].area >= kLedArea;
+  });
 }
 
 bool RingFinder::is_lit(const Eigen::Vector2d& uv) const {
@@ -486,7 +495,9 @@ void RingFinder::accept() {
     const auto members = ring.members();
     const bool is_free = std::all_of(members.begin(), members.end(),
                                      [&](std::uint32_t i) { return is_taken_[i] == 0; });
-    if (!is_free || (ring.count <= kFew && !is_alone(ring))) continue;
+    const bool is_weak = ring.count <= kFew &&
+                         (ring.rms > kFewRms * tolerance(ring.view.radius()) || !is_alone(ring));
+    if (!is_free || is_weak) continue;
     for (const std::uint32_t i : members) is_taken_[i] = 1;
     rings_.push_back(ring);
   }

@@ -79,6 +79,8 @@ class RingFinder {
   [[nodiscard]] bool complete(Ring& ring, const RingShape& shape, std::size_t shift) const;
   [[nodiscard]] std::optional<Ring> half_ring(std::span<const std::uint32_t> members) const;
   [[nodiscard]] bool are_alike(std::span<const std::uint32_t> members, double factor) const;
+  /// Whether they are as bright as LEDs nearby are.
+  [[nodiscard]] bool are_leds(std::span<const std::uint32_t> members) const;
   [[nodiscard]] bool is_lit(const Eigen::Vector2d& uv) const;
   [[nodiscard]] bool is_alone(const Ring& ring) const;
   void accept();

@@ -45,7 +45,7 @@ struct Detection {
   std::string_view failure;  ///< why the detector failed on this picture; empty when it did not
 };
 
-/// Finds LED boards: a ring of six LEDs is one spot, be it six blobs or one.
+/// Finds LED boards: a ring of LEDs is one spot, be it a blob for each LED or one for all.
 ///
 /// A picture with something huge and bright in it, as the sun or a window, is searched a second
 /// and at last a third time, for what stands out before that. Each search is bounded, and all
