@@ -20,7 +20,7 @@ constexpr double kMaxBend = 0.2;  // sine; a ring turns one way, and the edge of
 
 // How far LEDs are from where they should be: pixels, and parts of the radius for the lens.
 constexpr double kMaxRms = 0.35;
-constexpr double kMaxRmsOfRadius = 0.02;
+constexpr double kMaxRmsOfRadius = 0.005;
 constexpr double kPerspective = 1.0 / 250.0;  // of the radius squared: what it moves
 constexpr double kReach = 0.25;               // of the spacing: where a further LED is looked for
 
@@ -29,6 +29,7 @@ constexpr double kMiddle = 0.4;         // of the radius: the lens of the board'
 constexpr double kAlone = 2.5;          // of the radius: few lights have no others nearer
 constexpr std::size_t kFew = 4;         // lights
 constexpr double kFewRms = 0.5;         // of what is allowed to more
+constexpr double kFarRadius = 16.0;     // px; a larger board is near, and bright
 constexpr std::int32_t kLedArea = 8;
 constexpr int kLedPeak = 250;
 
@@ -113,9 +114,9 @@ std::span<const Ring> RingFinder::find(std::span<const Light> lights, const Gray
   });
   is_taken_.assign(count, 0);
   link_neighbors();
-  join_all([&](std::span<const std::uint32_t> group, double) { judge_whole(group); });
+  join_all([&](std::span<const std::uint32_t> group) { judge_whole(group); });
   accept();
-  join_all([&](std::span<const std::uint32_t> group, double link) { judge_part(group, link); });
+  join_all([&](std::span<const std::uint32_t> group) { judge_part(group); });
   accept();
   for (std::uint32_t i = 0; i < count; ++i)
     if (is_taken_[i] == 0) grow_from(i);
@@ -198,8 +199,7 @@ void RingFinder::grow_from(std::uint32_t b) {
   }
 }
 
-/// Joins what is free, link by link, and calls judge(group, longest link) for each group that may
-/// be a ring.
+/// Joins what is free, link by link, and calls judge(group) for each group that may be a ring.
 template <class Judge>
 void RingFinder::join_all(const Judge& judge) {
   const auto count = static_cast<std::uint32_t>(lights_.size());
@@ -224,7 +224,7 @@ void RingFinder::join_all(const Judge& judge) {
     std::uint32_t i = a;
     for (std::size_t k = 0; k < size_[a]; ++k, i = next_[i]) members[k] = i;
     const auto group = std::span(members).first(size_[a]);
-    if (are_alike(group, kRingArea)) judge(group, link.length);
+    if (are_alike(group, kRingArea)) judge(group);
   }
 }
 
@@ -256,13 +256,13 @@ void RingFinder::judge_whole(std::span<const std::uint32_t> group) {
 }
 
 /// Puts the ring of which these lights are an arc among the candidates.
-void RingFinder::judge_part(std::span<const std::uint32_t> group, double longest_link) {
+void RingFinder::judge_part(std::span<const std::uint32_t> group) {
   if (group.size() > kMaxRingLeds) return;
   Members members{};
   std::copy(group.begin(), group.end(), members.begin());
   const auto around = std::span(members).first(group.size());
   if (!order_around(lights_, around)) return;
-  const auto ring = group.size() == 3 ? half_ring(around) : arc(around, longest_link);
+  const auto ring = group.size() == 3 ? half_ring(around) : arc(around);
   if (ring) candidates_.push_back(*ring);
 }
 
@@ -282,12 +282,8 @@ std::optional<Ring> RingFinder::whole_ring(std::span<const std::uint32_t> member
 }
 
 /// An arc of a board's LEDs, in their order, which begins after the longest gap or the second.
-std::optional<Ring> RingFinder::arc(std::span<const std::uint32_t> members,
-                                    double longest_link) const {
-  const bool is_few = members.size() <= kFew;
-  if (is_few &&
-      (!are_alike(members, kFewArea) || (longest_link > kFarSpacing && !are_leds(members))))
-    return std::nullopt;
+std::optional<Ring> RingFinder::arc(std::span<const std::uint32_t> members) const {
+  if (members.size() <= kFew && !are_alike(members, kFewArea)) return std::nullopt;
   struct Gap {
     double length = 0.0;
     std::size_t after = 0;
@@ -484,6 +480,15 @@ bool RingFinder::is_alone(const Ring& ring) const {
   return true;
 }
 
+/// Whether so few lights, or an arc, look the way they do because they are a ring.
+bool RingFinder::is_credible(const Ring& ring) const {
+  if (ring.is_whole() && ring.count > kFew) return true;
+  const double radius = ring.view.radius();
+  return ring.rms <= kFewRms * tolerance(radius) &&
+         (radius <= kFarRadius || are_leds(ring.members())) &&
+         (ring.count > kFew || is_alone(ring));
+}
+
 /// The rings of most lights among the candidates first.
 void RingFinder::accept() {
   std::sort(candidates_.begin(), candidates_.end(), [](const Ring& a, const Ring& b) {
@@ -495,9 +500,7 @@ void RingFinder::accept() {
     const auto members = ring.members();
     const bool is_free = std::all_of(members.begin(), members.end(),
                                      [&](std::uint32_t i) { return is_taken_[i] == 0; });
-    const bool is_weak = ring.count <= kFew &&
-                         (ring.rms > kFewRms * tolerance(ring.view.radius()) || !is_alone(ring));
-    if (!is_free || is_weak) continue;
+    if (!is_free || !is_credible(ring)) continue;
     for (const std::uint32_t i : members) is_taken_[i] = 1;
     rings_.push_back(ring);
   }

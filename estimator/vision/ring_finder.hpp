@@ -70,10 +70,9 @@ class RingFinder {
   template <class Judge>
   void join_all(const Judge& judge);
   void judge_whole(std::span<const std::uint32_t> group);
-  void judge_part(std::span<const std::uint32_t> group, double longest_link);
+  void judge_part(std::span<const std::uint32_t> group);
   [[nodiscard]] std::optional<Ring> whole_ring(std::span<const std::uint32_t> members) const;
-  [[nodiscard]] std::optional<Ring> arc(std::span<const std::uint32_t> members,
-                                        double longest_link) const;
+  [[nodiscard]] std::optional<Ring> arc(std::span<const std::uint32_t> members) const;
   [[nodiscard]] std::optional<Ring> arc_after(std::span<const std::uint32_t> members,
                                               std::size_t first) const;
   [[nodiscard]] bool complete(Ring& ring, const RingShape& shape, std::size_t shift) const;
@@ -83,6 +82,7 @@ class RingFinder {
   [[nodiscard]] bool are_leds(std::span<const std::uint32_t> members) const;
   [[nodiscard]] bool is_lit(const Eigen::Vector2d& uv) const;
   [[nodiscard]] bool is_alone(const Ring& ring) const;
+  [[nodiscard]] bool is_credible(const Ring& ring) const;
   void accept();
 
   std::span<const Light> lights_;
