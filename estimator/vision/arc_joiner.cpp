@@ -14,6 +14,7 @@ constexpr int kMaxGap = 10;            // px between LEDs of a ring of which oth
 constexpr int kMaxRingSide = 64;       // px; on a larger board no LEDs touch
 constexpr std::int32_t kLeastLed = 8;  // px^2
 constexpr std::size_t kMostPixels = 2000;
+constexpr std::size_t kUsualArcs = 1024;
 constexpr double kArcArea = 1.5;      // of an LED's: two that touch
 constexpr double kLongArcArea = 4.0;  // the same where there is nothing but an arc and an LED
 constexpr double kMinArcRoundness = 0.28;
@@ -58,7 +59,11 @@ double lit_share(const RingView& view, const Eigen::Matrix2d& to_place,
 
 }  // namespace
 
-ArcJoiner::ArcJoiner() { pixels_.reserve(kMostPixels); }
+ArcJoiner::ArcJoiner() {
+  pixels_.reserve(kMostPixels);
+  is_taken_.reserve(kUsualArcs);
+  rings_.reserve(kUsualArcs);
+}
 
 std::span<const JoinedArcs> ArcJoiner::join(std::span<const Blob> blobs,
                                             std::span<const std::uint32_t> open,

@@ -91,6 +91,7 @@ RingFinder::RingFinder() {
   }
   order_.reserve(kMaxLights);
   links_.reserve(kMaxLights * kNeighbors);
+  near_.reserve(kMaxLights);
   parent_.reserve(kMaxLights);
   next_.reserve(kMaxLights);
   size_.reserve(kMaxLights);

@@ -72,6 +72,7 @@ SpotDetector::SpotDetector(const VisionConfig& config) : config_(config) {
   huge_.reserve(2 * kMaxHuge);
   lights_.reserve(kUsualBlobs);
   cores_.reserve(kUsualBlobs);
+  of_ring_.reserve(kMaxRingLeds);
   parent_.reserve(kUsualBlobs);
   groups_.reserve(kUsualBlobs);
   candidates_.reserve(kUsualBlobs);
