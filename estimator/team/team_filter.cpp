@@ -35,6 +35,9 @@ constexpr Duration kProbation = std::chrono::seconds{1};
 constexpr Duration kDark = std::chrono::seconds{1};
 constexpr Duration kLossMemory = std::chrono::seconds{10};
 constexpr double kDoubtPerLoss = 4.0;  // a robot that was contradicted starts so much less certain
+// A pair's range bias is mostly its modules' antenna delays, the same toward everybody: so much of
+// its variance. The rest is the pair's own, and drifts.
+constexpr double kShareOfModules = 0.8;
 // A misalignment is a fault beyond so many sigmas of its prior and of its estimate.
 constexpr double kWrongPriors = 4.0;
 constexpr double kWrongSigmas = 3.0;
@@ -154,7 +157,7 @@ void TeamFilter::reset(const TeamInterval& interval) {
   ranges_.clear();
   P_.resize(0, 0);
   TeamRobot& self = robots_[self_];
-  self.bias_index = append_bias(interval.settings.priors);
+  self.bias_index = append_calibration(interval.settings.priors);
   self.is_trusted = true;
 }
 
@@ -167,12 +170,13 @@ int TeamFilter::append(int count, double sigma) {
   return static_cast<int>(n);
 }
 
-int TeamFilter::append_bias(const Priors& priors) {
+int TeamFilter::append_calibration(const Priors& priors) {
   const int index = append(kBias, priors.gyro_scale);
   const double gyro = priors.gyro_bias_radps * priors.gyro_bias_radps;
   P_.diagonal().segment<3>(index).setConstant(std::max(gyro, kLeastVariance));
   P_.diagonal().segment<3>(index + 3).setConstant(
       std::max(accel_bias_variance(priors), kLeastVariance));
+  append(1, std::sqrt(0.5 * kShareOfModules) * priors.range_bias_m);
   return index;
 }
 
@@ -283,7 +287,8 @@ void TeamFilter::trust_members() {
 
 void TeamFilter::remove(RobotId id) {
   const TeamRobot robot = robots_.at(id);
-  std::vector<std::pair<int, int>> blocks{{robot.motion_index, kMotion}, {robot.bias_index, kBias}};
+  std::vector<std::pair<int, int>> blocks{{robot.motion_index, kMotion},
+                                          {robot.bias_index, TeamRobot::kCalibration}};
   for (const TeamCamera& camera : robot.cameras) blocks.emplace_back(camera.index, 3);
   for (auto range = ranges_.begin(); range != ranges_.end();) {
     const bool concerned = range->first.first == id || range->first.second == id;
@@ -347,7 +352,8 @@ void TeamFilter::add_calibrations(const TeamInterval& interval) {
   for (const TeamRange& reading : interval.ranges) {
     if (!robots_.contains(reading.observer) || !robots_.contains(reading.neighbor)) continue;
     const Pair pair = ordered(reading.observer, reading.neighbor);
-    if (!ranges_.contains(pair)) ranges_[pair] = {.index = append(1, priors.range_bias_m)};
+    if (!ranges_.contains(pair))
+      ranges_[pair] = {.index = append(1, std::sqrt(1.0 - kShareOfModules) * priors.range_bias_m)};
   }
 }
 
@@ -579,13 +585,16 @@ bool TeamFilter::correct(const TeamInterval& interval, Stage stage, Readings rea
   Trajectories paths = trajectories(interval);
   gate(interval, paths, readings);
   std::vector<TeamRow> linearized = rows(interval, paths, readings);
-  if (linearized.empty()) return true;
-
   const std::vector<bool> corrected = corrected_states(stage);
   const std::map<RobotId, TeamRobot> robots = robots_;
   const std::map<Pair, TeamRangeBias> ranges = ranges_;
   Eigen::VectorXd dx = Eigen::VectorXd::Zero(P_.rows());
   for (int iteration = 1;; ++iteration) {
+    if (linearized.empty()) {  // the last step may have made all ranges unlikely
+      robots_ = robots;
+      ranges_ = ranges;
+      return true;
+    }
     const TeamUpdate update(linearized, P_);
     if (!update.is_valid()) return false;
     Eigen::VectorXd next = update.correction(linearized, dx);
@@ -625,7 +634,7 @@ std::vector<bool> TeamFilter::corrected_states(Stage stage) const {
   for (const auto& [id, robot] : robots_) {
     if (!is_corrected(id)) continue;
     if (robot.motion_index >= 0) mark(robot.motion_index, kMotion);
-    mark(robot.bias_index, kBias);
+    mark(robot.bias_index, TeamRobot::kCalibration);
     for (const TeamCamera& camera : robot.cameras) mark(camera.index, 3);
   }
   for (const auto& [pair, range] : ranges_) {
@@ -647,6 +656,7 @@ void TeamFilter::inject(const Eigen::VectorXd& dx) {
     robot.bias.gyro_radps += dx.segment<3>(robot.bias_index);
     robot.bias.accel_mps2 += dx.segment<3>(robot.bias_index + 3);
     robot.bias.gyro_scale += dx.segment<9>(robot.bias_index + 6).reshaped<Eigen::ColMajor>(3, 3);
+    robot.antenna_delay_m += dx(robot.delay_index());
     for (TeamCamera& camera : robot.cameras) camera.misalignment += dx.segment<3>(camera.index);
   }
   for (auto& [pair, range] : ranges_) range.bias_m += dx(range.index);
@@ -725,7 +735,7 @@ void TeamFilter::advance(const TeamInterval& interval) {
     P_.diagonal().segment<3>(robot.bias_index + 3).array() +=
         noise.accel_walk * noise.accel_walk * dt + turning * turning * kTurnMemory * dt;
   }
-  const double kept_bias = std::exp(-noise.range_bias_return * dt);
+  const double kept_bias = std::exp(-noise.range_bias_return / (1.0 - kShareOfModules) * dt);
   for (auto& [pair, range] : ranges_) {
     range.bias_m *= kept_bias;
     P_.row(range.index) *= kept_bias;
@@ -840,7 +850,7 @@ void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const Gaus
   block.bottomRightCorner<3, 3>() = covariance.bottomRightCorner<3, 3>();
   block.bottomRightCorner<3, 3>().diagonal().array() +=
       std::pow(doubt * kStartAttitude, 2) + turn * turn;
-  robot.bias_index = append_bias(interval.settings.priors);
+  robot.bias_index = append_calibration(interval.settings.priors);
   robot.last_sighting = stamp_;
   robot.since = stamp_;
 }

@@ -16,11 +16,11 @@ namespace crepes {
 /// robot at the keyframe, so that this robot's motion there is known by definition, and gravity and
 /// the team's common motion are no states.
 ///
-/// States: each other robot's [p, v, theta]; every robot's gyroscope and accelerometer bias and
-/// its gyroscope's scale and axis errors; every camera's misalignment; a range bias a pair. All
-/// pairs of a robot share its states, so that the team calibrates itself. Bearings and ranges of
-/// the interval are linearized at its beginning, through the IMUs, and correct it together
-/// (iterated least squares). Then all motions advance to the end of the interval, the next
+/// States: each other robot's [p, v, theta]; every robot's gyroscope and accelerometer bias, its
+/// gyroscope's scale and axis errors and its antenna delay; every camera's misalignment; a range
+/// bias a pair. All pairs of a robot share its states, so that the team calibrates itself. Bearings
+/// and ranges of the interval are linearized at its beginning, through the IMUs, and correct it
+/// together (iterated least squares). Then all motions advance to the end of the interval, the next
 /// keyframe.
 ///
 /// A new robot is on probation for a second: until its measurements agree with the others, they
@@ -78,7 +78,8 @@ class TeamFilter {
 
   /// Appends independent states of this sigma. Returns their index.
   int append(int count, double sigma);
-  int append_bias(const Priors& priors);
+  /// The states of a robot's IMU and UWB module.
+  int append_calibration(const Priors& priors);
   void erase(int index, int count);
 
   RobotId self_{};

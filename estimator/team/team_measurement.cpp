@@ -118,7 +118,8 @@ std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias
 
   TeamRow row;
   row.dimension = 1;
-  row.residual.x() = reading.range_m - distance - bias.bias_m;
+  row.residual.x() = reading.range_m - distance - pair.observer.antenna_delay_m -
+                     pair.neighbor.antenna_delay_m - bias.bias_m;
   row.variance = reading.sigma_m * reading.sigma_m;
   const Eigen::RowVector3d u = d.transpose() / distance;
   const auto in_first_row = [](const Eigen::RowVector3d& v) {
@@ -128,7 +129,8 @@ std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias
   };
   add_motion(in_first_row(-u), in_first_row(u * now_i.R() * hat(q_i)), i, pair.observer, row);
   add_motion(in_first_row(u), in_first_row(-u * now_j.R() * hat(q_j)), j, pair.neighbor, row);
-  add_columns(bias.index, Eigen::Vector2d(1.0, 0.0), row);
+  for (const int index : {pair.observer.delay_index(), pair.neighbor.delay_index(), bias.index})
+    add_columns(index, Eigen::Vector2d(1.0, 0.0), row);
 
   const Eigen::Matrix<double, 3, 2> across = tangent_basis(d / distance);
   const Eigen::Matrix2d P = across.transpose() * covariance * across;

@@ -35,9 +35,13 @@ struct TeamCamera {
 };
 
 struct TeamRobot {
+  /// [gyroscope and accelerometer bias, the gyroscope's scale errors, antenna delay]
+  static constexpr int kCalibration = FreeMotionAt::kBias + 1;
+
   FreeMotion motion{};
   ImuBias bias{};
-  int motion_index = -1;  ///< none for this robot
+  double antenna_delay_m = 0.0;  ///< of its module; lengthens all its ranges
+  int motion_index = -1;         ///< none for this robot
   int bias_index = 0;
   std::vector<TeamCamera> cameras{};
   Timestamp last_sighting{};
@@ -45,9 +49,11 @@ struct TeamRobot {
   /// A robot on probation is corrected by what is measured between it and trusted robots, which are
   /// not.
   bool is_trusted = false;
+
+  [[nodiscard]] int delay_index() const { return bias_index + FreeMotionAt::kBias; }
 };
 
-/// The constant error of all ranges between two robots.
+/// The error of all ranges between two robots that their modules' antenna delays do not explain.
 struct TeamRangeBias {
   double bias_m = 0.0;
   int index = 0;

@@ -21,13 +21,13 @@ std::uint64_t rotated(std::uint64_t word, std::size_t length, std::size_t shift)
 
 std::size_t ones(std::uint64_t word) { return static_cast<std::size_t>(std::popcount(word)); }
 
-/// A pattern as bits, and as the frames of a camera that takes two a slot: frame 2i falls on the
-/// edge before slot i, frame 2i+1 into its middle.
+/// A pattern as bits, and as seen by a camera with two frames a slot: frame 2i falls on the edge
+/// before slot i, frame 2i+1 on the middle of slot i.
 struct Word {
   std::size_t slots = 0;
-  std::uint64_t lit = 0;          ///< bit i: slot i
-  std::uint64_t frame_lit = 0;    ///< bit i: frame i, where it is sure
-  std::uint64_t frame_known = 0;  ///< bit i: frame i is sure
+  std::uint64_t lit = 0;          ///< bit i: slot i is lit
+  std::uint64_t frame_lit = 0;    ///< bit i: frame i is lit; 0 if its state is uncertain
+  std::uint64_t frame_known = 0;  ///< bit i: the state of frame i is certain
 
   Word(std::uint64_t bits, std::size_t length) : slots(length), lit(bits) {
     const std::uint64_t before = rotated(bits, length, 1);
@@ -40,7 +40,7 @@ struct Word {
   }
 };
 
-/// The pattern's first slot is the highest bit, so that the order of words is that of texts.
+/// The first slot becomes the highest bit, so that words and texts have the same order.
 Word word_of(std::string_view pattern) {
   CREPES_EXPECT(!pattern.empty() && pattern.size() <= kMaxSlots, "a pattern has 1 to 32 slots");
   std::uint64_t bits = 0;
@@ -54,8 +54,8 @@ std::string text_of(const Word& word) {
   return text;
 }
 
-/// The least distance over shifts from `first_shift` on, or any value below `enough` once it is
-/// known to be below.
+/// The smallest distance over the shifts from `first_shift` on. If it is below `enough`, the result
+/// is only some value below `enough`.
 std::size_t distance(const Word& a, const Word& b, std::size_t enough, std::size_t first_shift) {
   std::size_t least = a.slots;
   for (std::size_t shift = first_shift; shift < a.slots && least >= enough; ++shift)
@@ -73,7 +73,7 @@ std::size_t clear(const Word& a, const Word& b, std::size_t enough) {
   return least;
 }
 
-/// Whether a word keeps the rules by itself.
+/// Whether a word keeps the rules that concern no other word.
 bool is_sound(const Word& word, const CodebookRules& rules) {
   std::uint64_t dark_run = ~word.lit & (~std::uint64_t{0} >> (64 - word.slots));
   if (ones(dark_run) < rules.distance) return false;
@@ -82,7 +82,7 @@ bool is_sound(const Word& word, const CodebookRules& rules) {
   return dark_run == 0 && distance(word, word, rules.distance, 1) >= rules.distance;
 }
 
-/// A random word of `rules.slots` with short dark runs, but for where its end meets its beginning.
+/// A random word of `rules.slots` without long dark runs. A run across its end may be too long.
 Word draw(const CodebookRules& rules, std::mt19937_64& random) {
   const std::uint64_t bits = random();
   std::uint64_t lit = 0;
@@ -95,14 +95,14 @@ Word draw(const CodebookRules& rules, std::mt19937_64& random) {
   return {lit, rules.slots};
 }
 
-/// Whether two words may not be in one set.
+/// Whether two words are too similar for one set.
 bool are_rivals(const Word& a, const Word& b, std::size_t least_distance, std::size_t least_clear) {
   return distance(a, b, least_distance, 0) < least_distance ||
          (least_clear > 0 && clear(a, b, least_clear) < least_clear);
 }
 
-/// One attempt: adds each word drawn that has no rival and puts it in the place of its rival where
-/// it has only one, which wanders through sets of the same size.
+/// One attempt. A drawn word without rival in the set is added. A word with exactly one rival
+/// replaces it: the search then continues from another set of the same size.
 std::vector<Word> attempt(const CodebookRules& rules, std::size_t least_clear, std::size_t ids,
                           const CodebookSearch& search, std::mt19937_64& random) {
   std::vector<Word> words;
@@ -162,7 +162,7 @@ Codebook search_codebook(const CodebookRules& rules, std::size_t ids,
   CREPES_EXPECT(rules.slots >= 1 && rules.slots <= kMaxSlots, "a pattern has 1 to 32 slots");
   std::mt19937_64 random(search.seed);
   std::vector<Word> best;
-  // Whole sets with ever more clear frames, until none is found any more.
+  // Requires one more clear frame after each complete set, until no complete set is found.
   bool is_whole = true;
   for (std::size_t least_clear = 0; is_whole && least_clear <= 2 * rules.slots; ++least_clear) {
     is_whole = false;

@@ -14,34 +14,34 @@ using namespace std::chrono_literals;
 // Limits of a camera.
 constexpr Duration kPhaseStep = 625us;
 constexpr std::size_t kMaxPhases = 320;
-constexpr Duration kEdgeBlur = 500us;  // half an exposure: a frame that straddles an edge is open
-constexpr double kDarkFrames = 6.0;    // beside a dark stretch: its edges, and faults in a row
+constexpr Duration kEdgeBlur = 500us;  // half an exposure: with an edge within, both are possible
+constexpr double kDarkFrames = 6.0;    // margin of a dark run: its edges, missed frames
 constexpr std::int64_t kWindowPeriods = 6;
 constexpr Duration kMinWindow = 1200ms;
-constexpr double kMinFlipRate = 0.02;  // lower ones trust single frames too much
+constexpr double kMinFlipRate = 0.02;  // with less, a single frame would count too much
 constexpr double kMaxFlipRate = 0.3;
 constexpr double kUnitsPerNat = 24.0;  // a full window of the least likely frames fits 16 bits
 
-// What is likely beforehand.
-constexpr double kMarkovOdds = 1.0;    // sources that change like a Markov chain, for each board
-constexpr double kLampOdds = 1.0;      // lamps on the mains, for each board
-constexpr double kMirrorShare = 0.01;  // boards that are the observer's own in a mirror
-constexpr double kReturnOdds = 100.0;  // boards that were seen before and not now, on their beat
-constexpr double kImageOdds = 0.1;     // second images of boards that are in sight
-constexpr Duration kInSight = 200ms;   // a board that was seen later than that is
-constexpr double kMaxSkew = 200e-6;    // of two crystals against each other
+// Priors, as odds or shares relative to a board of the library in any phase.
+constexpr double kMarkovOdds = 1.0;    // a source that changes like a Markov chain
+constexpr double kLampOdds = 1.0;      // a lamp on the mains
+constexpr double kMirrorShare = 0.01;  // the observer's own board in a mirror
+constexpr double kReturnOdds = 100.0;  // a board that returns in its known phase
+constexpr double kImageOdds = 0.1;     // a second image of a board that is in sight
+constexpr Duration kInSight = 200ms;   // a board counts as in sight for this long
+constexpr double kMaxSkew = 200e-6;    // between two crystals
 constexpr Duration kPhaseError = 2500us;
-constexpr Duration kOldPhase = 30s;  // an older one is too uncertain
+constexpr Duration kOldPhase = 30s;  // an older phase is too uncertain
 constexpr std::int64_t kPeriodsToLearn = 2;
 constexpr double kImpossible = -1e9;
 constexpr double kNegligible = 40.0;  // nats
 
-// When a track changes hands, a new board of the library differs in a fifth of its frames.
+// If a track continues on another board, that board's code differs in a fifth of the frames.
 constexpr double kOtherDiffers = 0.2;
 const double kDoubted = std::log(60.0);
 const double kLost = std::log(20'000.0);
 
-// Lamps on the mains flash twice a cycle; in steps of duty that a camera can hardly distinguish.
+// Lamps on the mains flash twice a cycle. A camera can hardly distinguish finer steps of duty.
 constexpr std::array kLampRatesHz{100.0, 120.0};
 constexpr std::array kLampDuties{0.1, 0.25, 0.4, 0.55, 0.7, 0.85};
 
@@ -61,7 +61,8 @@ std::int16_t highest(std::span<const std::int16_t> scores) {
   return best;
 }
 
-/// The log likelihood over all phases: the best score, by how many are within a nat of it.
+/// The log of the mean likelihood over all phases, approximated: the best score, times the share of
+/// phases within a nat of it.
 double log_mean(std::span<const std::int16_t> scores, std::int16_t top) {
   const auto nearly = static_cast<std::int16_t>(top - kUnitsPerNat);
   std::int16_t like_top = 0;
@@ -71,7 +72,7 @@ double log_mean(std::span<const std::int16_t> scores, std::int16_t top) {
          std::log(static_cast<double>(like_top) / static_cast<double>(scores.size()));
 }
 
-/// The middle of the phases that fit best and equally well.
+/// The middle of the run of phases that share the best score.
 std::size_t best_phase(std::span<const std::int16_t> scores) {
   const std::size_t n = scores.size();
   const std::int16_t top = highest(scores);
@@ -152,7 +153,7 @@ IdDecoder::Code IdDecoder::make_code(const BlinkCode& blink, double flip_rate) {
       std::clamp<std::size_t>(static_cast<std::size_t>(code.period / kPhaseStep), 8, kMaxPhases);
   const std::size_t steps = code.phases * kFine;
   const auto step_count = static_cast<std::int64_t>(steps);
-  // A step stands for all phases and times that are rounded to it.
+  // A step represents all phases and times that are rounded to it.
   const Duration spread =
       code.period * 3 / (4 * static_cast<std::int64_t>(code.phases)) + kEdgeBlur;
   for (std::int64_t i = 0; i < step_count; ++i) {
@@ -187,7 +188,8 @@ std::span<const std::int16_t> IdDecoder::scores_of(const BlinkEvidence& evidence
   return std::span(evidence.score).subspan(code.first_score, code.phases);
 }
 
-/// Of all codes while it may be anyone, then of the one that it is.
+/// Adds (`sign` 1) or removes (-1) an observation: for all codes while undecided, afterwards for
+/// the assigned code only.
 void IdDecoder::score(BlinkEvidence& evidence, BlinkObservation observation, int sign) const {
   const std::size_t first = evidence.assigned ? evidence.assigned->code : 0;
   const std::size_t end = evidence.assigned ? first + 1 : codes_.size();
@@ -206,7 +208,7 @@ void IdDecoder::add(BlinkEvidence& evidence, BlinkObservation observation) const
   if (!evidence.score.empty()) {
     score(evidence, observation, 1);
   } else if (!observation.lit) {
-    // A source that was never dark needs no scores: most lamps and reflections end here.
+    // A source that was never dark needs no scores. Most lamps and reflections never do.
     evidence.score.assign(score_count_, 0);
     for (std::size_t i = 0; i < evidence.window.size(); ++i) score(evidence, evidence.window[i], 1);
   }
@@ -230,7 +232,7 @@ void IdDecoder::observe_dark(BlinkEvidence& evidence, Timestamp stamp) const {
 void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp,
                             const PhaseMemory& known) const {
   if (!evidence.last_lit || stamp - *evidence.last_lit > longest_dark_) {
-    // It was away: what comes back in its place may be another.
+    // It was out of sight for too long: what appears in its place may be another source.
     evidence.pending_dark.clear();
     if (evidence.assigned) evidence.forget();
   }
@@ -256,7 +258,7 @@ void IdDecoder::learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory&
   if (now - evidence.assigned_since >= enough) known.learn(*evidence.assigned, now);
 }
 
-/// Log likelihood and prior of a code that continues with the phase of its last sighting.
+/// Log likelihood plus log prior of a code whose phase continues from its last sighting.
 double IdDecoder::log_known(const BlinkEvidence& evidence, std::size_t code, Timestamp now,
                             const PhaseMemory& known) const {
   const auto phase = known.of(code);
@@ -286,7 +288,7 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
     const double at_most = top / kUnitsPerNat + code.log_share;
     return at_most < best_log - kNegligible ? kImpossible : log_mean(scores, top) + code.log_share;
   };
-  double others = 0.0;  // relative to the best
+  double others = 0.0;  // posterior of all other codes, relative to the best one
   std::size_t best = 0;
   for (std::size_t c = 0; c < boards_; ++c) {
     const double log_c = std::max(anywhere(codes_[c]), log_known(evidence, c, now, known));
@@ -308,9 +310,11 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
   evidence.doubt = 0.0;
 }
 
-/// Page's test: the log odds that another board blinks here since some frame in the past,
+/// Page's test (CUSUM) for a change of the source: the log odds g that another board has been
+/// blinking here since some past frame,
 ///   g <- max(0, g + ln(((1 - d) p + d (1 - p)) / p)),
-/// p the likelihood of the frame under the ID and d how often another differs.
+/// where p is the likelihood of the frame under the assigned code, and d the share of frames in
+/// which another board differs.
 void IdDecoder::confirm(BlinkEvidence& evidence, BlinkObservation observation) const {
   const double lit =
       p_lit(codes_[evidence.assigned->code], evidence.assigned->phase, observation.stamp);

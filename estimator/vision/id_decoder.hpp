@@ -1,4 +1,4 @@
-/// A track's on/off history to the robot that blinks it.
+/// Decodes which robot's board a track is, from the track's on/off history.
 #pragma once
 
 #include <array>
@@ -15,29 +15,31 @@
 
 namespace crepes {
 
-/// A code of the library at one of its phases.
+/// A code of the library in one phase.
 struct CodeMatch {
   std::size_t code = 0;   ///< index into the library
   std::size_t phase = 0;  ///< in steps of the decoder, against our clock
 };
 
-/// What one track showed of late, and what it is taken for. Owned by the track, kept by IdDecoder.
+/// The recent observations of one track, and the code assigned to it. A track owns it; only
+/// IdDecoder changes it.
 struct BlinkEvidence {
   BlinkWindow window;
-  std::vector<Timestamp> pending_dark;  ///< dark since the last lit frame: blinking, or gone
+  std::vector<Timestamp> pending_dark;  ///< dark frames since the last lit one; they count as
+                                        ///< blinking once the track is lit again
   std::vector<std::int16_t> score;      ///< log likelihood of every code in every phase
   std::optional<Timestamp> last_lit;
-  std::optional<CodeMatch> assigned;  ///< who it is
+  std::optional<CodeMatch> assigned;  ///< the decision; empty while undecided
   Timestamp assigned_since{};
-  double confidence = 0.0;  ///< posterior of `assigned` when it was given
-  double doubt = 0.0;       ///< log odds that another blinks here since, never below zero
+  double confidence = 0.0;  ///< posterior probability of `assigned` when it was decided
+  double doubt = 0.0;       ///< log odds that another board has blinked here since; at least zero
 
-  /// Starts anew; keeps its memory.
+  /// Returns to the initial state. Allocated memory is kept.
   void forget();
 };
 
-/// Where in its code each board stands, by index into the library. A board keeps its beat while
-/// nobody looks at it: crystals differ by at most 100 ppm.
+/// The last known phase of each board, by index into the library. A board that is out of sight
+/// keeps blinking, and its phase can be predicted: two crystals differ by at most 200 ppm.
 class PhaseMemory {
  public:
   struct Phase {
@@ -56,35 +58,37 @@ class PhaseMemory {
   std::size_t known_ = 0;
 };
 
-/// Maximum-likelihood decoding of cyclic codes over their unknown phase, one frame at a time.
+/// Maximum-likelihood decoding of cyclic codes with unknown phase, one frame at a time.
 ///
-/// Every code in every phase (steps of about 0.6 ms) keeps the log likelihood of a sliding window.
-/// It competes with the other codes and with sources that are no boards: lamps on the mains, and a
-/// two-state Markov chain of unknown rates, which covers steady and flickering ones. A code wins as
-/// soon as the posterior of all others and of no board are below what the configuration allows. Its
-/// own frames are then tested against it for as long as the track lives.
+/// For every code in every phase (steps of about 0.6 ms) it keeps the log likelihood of a sliding
+/// window of frames. The alternatives are the other codes and sources that are no boards: lamps on
+/// the mains, and a two-state Markov chain of unknown rates for steady and flickering sources. A
+/// code is assigned once two posterior probabilities are below their configured limits: that of all
+/// other codes (`max_wrong_id`) and that of no board (`max_false_robot`). Afterwards each frame of
+/// the track is tested against the assigned code.
 class IdDecoder {
  public:
-  /// `rate_hz`: the camera's. `own`: the robot that looks; it sees itself in mirrors only, and its
-  /// ID is never given.
+  /// `rate_hz`: frame rate of the camera. `own`: the robot that carries the camera. It sees its own
+  /// board in mirrors only, so that ID is never assigned.
   IdDecoder(const IdLibrary& library, const VisionConfig& config, double rate_hz,
             std::optional<RobotId> own = std::nullopt);
 
-  /// The track's board was lit at `stamp`, later than all before.
+  /// The track was lit in the frame at `stamp`, which is later than all before.
   void observe_lit(BlinkEvidence& evidence, Timestamp stamp, const PhaseMemory& known = {}) const;
-  /// Nothing was seen where the track's board is. Counts once it is lit again soon enough.
+  /// Nothing was seen where the track is predicted. The frame counts as dark if the track is lit
+  /// again within longest_dark().
   void observe_dark(BlinkEvidence& evidence, Timestamp stamp) const;
-  /// Remembers the phase of a board that has been identified for long enough.
+  /// Stores the phase in `known` if the board has been identified for two periods.
   void learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const;
 
-  /// Who it is; empty while undecided or in doubt.
+  /// The robot whose board the track is; empty while undecided or in doubt.
   [[nodiscard]] std::optional<RobotId> id_of(const BlinkEvidence& evidence) const;
   [[nodiscard]] static bool is_identified(const BlinkEvidence& evidence);
   [[nodiscard]] RobotId code_id(const CodeMatch& match) const { return codes_[match.code].id; }
-  /// The probability that an assigned board is lit at `stamp`; empty for others.
+  /// The probability that the assigned board is lit at `stamp`; empty while none is assigned.
   [[nodiscard]] std::optional<double> lit_probability(const BlinkEvidence& evidence,
                                                       Timestamp stamp) const;
-  /// A board is never dark for longer, frames at the edges included.
+  /// The longest dark time of any code of the library, with a margin of six frames.
   [[nodiscard]] Duration longest_dark() const { return longest_dark_; }
 
  private:
@@ -95,9 +99,10 @@ class IdDecoder {
     Duration period{};
     std::size_t phases = 0;
     std::size_t first_score = 0;  ///< its place in BlinkEvidence::score
-    double log_share = 0.0;       ///< how likely it is beforehand, all phases together
+    double log_share = 0.0;       ///< log prior of the code, all phases together
     std::vector<double> p_lit;    ///< over one period, in fine steps
-    /// [lit][fine offset][phase], the phases twice in a row: log likelihood of one observation.
+    /// [lit][fine offset][phase]: log likelihood of one observation. The phases are stored twice in
+    /// a row, so that no index has to wrap.
     std::array<std::array<std::vector<std::int16_t>, kFine>, 2> weight;
   };
 
@@ -115,8 +120,8 @@ class IdDecoder {
   void decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory& known) const;
   void confirm(BlinkEvidence& evidence, BlinkObservation observation) const;
 
-  std::vector<Code> codes_;  ///< the library's, then lamps
-  std::size_t boards_ = 0;   ///< of them the library's
+  std::vector<Code> codes_;  ///< those of the library, then those of lamps
+  std::size_t boards_ = 0;   ///< number of codes of the library
   MarkovLikelihood markov_;
   double max_wrong_id_;
   double max_false_robot_;

@@ -9,11 +9,11 @@ namespace {
 
 constexpr std::size_t kMinPatternSlots = 8;
 constexpr std::size_t kMaxPatternSlots = 32;
-constexpr double kMinDutyDistance = 0.02;  // less is lost between two frames
+constexpr double kMinDutyDistance = 0.02;  // smaller differences are lost between two frames
 
 Duration from_ms(double ms) { return Duration{std::llround(ms * 1e6)}; }
 
-/// The same for all patterns that are one signal: the least rotation of the part that repeats.
+/// Equal for all patterns that are the same signal: the smallest rotation of the repeating part.
 std::string canonical(const std::string& pattern) {
   const std::size_t repeat = (pattern + pattern).find(pattern, 1);
   const std::string root = pattern.substr(0, repeat);

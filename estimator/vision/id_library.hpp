@@ -1,4 +1,4 @@
-/// Who blinks how: the codes of all boards of the swarm.
+/// The blink codes of all boards of the swarm.
 #pragma once
 
 #include <cstdint>
@@ -12,19 +12,20 @@
 
 namespace crepes {
 
-/// When a board is lit, as a function of the board's own time; repeats for ever.
+/// Whether a board is lit, as a function of the board's own time. Repeats with period().
 class BlinkCode {
  public:
-  /// `pattern`: 8 to 32 characters, 1 lit and 0 dark, one a slot; must hold both.
+  /// `pattern`: 8 to 32 characters, one a slot, 1 lit and 0 dark. Both must occur.
   [[nodiscard]] static Result<BlinkCode> from_pattern(std::string_view pattern, Duration slot);
   /// Lit for the first `duty` of every `period`.
   [[nodiscard]] static Result<BlinkCode> from_duty(double duty, Duration period);
-  /// The code that `member` has, by pattern or by duty.
+  /// The code of `member`, which has either a pattern or a duty.
   [[nodiscard]] static Result<BlinkCode> from(const MemberConfig& member, const SwarmConfig& swarm);
 
   [[nodiscard]] Duration period() const { return period_; }
   [[nodiscard]] bool is_lit(Duration board_time) const;
-  /// The part of [from, to) in which the board is lit, 0 to 1: what an exposure collects.
+  /// The share of [from, to) in which the board is lit, 0 to 1: the light that an exposure of this
+  /// time collects.
   [[nodiscard]] double lit_fraction(Duration from, Duration to) const;
 
  private:
@@ -39,7 +40,7 @@ class BlinkCode {
   std::vector<Interval> lit_;  ///< within one period, in order
 };
 
-/// The codes of all members. No two of them are the same signal.
+/// The codes of all members. No two are the same signal, however shifted in time.
 class IdLibrary {
  public:
   struct Entry {
@@ -47,7 +48,7 @@ class IdLibrary {
     BlinkCode code;
   };
 
-  /// Refuses members without a code, with an ambiguous one, or with the code of another.
+  /// Refuses members that have no code, both a pattern and a duty, or the code or id of another.
   [[nodiscard]] static Result<IdLibrary> from(const SwarmConfig& swarm);
 
   [[nodiscard]] std::span<const Entry> entries() const { return entries_; }

@@ -24,7 +24,8 @@ tools = {command: told(crepesctl, command, "--help") for command in commands_in(
 for command in list(tools):
     if "Subcommands:" in tools[command]:
         tools[command] += "".join(told(crepesctl, command, inner, "--help") for inner in commands_in(tools[command]))
-pages = [source / "README.md", *sorted(source.glob("config/docs/**/*.md")), *sorted(source.glob("systemd/*.md"))]
+pages = [source / "README.md", *sorted(source.glob("config/docs/**/*.md")), *sorted(source.glob("systemd/*.md")),
+         source / "firmware/HARDWARE.md", *sorted(source.glob("config/examples/*/README.md"))]
 keys = {key.path for key in keys_of((source / "config/crepesd.yaml").read_text())}
 sections = {key.split(".")[0] for key in keys}
 keys_named = calls = 0
@@ -51,10 +52,13 @@ readme = (source / "README.md").read_text()
 faults += [f"README.md: nothing of crepesctl {command}" for command in tools if not re.search(rf"^(eval .*)?crepesctl {command}\b", readme, re.MULTILINE)]
 rows = (source / "daemon/ctl/README.md").read_text()
 faults += [f"daemon/ctl/README.md: nothing of {command}" for command in tools if f"`{command}`" not in rows]
+pins = set(re.findall(r"\bPA\d+\b", (source / "firmware/led_board/README.md").read_text()))
+for file in ("firmware/HARDWARE.md", "firmware/pictures/led_board.svg"):
+    faults += [f"{file}: nothing of {pin}, which the firmware uses" for pin in sorted(pins) if not re.search(rf"\b{pin}\b", (source / file).read_text())]
 completion, manual = told(crepesctl, "completion", "bash"), "\n".join(tool(crepesctl)).replace("\\-", "-")
 for command, text in tools.items():
     faults += [f"completion: nothing of {option} of {command}" for option in sorted(options_in(text)) if option not in completion]
     faults += [f"crepesctl.1: nothing of {option} of {command}" for option in sorted(options_in(text)) if option not in manual]
-assert len(pages) > 10 and keys_named > 50 and len(options) > 4 and len(tools) > 15 and calls > 30, "looked at too little to mean anything"
+assert len(pins) == 8 and len(pages) > 10 and keys_named > 50 and len(options) > 4 and len(tools) > 15 and calls > 30, "looked at too little to mean anything"
 print("\n".join(faults) or f"{len(pages)} pages, {keys_named} keys, {len(options)} options, {len(tools)} commands, {calls} calls: all as they are")
 sys.exit(bool(faults))

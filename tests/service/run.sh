@@ -24,7 +24,7 @@ mount -t overlay -o "lowerdir=/,upperdir=$place/memory/upper,workdir=$place/memo
 rm -rf "$place"/tree/etc/systemd/system/* "$place/tree/usr/sbin/policy-rc.d" "$place/tree/var/log/journal"
 mkdir "$place/tree/crepes"
 cp "$package" "$place/tree/crepes/crepes.deb"
-cp "$here"/*.py "$here"/*.umockdev "$source"/config/examples/four-simulated/r[12].yaml "$place/tree/crepes/"
+cp "$here"/*.py "$here"/*.umockdev "$source"/config/examples/four-simulated/r[12].yaml "$source"/systemd/*.md "$place/tree/crepes/"
 cat >"$place/tree/etc/systemd/system/service-test.service" <<'UNIT'
 [Unit]
 Description=What happens to services

@@ -87,14 +87,26 @@ def device_rules():
     check("an FTDI bridge does not hold bytes back", "latency_timer' writing '1'" in udev_says("1-4/1-4:1.0/ttyUSB0").stderr)
 
 
-def give_key():
-    """Follows systemd/MESH.md for this robot and its neighbor."""
-    made = run("crepesctl", "keygen", "/crepes/mesh.key")
-    run("install", "-m640", "-gcrepes", "/crepes/mesh.key", "/etc/crepes/")
-    for fragments in (pathlib.Path("/etc/crepes/crepesd.d"), pathlib.Path("/crepes/r2.d")):
-        fragments.mkdir(exist_ok=True)
-        (fragments / "20-key.yaml").write_text("net: {key_file: /etc/crepes/mesh.key}\n")
-    return made.stdout.split()[-1]
+def follow(page, only=""):
+    """Runs the commands of a document as they stand, of blocks with `only` in them. Returns what they print."""
+    blocks = [block for block in re.findall(r"^```\n(.*?)^```", pathlib.Path(page).read_text(), re.MULTILINE | re.DOTALL) if only in block]
+    done = run("bash", "-euc", 'sudo() { "$@"; }; cd /crepes\n' + "".join(blocks))
+    check(f"the steps of {page} succeed", blocks and done.returncode == 0, done.stderr.strip())
+    return done.stdout
+
+
+def documented_steps():
+    """Installs the example of two robots, without devices and mesh, and gives both robots of the test a key."""
+    follow("/crepes/README.md")
+    told, _ = awaited(lambda: all(missing in shown("StatusText") for missing in ("/dev/crepes/imu", "/dev/crepes/uwb", "bat0: no such interface")), 5.0)
+    check("the example runs without devices and names them", told and shown("ActiveState") == "active", shown("StatusText"))
+    printed = follow("/crepes/MESH.md", only="keygen")
+    neighbor = pathlib.Path("/crepes/r2.d")
+    neighbor.mkdir()
+    (neighbor / "20-key.yaml").write_text(pathlib.Path("/etc/crepes/crepesd.d/20-key.yaml").read_text())
+    run("systemctl", "stop", "crepesd")
+    CONFIG.unlink()
+    return printed.splitlines()[0].split()[-1]
 
 
 def faulty_configuration():
@@ -200,7 +212,7 @@ def remove():
 def main():
     install()
     device_rules()
-    key = give_key()
+    key = documented_steps()
     neighbor = subprocess.Popen(["/usr/bin/crepesd", "--config", "/crepes/r2.yaml"], stderr=subprocess.DEVNULL)
     subscriber = Subscriber()
     faulty_configuration()

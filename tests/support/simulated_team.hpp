@@ -20,7 +20,7 @@ namespace crepes::test {
 inline constexpr RobotId kSelf{1};
 inline constexpr Duration kInterval = std::chrono::milliseconds{100};
 inline constexpr double kIntervalSeconds = 0.1;
-inline constexpr double kBearingSigma = 1e-3;  // rad
+inline constexpr double kBearingSigma = 5e-4;  // rad
 inline constexpr double kRangeSigma = 0.05;    // m
 
 inline TeamSettings team_settings() {
@@ -46,6 +46,7 @@ class SimulatedTeam {
                      random_.rotation()};
       body.bias = {.gyro_radps = random_.vector(0.005), .accel_mps2 = random_.vector(0.035)};
       body.misalignment = random_.vector(radians(0.17));
+      body.antenna_delay_m = random_.normal(0.05 * std::sqrt(0.4));
     }
   }
 
@@ -69,8 +70,10 @@ class SimulatedTeam {
     for (const auto& [i, from] : bodies_) {
       for (const auto& [j, to] : bodies_) {
         if (i == j) continue;
+        // The errors of lens and spot last longer than an interval.
+        const Eigen::Vector3d error = random_.vector(kBearingSigma);
         for (int k = 1; k <= 4 && sees(i, j); ++k)
-          interval.bearings.push_back({i, bearing(i, j, 0.024 * k, paths)});
+          interval.bearings.push_back({i, bearing(i, j, 0.024 * k, error, paths)});
         if (i < j) interval.ranges.push_back(range(i, j, paths));
       }
     }
@@ -95,6 +98,7 @@ class SimulatedTeam {
     FreeMotion motion;
     ImuBias bias;
     Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();
+    double antenna_delay_m = 0.0;
     double phase = 0.0;
     std::vector<ImuMean> imu;
   };
@@ -123,7 +127,7 @@ class SimulatedTeam {
     return imu;
   }
 
-  Bearing bearing(RobotId i, RobotId j, double t_s,
+  Bearing bearing(RobotId i, RobotId j, double t_s, const Eigen::Vector3d& error,
                   const std::map<RobotId, RobotTrajectory>& paths) {
     const FreeMotion from = paths.at(i).at(t_s).motion;
     const FreeMotion to = paths.at(j).at(t_s).motion;
@@ -132,7 +136,7 @@ class SimulatedTeam {
     const Eigen::Vector3d u = so3_exp(bodies_.at(i).misalignment) * d.normalized();
     return {.stamp = now_ + from_seconds(t_s),
             .neighbor = j,
-            .u_B = so3_exp(random_.vector(kBearingSigma)) * u,
+            .u_B = so3_exp(error) * u,
             .p_B_C = p_body_camera_,
             .sigma_rad = kBearingSigma};
   }
@@ -144,11 +148,12 @@ class SimulatedTeam {
     const double distance =
         (to.p_F + to.q_F_B * p_body_uwb_ - from.p_F - from.q_F_B * p_body_uwb_).norm();
     auto [bias, is_new] = range_bias_.try_emplace({i, j}, 0.0);
-    if (is_new) bias->second = random_.normal(0.05);
+    if (is_new) bias->second = random_.normal(0.05 * std::sqrt(0.2));
+    const double delay_m = bodies_.at(i).antenna_delay_m + bodies_.at(j).antenna_delay_m;
     return {i,
             j,
             now_ + from_seconds(t_s),
-            {distance + bias->second + random_.normal(kRangeSigma), kRangeSigma}};
+            {distance + delay_m + bias->second + random_.normal(kRangeSigma), kRangeSigma}};
   }
 
   [[nodiscard]] Pose relative(RobotId i, RobotId j) const {

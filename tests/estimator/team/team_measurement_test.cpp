@@ -13,7 +13,7 @@ using test::RandomGeometry;
 constexpr double kDuration = 0.1;  // s
 constexpr double kTime = 0.06;     // s; a point of the trajectories' grid
 constexpr double kStep = 1e-6;
-constexpr int kPerRobot = FreeMotionAt::kStart;
+constexpr int kPerRobot = FreeMotionAt::kMotion + TeamRobot::kCalibration;
 constexpr int kCamera = 2 * kPerRobot;
 constexpr int kRangeBias = kCamera + 3;
 
@@ -55,7 +55,9 @@ struct Scene {
       robot.motion.q_F_B = robot.motion.q_F_B * so3_exp(by * Eigen::Vector3d::Unit(i - 6));
     if (i >= 9 && i < 12) robot.bias.gyro_radps(i - 9) += by;
     if (i >= 12 && i < 15) robot.bias.accel_mps2(i - 12) += by;
-    if (i >= 15) robot.bias.gyro_scale.reshaped<Eigen::ColMajor>()(i - 15) += by;
+    if (i == kPerRobot - 1) robot.antenna_delay_m += by;
+    if (i >= 15 && i < kPerRobot - 1)
+      robot.bias.gyro_scale.reshaped<Eigen::ColMajor>()(i - 15) += by;
   }
 
   /// Calls `f` with the pair as it is now.
