@@ -65,9 +65,10 @@ class BlobFinder {
   void visit(std::size_t blob, const PixelBox& box, const Visit& visit) const {
     auto run = std::partition_point(runs_.begin(), runs_.end(),
                                     [&](const Run& r) { return r.row < box.v_min; });
-    for (; run != runs_.end() && run->row <= box.v_max; ++run)
-      if (blob_of_[static_cast<std::size_t>(run - runs_.begin())] == blob)
-        for (int u = run->begin; u < run->end; ++u) visit(u, run->row);
+    for (; run != runs_.end() && run->row <= box.v_max; ++run) {
+      if (blob_of_[static_cast<std::size_t>(run - runs_.begin())] != blob) continue;
+      for (int u = run->begin; u < run->end; ++u) visit(u, run->row);
+    }
   }
 
  private:
