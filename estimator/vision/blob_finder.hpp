@@ -1,6 +1,7 @@
 /// Connected bright pixels of a gray image.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -58,6 +59,17 @@ class BlobFinder {
 
   /// Which of the blobs that the last find() appended has the pixel, counted from 0.
   [[nodiscard]] std::optional<std::size_t> blob_at(int u, int v) const;
+
+  /// Calls visit(u, v) for the pixels of one of them, which lie in `box`.
+  template <class Visit>
+  void visit(std::size_t blob, const PixelBox& box, const Visit& visit) const {
+    auto run = std::partition_point(runs_.begin(), runs_.end(),
+                                    [&](const Run& r) { return r.row < box.v_min; });
+    for (; run != runs_.end() && run->row <= box.v_max; ++run) {
+      if (blob_of_[static_cast<std::size_t>(run - runs_.begin())] != blob) continue;
+      for (int u = run->begin; u < run->end; ++u) visit(u, run->row);
+    }
+  }
 
  private:
   struct Run {

@@ -1,11 +1,15 @@
-/// Six LEDs to one board.
+/// The LEDs of one board to one board.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
+
+#include "estimator/vision/blob_finder.hpp"
+#include "estimator/vision/ring_model.hpp"
 
 namespace crepes {
 
@@ -17,44 +21,81 @@ struct Light {
   std::uint32_t blob = 0;   ///< the blob that it is, or is part of
 };
 
-/// A board whose LEDs are separate blobs.
+/// A board whose LEDs are separate lights.
 struct Ring {
-  double u = 0.0, v = 0.0;  ///< where the ring's center appears [px]
-  std::array<std::uint32_t, 6> lights{};
+  RingView view{};
+  int leds = 0;  ///< of the board; some may be hidden
+  std::array<std::uint32_t, kMaxRingLeds> lights{};
   std::size_t count = 0;  ///< of lights
+  double rms = 0.0;       ///< [px]
+
+  [[nodiscard]] bool is_whole() const { return count == static_cast<std::size_t>(leds); }
+  [[nodiscard]] std::span<const std::uint32_t> members() const {
+    return std::span(lights).first(count);
+  }
 };
 
-/// Finds boards so near that their LEDs are lights of their own.
+/// Finds boards so near that their LEDs are lights of their own: rings of 4 to 16 LEDs, round or
+/// square, seen up to 73 degrees aslant, whole or in part.
 ///
-/// Any three neighbors a, b, c on a regular hexagon have its center at a + c - b, and an affine
-/// view keeps that true. So every light votes for a center with each two of its near neighbors; two
-/// votes at one place make a ring of four to six LEDs, no matter which are hidden. The lines
-/// through opposite LEDs meet in the center under any perspective: where there are two or more, it
-/// is there.
+/// Lights are joined, the nearest first, into a tree of groups: the LEDs of a ring are a group of
+/// it, and where another light is too near, some arcs are. Each group is held against every shape
+/// with as many LEDs or, as an arc, with more. An arc tells where the others should be: they are
+/// added where there is light, and must be dark else. Whole rings are taken before arcs, and those
+/// of most lights first. What is left has other lights too near to it: four LEDs in a row tell the
+/// rest of their ring as well.
 ///
-/// Half a ring is one vote, which three robots in a row with a bend give as well. It is believed
-/// where the three are parts of one blob, or bright, alike and closer together than robots fly.
+/// Many things look like few LEDs. Four lights are a ring, and four of more an arc, where they are
+/// alike, and alone. Three are where they are the half of six, and parts of one blob, or bright and
+/// closer together than robots fly.
 class RingFinder {
  public:
   RingFinder();
 
-  /// Valid until the next call. A light belongs to one ring at most.
-  [[nodiscard]] std::span<const Ring> find(std::span<const Light> lights);
+  /// Valid until the next call. A light belongs to one ring at most. The lights are those of
+  /// `image` above `threshold`.
+  [[nodiscard]] std::span<const Ring> find(std::span<const Light> lights, const GrayImage& image,
+                                           int threshold);
 
  private:
-  struct Vote {
-    double u = 0.0, v = 0.0;
-    double radius = 0.0;
-    std::array<std::uint32_t, 3> lights{};
+  struct Link {
+    double length;
+    std::uint32_t a, b;
   };
+  static constexpr std::size_t kNearest = 3;
+  using Members = std::array<std::uint32_t, kMaxRingLeds + 1>;
 
-  void vote(std::span<const Light> lights, std::uint32_t corner, std::size_t place);
-  void count_votes(std::span<const Light> lights, std::size_t seed, std::size_t least);
-  void accept_half_rings(std::span<const Light> lights);
-  [[nodiscard]] bool is_free(const Vote& vote) const;
+  void link_neighbors();
+  void grow_from(std::uint32_t b);
+  template <class Judge>
+  void join_all(const Judge& judge);
+  void judge_whole(std::span<const std::uint32_t> group);
+  void judge_part(std::span<const std::uint32_t> group);
+  [[nodiscard]] std::optional<Ring> whole_ring(std::span<const std::uint32_t> members) const;
+  [[nodiscard]] std::optional<Ring> arc(std::span<const std::uint32_t> members) const;
+  [[nodiscard]] std::optional<Ring> arc_after(std::span<const std::uint32_t> members,
+                                              std::size_t first) const;
+  [[nodiscard]] bool complete(Ring& ring, const RingShape& shape, std::size_t shift) const;
+  [[nodiscard]] std::optional<Ring> half_ring(std::span<const std::uint32_t> members) const;
+  [[nodiscard]] bool are_alike(std::span<const std::uint32_t> members, double factor) const;
+  /// Whether they are as bright as LEDs nearby are.
+  [[nodiscard]] bool are_leds(std::span<const std::uint32_t> members) const;
+  [[nodiscard]] bool is_lit(const Eigen::Vector2d& uv) const;
+  [[nodiscard]] bool is_alone(const Ring& ring) const;
+  [[nodiscard]] bool is_credible(const Ring& ring) const;
+  void accept();
 
+  std::span<const Light> lights_;
+  const GrayImage* image_ = nullptr;
+  int threshold_ = 0;
+  std::vector<RingShape> shapes_;     ///< by number of LEDs
   std::vector<std::uint32_t> order_;  ///< lights by u
-  std::vector<Vote> votes_;           ///< by u
+  std::vector<Link> links_;
+  std::vector<std::array<std::uint32_t, kNearest>> near_;  ///< of each light; itself for none
+  std::vector<std::uint32_t> parent_;                      ///< union-find over lights
+  std::vector<std::uint32_t> next_;                        ///< the groups as cycles
+  std::vector<std::uint32_t> size_;                        ///< of the group, at its root
+  std::vector<Ring> candidates_;
   std::vector<std::uint8_t> is_taken_;
   std::vector<Ring> rings_;
 };

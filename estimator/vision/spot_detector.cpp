@@ -25,11 +25,13 @@ constexpr double kMaxElongation = 2.45;  // of a board in fragments; two side by
 constexpr int kMaxSpeck = 7;        // px; pieces of so little are one board, whatever its shape
 constexpr int kMaxFragmented = 28;  // px; on a larger board every LED stands alone
 constexpr int kSplitMinSide = 6;    // px; smaller blobs show no ring
-constexpr int kSplitMaxSide = 40;   // px; LEDs further apart do not touch
+constexpr int kSplitMaxSide = 100;  // px; LEDs of larger rings do not touch
 
 constexpr double kRim = 1.25;       // of a ring's radius: what is nearer belongs to it
 constexpr double kSmallRing = 5.0;  // px radius; the center of its light is surer than that of LEDs
-constexpr double kSmallRingShift = 0.3;  // of its radius; if they differ more, LEDs are hidden
+constexpr double kSharpRing = 0.04;      // of its radius, the error of LEDs that stand apart
+constexpr double kSmallRingShift = 0.3;  // of its radius; an arc's light is further away
+constexpr double kOtherLight = 0.6;      // of its radius; light of another board is in its blob
 
 int longer_side(const PixelBox& box) { return std::max(box.width(), box.height()); }
 int shorter_side(const PixelBox& box) { return std::min(box.width(), box.height()); }
@@ -70,6 +72,7 @@ SpotDetector::SpotDetector(const VisionConfig& config) : config_(config) {
   huge_.reserve(2 * kMaxHuge);
   lights_.reserve(kUsualBlobs);
   cores_.reserve(kUsualBlobs);
+  of_ring_.reserve(kMaxRingLeds);
   parent_.reserve(kUsualBlobs);
   groups_.reserve(kUsualBlobs);
   candidates_.reserve(kUsualBlobs);
@@ -130,9 +133,15 @@ bool SpotDetector::search(const GrayImage& image, int threshold, double contrast
   if (!finder_.find(image, threshold, config_.max_area_px2, blobs_)) return false;
   sort_out(image, threshold, contrast, rejected);
   find_lights(image, threshold);
-  for (const Ring& ring : ring_finder_.find(lights_))
-    if (ring.count > 3 || is_half(image, threshold, ring)) take_ring(image, threshold, ring);
-  std::erase_if(open_, [&](std::uint32_t i) { return is_open_[i] == 0; });
+  for (const Ring& ring : ring_finder_.find(lights_, image, threshold))
+    if (!is_whole_blob(ring)) take_ring(image, threshold, ring);
+  const auto close = [&] {
+    std::erase_if(open_, [&](std::uint32_t i) { return is_open_[i] == 0; });
+  };
+  close();
+  for (const JoinedArcs& arcs : arc_joiner_.join(blobs_, open_, finder_))
+    take_arcs(image, threshold, arcs);
+  close();
   join_fragments();
   for (const std::uint32_t i : open_) {
     if (is_open_[i] == 0) continue;
@@ -233,52 +242,57 @@ void SpotDetector::split(const GrayImage& image, std::uint32_t index, int thresh
   }
 }
 
-/// Whether half a ring's other half is hidden indeed, and does not just touch what was found.
-bool SpotDetector::is_half(const GrayImage& image, int threshold, const Ring& ring) const {
+/// Whether it is an arc that is one blob, too round for that.
+bool SpotDetector::is_whole_blob(const Ring& ring) const {
   constexpr double kLong = 1.4;  // half a ring is longer than wide
-  const auto members = std::span(ring.lights).first(ring.count);
-  const std::uint32_t blob = lights_[members[0]].blob;
-  if (blob == lights_[members[1]].blob && blobs_[blob].elongation() < kLong) return false;
-  double radius = 0.0;
-  for (const std::uint32_t i : members)
-    radius = std::max(radius, distance(lights_[i].u - ring.u, lights_[i].v - ring.v));
-  for (std::uint32_t i = 0; i < lights_.size(); ++i) {
-    if (std::find(members.begin(), members.end(), i) == members.end() &&
-        (lights_[i].blob == blob ||
-         distance(lights_[i].u - ring.u, lights_[i].v - ring.v) < kRim * radius))
-      return false;
-  }
-  return std::all_of(members.begin(), members.end(), [&](std::uint32_t light) {
-    const auto u = static_cast<int>(std::lround(2.0 * ring.u - lights_[light].u));
-    const auto v = static_cast<int>(std::lround(2.0 * ring.v - lights_[light].v));
-    return u < 0 || v < 0 || u >= image.width || v >= image.height || image.row(v)[u] < threshold;
-  });
+  const std::uint32_t blob = lights_[ring.lights[0]].blob;
+  const auto members = ring.members();
+  return !ring.is_whole() && blobs_[blob].elongation() < kLong &&
+         std::all_of(members.begin(), members.end(),
+                     [&](std::uint32_t light) { return lights_[light].blob == blob; });
 }
 
-/// The blobs of a ring, and what else is in it, are accounted for.
-void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& ring) {
+/// Blobs of a ring, and what else is in it, are accounted for. Returns their sum.
+Blob SpotDetector::take_blobs(std::span<const std::uint32_t> blobs, const RingView& view) {
   Blob whole;
-  double radius = 0.0;
   const auto take = [&](std::uint32_t i) {
     if (is_open_[i] == 0) return;
     is_open_[i] = 0;
     if (whole.area == 0) whole.box = blobs_[i].box;
     whole.absorb(blobs_[i]);
   };
-  for (std::size_t k = 0; k < ring.count; ++k) {
-    const Light& light = lights_[ring.lights[k]];
-    take(light.blob);
-    radius = std::max(radius, distance(light.u - ring.u, light.v - ring.v));
-  }
-  if (whole.area == 0) return;  // its blobs went into another ring
+  for (const std::uint32_t i : blobs) take(i);
+  if (whole.area == 0) return whole;  // its blobs went into another ring
   for (const std::uint32_t i : open_)
-    if (distance(blobs_[i].mean_u() - ring.u, blobs_[i].mean_v() - ring.v) < kRim * radius) take(i);
+    if (view.place_near({blobs_[i].mean_u(), blobs_[i].mean_v()}).norm() < kRim) take(i);
+  return whole;
+}
+
+void SpotDetector::take_arcs(const GrayImage& image, int threshold, const JoinedArcs& arcs) {
+  const Blob whole = take_blobs(arcs.members(), arcs.view);
+  if (whole.area == 0) return;
   const Surroundings around = surroundings_of(image, whole.box, threshold);
   Spot spot = measure_spot(image, whole, threshold, around);
-  const double shift = distance(spot.u_px - ring.u, spot.v_px - ring.v);
-  if (radius > kSmallRing || shift > kSmallRingShift * radius) {
-    spot.u_px = ring.u;
-    spot.v_px = ring.v;
+  spot.u_px = arcs.view.center.x();
+  spot.v_px = arcs.view.center.y();
+  candidates_.push_back({spot, whole.box});
+}
+
+void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& ring) {
+  of_ring_.clear();
+  for (const std::uint32_t light : ring.members()) of_ring_.push_back(lights_[light].blob);
+  const Blob whole = take_blobs(of_ring_, ring.view);
+  if (whole.area == 0) return;
+  const Surroundings around = surroundings_of(image, whole.box, threshold);
+  Spot spot = measure_spot(image, whole, threshold, around);
+  const Eigen::Vector2d& center = ring.view.center;
+  const double radius = ring.view.radius();
+  const double shift = distance(spot.u_px - center.x(), spot.v_px - center.y());
+  const bool is_cut = shift > (ring.is_whole() ? kOtherLight : kSmallRingShift) * radius;
+  const bool is_sharp = radius > kSmallRing && ring.rms < kSharpRing * radius;
+  if (is_sharp || is_cut) {
+    spot.u_px = center.x();
+    spot.v_px = center.y();
   }
   candidates_.push_back({spot, whole.box});
 }

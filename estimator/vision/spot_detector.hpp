@@ -10,6 +10,7 @@
 
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/result.hpp"
+#include "estimator/vision/arc_joiner.hpp"
 #include "estimator/vision/blob_finder.hpp"
 #include "estimator/vision/brightness_sample.hpp"
 #include "estimator/vision/ring_finder.hpp"
@@ -44,7 +45,7 @@ struct Detection {
   std::string_view failure;  ///< why the detector failed on this picture; empty when it did not
 };
 
-/// Finds LED boards: a ring of six LEDs is one spot, be it six blobs or one.
+/// Finds LED boards: a ring of LEDs is one spot, be it a blob for each LED or one for all.
 ///
 /// A picture with something huge and bright in it, as the sun or a window, is searched a second
 /// and at last a third time, for what stands out before that. Each search is bounded, and all
@@ -70,8 +71,10 @@ class SpotDetector {
   [[nodiscard]] bool is_news(const PixelBox& box) const;
   void find_lights(const GrayImage& image, int threshold);
   void split(const GrayImage& image, std::uint32_t index, int threshold);
-  [[nodiscard]] bool is_half(const GrayImage& image, int threshold, const Ring& ring) const;
+  [[nodiscard]] bool is_whole_blob(const Ring& ring) const;
   void take_ring(const GrayImage& image, int threshold, const Ring& ring);
+  void take_arcs(const GrayImage& image, int threshold, const JoinedArcs& arcs);
+  [[nodiscard]] Blob take_blobs(std::span<const std::uint32_t> blobs, const RingView& view);
   void join_fragments();
   [[nodiscard]] std::uint32_t group_of(std::uint32_t place);
   void select(Rejected& rejected);
@@ -80,6 +83,8 @@ class SpotDetector {
   BlobFinder finder_;
   BlobFinder splitter_;
   RingFinder ring_finder_;
+  ArcJoiner arc_joiner_;
+  std::vector<std::uint32_t> of_ring_;  ///< its blobs
   std::vector<Blob> blobs_;
   std::vector<std::uint32_t> open_;  ///< blobs that are not accounted for yet, by first row
   std::vector<std::uint8_t> is_open_;

@@ -1,7 +1,8 @@
-// What detector and tracker make of difficult pictures: vision_study [NAME_PART...]
+// What detector and tracker make of difficult pictures: vision_study [seed=N] [NAME_PART...]
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <random>
 #include <string_view>
 
@@ -114,6 +115,15 @@ void print_rings(const char* name, const RingPictures& rings) {
   std::fflush(stdout);
 }
 
+/// The argument seed=N, 1 without it.
+std::uint64_t seed_of(int argc, char** argv) {
+  constexpr std::string_view kKey = "seed=";
+  for (int i = 1; i < argc; ++i)
+    if (std::string_view(argv[i]).substr(0, kKey.size()) == kKey)
+      return std::strtoull(argv[i] + kKey.size(), nullptr, 10);
+  return 1;
+}
+
 bool is_wanted(std::string_view name, int argc, char** argv) {
   return argc < 2 || std::any_of(argv + 1, argv + argc, [&](const char* part) {
            return name.find(part) != std::string_view::npos;
@@ -146,7 +156,9 @@ int main(int argc, char** argv) {
   }
   std::printf("%-28s %6s  %6s  %5s  %6s  %8s  %6s  %6s  %5s  %5s\n", "scene", "lit", "right%",
               "wrong", "astray", "false/pic", "med px", "p99 px", "never", "ID s");
-  for (const VisionScene& scene : scenes())
+  for (VisionScene& scene : scenes()) {
+    scene.seed = seed_of(argc, argv);
     if (is_wanted(scene.name, argc, argv)) print(scene, score_vision(scene));
+  }
   return 0;
 }

@@ -11,6 +11,7 @@
 #include "estimator/core/so3.hpp"
 #include "estimator/vision/blob_finder.hpp"
 #include "estimator/vision/camera_model.hpp"
+#include "estimator/vision/ring_model.hpp"
 
 namespace crepes::test {
 
@@ -25,8 +26,11 @@ struct Optics {
   double electrons_per_level = 40.0;  ///< sets the shot noise
 };
 
-/// A ring of six LEDs that all look along its axis.
+/// A ring of LEDs that all look along its axis.
 struct RingBoard {
+  int leds = 6;
+  bool is_square = false;  ///< along the edges of a square, of which `radius_m` is the incircle
+  double lens = 0.0;       ///< light in the center, as a part of one LED's
   double radius_m = 0.03;
   double led_spread = 0.05;   ///< one sigma of the LEDs' brightness
   unsigned hidden = 0;        ///< bit k: LED k is hidden
@@ -55,12 +59,16 @@ class RingScene {
   /// The axis of the board is x of `T_C_M`. Returns where the ring's center appears.
   Eigen::Vector2d add_ring(const Pose& T_C_M, const RingBoard& board = {}) {
     std::normal_distribution<double> spread(1.0, board.led_spread);
-    for (unsigned k = 0; k < 6; ++k) {
-      const double gain = spread(random_);
+    const RingShape shape =
+        board.is_square ? RingShape::square(board.leds) : RingShape::round(board.leds);
+    for (std::size_t k = 0; k <= shape.places.size(); ++k) {
+      const bool is_lens = k == shape.places.size();
+      if (is_lens && board.lens <= 0.0) continue;
+      const double gain = is_lens ? board.lens : spread(random_);
       if ((board.hidden >> k & 1U) != 0) continue;
-      const double angle = k * std::numbers::pi / 3.0;
+      const Eigen::Vector2d place = is_lens ? Eigen::Vector2d::Zero() : shape.places[k];
       const Eigen::Vector3d p_C =
-          T_C_M * (board.radius_m * Eigen::Vector3d(0.0, std::cos(angle), std::sin(angle)));
+          T_C_M * (board.radius_m * Eigen::Vector3d(0.0, place.x(), place.y()));
       const double cosine = -(T_C_M.q * Eigen::Vector3d::UnitX()).dot(p_C.normalized());
       const auto uv = camera_.project(p_C);
       if (cosine <= 0.0 || !uv) continue;
