@@ -29,7 +29,10 @@ class RandomGeometry {
   Eigen::Vector3d vector(double sigma = 1.0) { return normal_vector<3>(sigma); }
   Eigen::Vector3d direction() { return vector().normalized(); }
   Eigen::Quaterniond rotation() {
-    return so3_exp(uniform(0.0, std::numbers::pi) * direction()).normalized();
+    // One draw a statement: compilers for amd64 and arm64 evaluate operands in another order.
+    const Eigen::Vector3d axis = direction();
+    const double angle = uniform(0.0, std::numbers::pi);
+    return so3_exp(angle * axis).normalized();
   }
   Pose pose(double sigma_m = 3.0) { return {vector(sigma_m), rotation()}; }
 

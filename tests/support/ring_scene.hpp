@@ -144,8 +144,9 @@ inline CameraModel small_fisheye() {
 /// around a random line across the view.
 inline Pose random_board(std::mt19937& random, double range_m, double tilt_rad) {
   std::uniform_real_distribution<double> part(-1.0, 1.0);
-  const Eigen::Vector3d toward =
-      Eigen::Vector3d(0.15 * part(random), 0.12 * part(random), 1.0).normalized();
+  const double down = 0.12 * part(random);
+  const double right = 0.15 * part(random);
+  const Eigen::Vector3d toward = Eigen::Vector3d(right, down, 1.0).normalized();
   const Eigen::Quaterniond facing = shortest_rotation(Eigen::Vector3d::UnitX(), -toward);
   const double roll = std::numbers::pi * part(random);
   const double around = std::numbers::pi * part(random);
