@@ -164,8 +164,7 @@ void RingFinder::link_neighbors() {
   });
 }
 
-/// Rings that other lights are too near to: from four LEDs a, b, c, d in a row, of which d - a is
-/// parallel to c - b and 1 + 2 cos(360 deg / n) times as long.
+/// Rings that other lights are too near to, from four LEDs in a row, the second of which is b.
 void RingFinder::grow_from(std::uint32_t b) {
   const auto is_usable = [&](std::uint32_t i, std::uint32_t other) {
     return i != other && is_taken_[i] == 0;
@@ -181,22 +180,28 @@ void RingFinder::grow_from(std::uint32_t b) {
         if (!is_usable(d, c) || d == a || d == b) continue;
         const Eigen::Vector2d cd = place_of(lights_[d]) - place_of(lights_[c]);
         if (turn * cross(bc, cd) <= 0.0) continue;
-        const Eigen::Vector2d ad = ab + bc + cd;
-        const double ratio = ad.dot(bc) / bc.squaredNorm();
-        if (std::abs(cross(ad, bc)) > kRowTolerance * bc.squaredNorm()) continue;
-        const std::array row{a, b, c, d};
-        if (!are_alike(row, kRingArea)) continue;
-        for (const RingShape& shape : shapes_) {
-          const double wanted = 1.0 + 2.0 * shape.places[1].x();
-          if (shape.leds() == kMinRingLeds || !shape.is_round() ||
-              std::abs(wanted - ratio) > kRowTolerance)
-            continue;
-          Ring ring{.leds = shape.leds(), .count = row.size()};
-          std::copy(row.begin(), row.end(), ring.lights.begin());
-          if (complete(ring, shape, 0) && ring.count > kFew) candidates_.push_back(ring);
-        }
+        grow_row({a, b, c, d});
       }
     }
+  }
+}
+
+/// Of four LEDs a, b, c, d in a row of n, d - a is parallel to c - b and 1 + 2 cos(360 deg / n)
+/// times as long.
+void RingFinder::grow_row(const std::array<std::uint32_t, 4>& row) {
+  const Eigen::Vector2d ad = place_of(lights_[row[3]]) - place_of(lights_[row[0]]);
+  const Eigen::Vector2d bc = place_of(lights_[row[2]]) - place_of(lights_[row[1]]);
+  if (std::abs(cross(ad, bc)) > kRowTolerance * bc.squaredNorm() || !are_alike(row, kRingArea))
+    return;
+  const double ratio = ad.dot(bc) / bc.squaredNorm();
+  for (const RingShape& shape : shapes_) {
+    const double wanted = 1.0 + 2.0 * shape.places[1].x();
+    if (shape.leds() == kMinRingLeds || !shape.is_round() ||
+        std::abs(wanted - ratio) > kRowTolerance)
+      continue;
+    Ring ring{.leds = shape.leds(), .count = row.size()};
+    std::copy(row.begin(), row.end(), ring.lights.begin());
+    if (complete(ring, shape, 0) && ring.count > kFew) candidates_.push_back(ring);
   }
 }
 
@@ -245,8 +250,8 @@ void RingFinder::judge_whole(std::span<const std::uint32_t> group) {
   for (const std::uint32_t i : group) middle += place_of(lights_[i]);
   middle /= static_cast<double>(group.size());
   const auto off = [&](std::uint32_t i) { return (place_of(lights_[i]) - middle).squaredNorm(); };
-  const auto lens =
-      std::min_element(members.begin(), members.begin() + static_cast<std::ptrdiff_t>(group.size()),
+  auto* const lens =
+      std::min_element(members.data(), members.data() + group.size(),
                        [&](std::uint32_t a, std::uint32_t b) { return off(a) < off(b); });
   std::swap(*lens, members[group.size() - 1]);
   const auto around = std::span(members).first(group.size() - 1);

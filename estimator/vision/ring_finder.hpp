@@ -67,6 +67,7 @@ class RingFinder {
 
   void link_neighbors();
   void grow_from(std::uint32_t b);
+  void grow_row(const std::array<std::uint32_t, 4>& row);
   template <class Judge>
   void join_all(const Judge& judge);
   void judge_whole(std::span<const std::uint32_t> group);
