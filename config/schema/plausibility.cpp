@@ -11,9 +11,9 @@ namespace {
 
 using Doubts = std::vector<RuleFault>;
 
-constexpr double kLongArm_m = 1.0;  // of a lever arm on a robot
-constexpr double kFewFrames = 2.0;  // of a slot
-constexpr double kMillisecond_s = 1e-3;
+constexpr double kLongArm = 1.0;       // m; of a lever arm on a robot
+constexpr double kFewFrames = 2.0;     // of a slot
+constexpr double kMillisecond = 1e-3;  // s
 
 void doubt_members(const SwarmConfig& swarm, Doubts& doubts) {
   for (std::size_t i = 0; i < swarm.members.size(); ++i) {
@@ -22,7 +22,7 @@ void doubt_members(const SwarmConfig& swarm, Doubts& doubts) {
       const std::string path = fmt::format("swarm.members[{}].{}", i, key);
       if (arm.isZero(0.0))
         doubts.push_back({path, fmt::format("is 0: measure where the {} is", what)});
-      if (arm.norm() > kLongArm_m)
+      if (arm.norm() > kLongArm)
         doubts.push_back({path, fmt::format("is {:.2f} m long: the unit is metres", arm.norm())});
     };
     doubt_arm("p_body_led", member.p_body_led, "center of the LED ring");
@@ -36,18 +36,21 @@ void doubt_cameras(const Config& config, Doubts& doubts) {
     const CameraConfig& camera = config.cameras[i];
     const std::string key = fmt::format("cameras[{}]", i);
     const Pose& T_C_B = camera.calibration.T_cam_imu;
-    if (T_C_B.q.isApprox(Eigen::Quaterniond::Identity()) && T_C_B.p.isZero(0.0))
+    if (T_C_B.q.isApprox(Eigen::Quaterniond::Identity()) && T_C_B.p.isZero(0.0)) {
       doubts.push_back({key + ".T_cam_imu",
                         "is the identity: the camera would look along the body's z, upwards"});
-    if (T_C_B.p.norm() > kLongArm_m)
+    }
+    if (T_C_B.p.norm() > kLongArm) {
       doubts.push_back({key + ".T_cam_imu",
                         fmt::format("moves by {:.2f} m: the unit is metres", T_C_B.p.norm())});
-    const double frames = camera.calibration.rate_hz * config.swarm.slot_ms * kMillisecond_s;
-    if (frames < kFewFrames)
+    }
+    const double frames = camera.calibration.rate_hz * config.swarm.slot_ms * kMillisecond;
+    if (frames < kFewFrames) {
       doubts.push_back({key + ".rate_hz",
                         fmt::format("gives {:.1f} frames a slot (swarm.slot_ms); two or more can "
                                     "be read reliably",
                                     frames)});
+    }
     if (camera.device.driver == CameraDriver::kFolder &&
         !std::filesystem::is_directory(camera.device.folder, status))
       doubts.push_back({key + ".folder", "there is no such folder now"});

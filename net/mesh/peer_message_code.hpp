@@ -279,9 +279,10 @@ void code_bearings(Stream& stream, std::vector<CodedBearing>& bearings, std::siz
       stream.bits(bearing.sigma, kBearingSigmaBits);
       continue;
     }
-    for (std::size_t c = 0; c < 2; ++c)
+    for (std::size_t c = 0; c < 2; ++c) {
       stream.delta(bearing.u.at(c), extrapolated(bearings, i, c), kStep, up_to(kDirectionUnit),
                    PeerMessageError::kNotUnit);
+    }
     stream.delta(bearing.sigma, bearings[i - 1].sigma, 0, {0, kBearingSigma.steps},
                  PeerMessageError::kOutOfRange);
   }
@@ -313,9 +314,10 @@ void code_sources(Stream& stream, CodedBody& body) {
   constexpr unsigned kPlace = 11;
   constexpr unsigned kNextId = 2;
   stream.size(body.cameras, 0);
-  for (std::array<std::int64_t, 3>& camera : body.cameras)
+  for (std::array<std::int64_t, 3>& camera : body.cameras) {
     for (std::int64_t& coordinate : camera)
       stream.delta(coordinate, 0, kPlace, up_to(kMaxCoordinateCode), PeerMessageError::kOutOfRange);
+  }
   stream.size(body.sources, 3);
   std::uint64_t last = 0;
   for (CodedSource& source : body.sources) {

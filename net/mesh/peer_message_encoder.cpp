@@ -69,10 +69,11 @@ std::size_t bits_of(const std::vector<CodedImuSample>& samples, std::size_t firs
                     const Prediction& prediction) {
   std::size_t bits = 0;
   for (std::size_t i = 1; i < samples.size(); ++i) {
-    for (std::size_t axis = first_axis; axis < first_axis + 3; ++axis)
+    for (std::size_t axis = first_axis; axis < first_axis + 3; ++axis) {
       bits += BitWriter::width_of(
           samples[i].values.at(axis) - predicted_value(samples, i, axis, prediction.is_linear),
           prediction.order);
+    }
   }
   return bits;
 }
@@ -114,9 +115,10 @@ CodedEstimate coded(const NeighborEstimate& estimate, std::int64_t age) {
   code.largest = static_cast<unsigned>(largest);
   std::size_t next = 0;
   for (Eigen::Index i = 0; i < 4; ++i) {
-    if (i != largest)
+    if (i != largest) {
       code.q.at(next++) =
           rounded(q[i], 1.0 / (std::numbers::sqrt2 * static_cast<double>(kQuaternionUnit)));
+    }
   }
   for (int i = 0; i < 3; ++i) {
     code.p.at(static_cast<std::size_t>(i)) = rounded(estimate.T_B_N.pose.p[i], kPlaceStep);

@@ -28,14 +28,14 @@ std::size_t datagram_bytes(const SendSettings& settings, std::size_t neighbors) 
 
 double airtime(double datagrams_per_s, double bytes_per_datagram, double rate_mbps) {
   constexpr double kHeaders = 8 + 20 + 14 + 14 + 8 + 24 + 4;  // UDP IP Ethernet batman LLC MAC FCS
-  constexpr double kPreamble_us = 20.0;
-  constexpr double kSymbol_us = 4.0;
+  constexpr double kPreamble = 20.0;                          // us
+  constexpr double kSymbol = 4.0;                             // us
   constexpr double kServiceAndTailBits = 16 + 6;
-  constexpr double kDifsAndMeanBackoff_us = 34.0 + 7.5 * 9.0;
+  constexpr double kDifsAndMeanBackoff = 34.0 + 7.5 * 9.0;  // us
   constexpr double kRepeats = 3.0;
   const double bits = 8 * (kHeaders + bytes_per_datagram) + kServiceAndTailBits;
-  const double symbols = std::ceil(bits / (rate_mbps * kSymbol_us));
-  const double frame_us = kDifsAndMeanBackoff_us + kPreamble_us + symbols * kSymbol_us;
+  const double symbols = std::ceil(bits / (rate_mbps * kSymbol));
+  const double frame_us = kDifsAndMeanBackoff + kPreamble + symbols * kSymbol;
   return 1e-6 * frame_us * kRepeats * datagrams_per_s;
 }
 
