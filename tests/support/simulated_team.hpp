@@ -20,8 +20,9 @@ namespace crepes::test {
 inline constexpr RobotId kSelf{1};
 inline constexpr Duration kInterval = std::chrono::milliseconds{100};
 inline constexpr double kIntervalSeconds = 0.1;
-inline constexpr double kBearingSigma = 5e-4;  // rad
-inline constexpr double kRangeSigma = 0.05;    // m
+inline constexpr double kBearingSigma =
+    5e-4;  // rad; of all that a camera sees of a robot in an interval
+inline constexpr double kRangeSigma = 0.05;  // m
 
 inline TeamSettings team_settings() {
   return {.noise = {.gyro_density = 1e-3, .accel_density = 1e-2},
