@@ -20,9 +20,9 @@ namespace crepes::test {
 inline constexpr RobotId kSelf{1};
 inline constexpr Duration kInterval = std::chrono::milliseconds{100};
 inline constexpr double kIntervalSeconds = 0.1;
-inline constexpr double kBearingSigma =
-    5e-4;  // rad; of all that a camera sees of a robot in an interval
-inline constexpr double kRangeSigma = 0.05;  // m
+// Of the mean of an interval's bearings: the errors of lens and spot last longer.
+inline constexpr double kBearingSigma = 5e-4;  // rad
+inline constexpr double kRangeSigma = 0.05;    // m
 
 inline TeamSettings team_settings() {
   return {.noise = {.gyro_density = 1e-3, .accel_density = 1e-2},
@@ -71,7 +71,6 @@ class SimulatedTeam {
     for (const auto& [i, from] : bodies_) {
       for (const auto& [j, to] : bodies_) {
         if (i == j) continue;
-        // The errors of lens and spot last longer than an interval.
         const Eigen::Vector3d error = random_.vector(kBearingSigma);
         for (int k = 1; k <= 4 && sees(i, j); ++k)
           interval.bearings.push_back({i, bearing(i, j, 0.024 * k, error, paths)});
