@@ -1,14 +1,11 @@
 /// The team as one estimate: every robot's motion and calibration in one Kalman filter.
 #pragma once
 
-#include <Eigen/Core>
-#include <map>
-#include <utility>
 #include <vector>
 
-#include "estimator/team/team_interval.hpp"
-#include "estimator/team/team_measurement.hpp"
-#include "estimator/team/team_state.hpp"
+#include "estimator/team/team_belief.hpp"
+#include "estimator/team/team_readings.hpp"
+#include "estimator/team/team_trust.hpp"
 
 namespace crepes {
 
@@ -35,68 +32,21 @@ class TeamFilter {
   [[nodiscard]] TeamSolution step(const TeamInterval& interval);
 
  private:
-  using Pair = std::pair<RobotId, RobotId>;
-  using Trajectories = std::map<RobotId, RobotTrajectory>;
-  struct Sight;
-  struct Ranging;
-  struct Readings;
-  enum class Stage { kTrusted, kProbation };
+  using Stage = TeamReadings::Stage;
 
-  void reset(const TeamInterval& interval);
-  using Witnesses = std::map<RobotId, Agreement>;
-  [[nodiscard]] Witnesses witnesses(bool with_turned) const;
-  [[nodiscard]] bool is_turned(RobotId observer, const TeamCamera& camera) const;
   void remove_members(const TeamInterval& interval);
-  void remove(RobotId id);
-  [[nodiscard]] int recent_losses(RobotId robot) const;
-  void trust_members();
-  void judge_cameras(const TeamInterval& interval);
-  [[nodiscard]] bool is_realigned(RobotId robot) const;
-  void add_calibrations(const TeamInterval& interval);
-  [[nodiscard]] Trajectories trajectories(const TeamInterval& interval) const;
-  [[nodiscard]] Readings readings(const TeamInterval& interval, Stage stage) const;
-  [[nodiscard]] bool takes_part(RobotId observer, RobotId neighbor, Stage stage) const;
-  [[nodiscard]] TeamPair pair(const TeamInterval& interval, const Trajectories& paths,
-                              RobotId observer, RobotId neighbor) const;
-  void gate(const TeamInterval& interval, const Trajectories& paths, Readings& readings);
-  [[nodiscard]] std::vector<TeamRow> rows(const TeamInterval& interval, const Trajectories& paths,
-                                          const Readings& readings) const;
-  [[nodiscard]] Eigen::Matrix3d position_covariance(RobotId from, RobotId to) const;
+  void append_cameras(const TeamInterval& interval);
   /// False if the covariance has become singular.
   [[nodiscard]] bool correct(const TeamInterval& interval);
-  [[nodiscard]] bool correct(const TeamInterval& interval, Stage stage, Readings readings);
+  [[nodiscard]] bool correct(const TeamInterval& interval, Stage stage, TeamReadings readings);
   [[nodiscard]] std::vector<bool> corrected_states(Stage stage) const;
-  void inject(const Eigen::VectorXd& dx);
-  void advance(const TeamInterval& interval);
   void add_members(const TeamInterval& interval, TeamSolution& solution);
   void add_member(const TeamInterval& interval, RobotId id, const GaussianPose& T_S_N,
                   const Eigen::Vector3d& v_S_N);
-  [[nodiscard]] GaussianPose known_pose(RobotId id) const;
   void report(const TeamInterval& interval, TeamSolution& solution) const;
-  void report_cameras(const TeamInterval& interval, RobotId id, TeamSolution& solution) const;
-  void report_ranges(RobotId id, TeamSolution& solution) const;
 
-  /// Appends independent states of this sigma. Returns their index.
-  int append(int count, double sigma);
-  /// The states of a robot's IMU and UWB module.
-  int append_calibration(const Priors& priors);
-  void erase(int index, int count);
-
-  RobotId self_{};
-  Timestamp stamp_{};
-  std::map<RobotId, TeamRobot> robots_;  ///< with this robot
-  std::map<Pair, TeamRangeBias> ranges_;
-  struct Losses {
-    Timestamp last{};
-    int count = 0;
-  };
-  std::map<RobotId, Losses> losses_;  ///< of robots that were contradicted
-  struct Realignment {
-    Timestamp since{};
-    bool is_refused = false;
-  };
-  std::map<RobotId, Realignment> realigned_;  ///< robots whose cameras are turned
-  Eigen::MatrixXd P_;
+  TeamBelief belief_;
+  TeamTrust trust_;
 };
 
 }  // namespace crepes

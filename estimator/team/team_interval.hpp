@@ -1,6 +1,7 @@
 /// What the team's filter receives: everything that anybody measured within one interval.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "estimator/core/imu_history.hpp"
@@ -55,6 +56,11 @@ struct TeamInterval {
   std::vector<RelativePoseEdge> edges;
   TeamSettings settings;
 
+  /// Null if its IMU does not cover the interval.
+  [[nodiscard]] const TeamMember* member(RobotId robot) const {
+    const auto found = std::ranges::find(members, robot, &TeamMember::robot);
+    return found == members.end() ? nullptr : &*found;
+  }
   [[nodiscard]] std::size_t step_count() const {
     return static_cast<std::size_t>((to - from + kStep - Duration{1}) / kStep);
   }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
@@ -11,6 +12,13 @@
 #include "estimator/team/robot_trajectory.hpp"
 
 namespace crepes {
+
+/// The lower id first.
+using RobotPair = std::pair<RobotId, RobotId>;
+
+[[nodiscard]] inline RobotPair ordered(RobotId a, RobotId b) {
+  return a < b ? RobotPair(a, b) : RobotPair(b, a);
+}
 
 /// How many readings agreed with the filter of late, and how many its gate refused.
 struct Agreement {

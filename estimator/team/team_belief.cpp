@@ -1,0 +1,264 @@
+#include "estimator/team/team_belief.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <utility>
+
+#include "estimator/core/constants.hpp"
+#include "estimator/core/so3.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr int kMotion = FreeMotionAt::kMotion;
+constexpr int kBias = FreeMotionAt::kBias;
+constexpr double kLeastVariance = 1e-12;  // of a prior: one known exactly stays regular
+// A pair's range bias is mostly its modules' antenna delays, the same toward everybody: so much of
+// its variance. The rest is the pair's own, and drifts.
+constexpr double kShareOfModules = 0.8;
+// An accelerometer's scale errors act as a bias that changes while the robot turns, and keeps its
+// direction for so long.
+constexpr double kTurnMemory = 1.0;  // s
+
+/// Mean over an interval [rad/s].
+double turn_rate(const TeamMember& member) {
+  double sum = 0.0;
+  for (const ImuMean& mean : member.imu) sum += mean.gyro_radps.norm();
+  return sum / static_cast<double>(std::max<std::size_t>(1, member.imu.size()));
+}
+
+/// How a robot's errors at the next keyframe follow from those at the last one.
+struct Moved {
+  int index = 0;
+  int bias_index = 0;
+  Eigen::Matrix<double, kMotion, kMotion> by_motion{};
+  Eigen::Matrix<double, kMotion, kBias> by_bias{};
+  Eigen::Matrix<double, kMotion, kBias> by_self_bias{};
+  Eigen::Matrix<double, kMotion, kMotion> by_self{};  ///< by this robot's motion at the end
+  Eigen::Matrix<double, kMotion, kMotion> noise{};
+};
+
+/// With S this robot at the end of the interval, the new frame's motions are
+///   p' = R_S^T (p - p_S),  v' = R_S^T (v - v_S),  R' = R_S^T R,
+/// and their errors  dp' = R_S^T (dp - dp_S) + [p']x dtheta_S,  dv' likewise,
+/// dtheta' = dtheta - R'^T dtheta_S. `next` becomes the new motion.
+Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, FreeMotion& next) {
+  const Eigen::Matrix3d R_S_F = self.motion.R().transpose();
+  next.p_F = R_S_F * (end.motion.p_F - self.motion.p_F);
+  next.v_F = R_S_F * (end.motion.v_F - self.motion.v_F);
+  next.q_F_B = (self.motion.q_F_B.conjugate() * end.motion.q_F_B).normalized();
+  Moved moved;
+  Eigen::Matrix<double, kMotion, kMotion> turn =
+      Eigen::Matrix<double, kMotion, kMotion>::Identity();
+  turn.block<3, 3>(0, 0) = R_S_F;
+  turn.block<3, 3>(3, 3) = R_S_F;
+  moved.by_self.setZero();
+  moved.by_self.block<3, 3>(0, 0) = -R_S_F;
+  moved.by_self.block<3, 3>(3, 3) = -R_S_F;
+  moved.by_self.block<3, 3>(0, 6) = hat(next.p_F);
+  moved.by_self.block<3, 3>(3, 6) = hat(next.v_F);
+  moved.by_self.block<3, 3>(6, 6) = -next.R().transpose();
+  moved.by_motion = turn.lazyProduct(end.by_start.leftCols<kMotion>());
+  moved.by_bias = turn.lazyProduct(end.by_start.rightCols<kBias>());
+  moved.by_self_bias = moved.by_self.lazyProduct(self.by_start.rightCols<kBias>());
+  const Eigen::Matrix<double, kMotion, kMotion> turned = turn.lazyProduct(end.noise);
+  moved.noise = turned.lazyProduct(turn.transpose());
+  return moved;
+}
+
+/// The covariance at the next keyframe. `self_noise` is what this robot's IMU has added.
+void carry(const std::vector<Moved>& all, int self_bias,
+           const Eigen::Matrix<double, kMotion, kMotion>& self_noise, Eigen::MatrixXd& P) {
+  for (const Moved& m : all) {
+    P.middleRows<kMotion>(m.index) = (m.by_motion * P.middleRows<kMotion>(m.index) +
+                                      m.by_bias * P.middleRows<kBias>(m.bias_index) +
+                                      m.by_self_bias * P.middleRows<kBias>(self_bias))
+                                         .eval();
+  }
+  for (const Moved& m : all) {
+    P.middleCols<kMotion>(m.index) = (P.middleCols<kMotion>(m.index) * m.by_motion.transpose() +
+                                      P.middleCols<kBias>(m.bias_index) * m.by_bias.transpose() +
+                                      P.middleCols<kBias>(self_bias) * m.by_self_bias.transpose())
+                                         .eval();
+  }
+  for (const Moved& a : all) {
+    P.block<kMotion, kMotion>(a.index, a.index) += a.noise;
+    const Eigen::Matrix<double, kMotion, kMotion> of_self = a.by_self.lazyProduct(self_noise);
+    for (const Moved& b : all)
+      P.block<kMotion, kMotion>(a.index, b.index) += of_self.lazyProduct(b.by_self.transpose());
+  }
+}
+
+}  // namespace
+
+double accel_bias_variance(const Priors& priors) {
+  return priors.accel_bias_mps2 * priors.accel_bias_mps2 +
+         std::pow(priors.accel_scale * kGravityMps2, 2);
+}
+
+TeamBelief TeamBelief::beginning(const TeamInterval& interval) {
+  TeamBelief belief;
+  belief.self = interval.self;
+  belief.stamp = interval.from;
+  TeamRobot& self = belief.robots[interval.self];
+  self.bias_index = belief.append_calibration(interval.settings.priors);
+  self.is_trusted = true;
+  return belief;
+}
+
+int TeamBelief::append(int count, double sigma) {
+  const Eigen::Index n = P.rows();
+  Eigen::MatrixXd larger = Eigen::MatrixXd::Zero(n + count, n + count);
+  larger.topLeftCorner(n, n) = P;
+  larger.diagonal().tail(count).setConstant(std::max(sigma * sigma, kLeastVariance));
+  P = std::move(larger);
+  return static_cast<int>(n);
+}
+
+int TeamBelief::append_calibration(const Priors& priors) {
+  const int index = append(kBias, priors.gyro_scale);
+  const double gyro = priors.gyro_bias_radps * priors.gyro_bias_radps;
+  P.diagonal().segment<3>(index).setConstant(std::max(gyro, kLeastVariance));
+  P.diagonal().segment<3>(index + 3).setConstant(
+      std::max(accel_bias_variance(priors), kLeastVariance));
+  append(1, std::sqrt(0.5 * kShareOfModules) * priors.range_bias_m);
+  return index;
+}
+
+void TeamBelief::erase(int index, int count) {
+  const Eigen::Index rest = P.rows() - index - count;
+  Eigen::MatrixXd smaller(P.rows() - count, P.rows() - count);
+  smaller.topLeftCorner(index, index) = P.topLeftCorner(index, index);
+  smaller.topRightCorner(index, rest) = P.topRightCorner(index, rest);
+  smaller.bottomLeftCorner(rest, index) = P.bottomLeftCorner(rest, index);
+  smaller.bottomRightCorner(rest, rest) = P.bottomRightCorner(rest, rest);
+  P = std::move(smaller);
+  const auto shift = [&](int& i) { i -= i > index ? count : 0; };
+  for (auto& [id, robot] : robots) {
+    shift(robot.motion_index);
+    shift(robot.bias_index);
+    for (TeamCamera& camera : robot.cameras) shift(camera.index);
+  }
+  for (auto& [pair, range] : ranges) shift(range.index);
+}
+
+void TeamBelief::remove(RobotId id) {
+  const TeamRobot robot = robots.at(id);
+  std::vector<std::pair<int, int>> blocks{{robot.motion_index, kMotion},
+                                          {robot.bias_index, TeamRobot::kCalibration}};
+  for (const TeamCamera& camera : robot.cameras) blocks.emplace_back(camera.index, 3);
+  for (auto range = ranges.begin(); range != ranges.end();) {
+    const bool concerned = range->first.first == id || range->first.second == id;
+    if (concerned) blocks.emplace_back(range->second.index, 1);
+    range = concerned ? ranges.erase(range) : std::next(range);
+  }
+  robots.erase(id);
+  std::ranges::sort(blocks, std::greater{});
+  for (const auto& [index, count] : blocks) erase(index, count);
+  for (auto& [other, observer] : robots)
+    for (TeamCamera& camera : observer.cameras) camera.agreement.erase(id);
+}
+
+void TeamBelief::append_range_biases(const TeamInterval& interval) {
+  const double sigma = std::sqrt(1.0 - kShareOfModules) * interval.settings.priors.range_bias_m;
+  for (const TeamRange& reading : interval.ranges) {
+    if (!robots.contains(reading.observer) || !robots.contains(reading.neighbor)) continue;
+    const RobotPair pair = ordered(reading.observer, reading.neighbor);
+    if (!ranges.contains(pair)) ranges[pair] = {.index = append(1, sigma)};
+  }
+}
+
+TeamTrajectories TeamBelief::trajectories(const TeamInterval& interval) const {
+  TeamTrajectories paths;
+  const double duration_s = to_seconds(interval.to - interval.from);
+  for (const TeamMember& member : interval.members) {
+    const auto robot = robots.find(member.robot);
+    if (robot == robots.end()) continue;
+    paths.try_emplace(member.robot, robot->second.motion, robot->second.bias, member.imu,
+                      duration_s, interval.settings.noise);
+  }
+  return paths;
+}
+
+GaussianPose TeamBelief::pose(RobotId id) const {
+  const TeamRobot& robot = robots.at(id);
+  GaussianPose result{{robot.motion.p_F, robot.motion.q_F_B}};
+  if (robot.motion_index < 0) return result;
+  // The covariance of [p, v, theta] without v.
+  const std::array<Eigen::Index, 2> parts{robot.motion_index, robot.motion_index + 6};
+  for (Eigen::Index a = 0; a < 2; ++a) {
+    for (Eigen::Index b = 0; b < 2; ++b) {
+      result.covariance.block<3, 3>(3 * a, 3 * b) =
+          P.block<3, 3>(parts.at(std::size_t(a)), parts.at(std::size_t(b)));
+    }
+  }
+  return result;
+}
+
+Eigen::Matrix3d TeamBelief::position_covariance(RobotId from, RobotId to) const {
+  const int i = robots.at(from).motion_index;
+  const int j = robots.at(to).motion_index;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  if (i >= 0) covariance += P.block<3, 3>(i, i);
+  if (j >= 0) covariance += P.block<3, 3>(j, j);
+  if (i >= 0 && j >= 0) covariance -= P.block<3, 3>(i, j) + P.block<3, 3>(j, i);
+  return covariance;
+}
+
+void TeamBelief::inject(const Eigen::VectorXd& dx) {
+  for (auto& [id, robot] : robots) {
+    if (robot.motion_index >= 0) {
+      const auto step = dx.segment<kMotion>(robot.motion_index);
+      robot.motion.p_F += step.head<3>();
+      robot.motion.v_F += step.segment<3>(3);
+      robot.motion.q_F_B = (robot.motion.q_F_B * so3_exp(step.tail<3>())).normalized();
+    }
+    robot.bias.gyro_radps += dx.segment<3>(robot.bias_index);
+    robot.bias.accel_mps2 += dx.segment<3>(robot.bias_index + 3);
+    robot.bias.gyro_scale += dx.segment<9>(robot.bias_index + 6).reshaped<Eigen::ColMajor>(3, 3);
+    robot.antenna_delay_m += dx(robot.delay_index());
+    for (TeamCamera& camera : robot.cameras) camera.misalignment += dx.segment<3>(camera.index);
+  }
+  for (auto& [pair, range] : ranges) range.bias_m += dx(range.index);
+}
+
+void TeamBelief::advance(const TeamInterval& interval) {
+  const TeamTrajectories paths = trajectories(interval);
+  const FreeMotionAt& end_of_self = paths.at(self).end();
+  std::vector<Moved> all;
+  for (auto& [id, robot] : robots) {
+    if (robot.motion_index < 0) continue;
+    all.push_back(moved(paths.at(id).end(), end_of_self, robot.motion));
+    all.back().index = robot.motion_index;
+    all.back().bias_index = robot.bias_index;
+  }
+  carry(all, robots.at(self).bias_index, end_of_self.noise, P);
+  add_drift(interval);
+  P = (0.5 * (P + P.transpose())).eval();
+  stamp = interval.to;
+}
+
+/// What changes by itself: the IMUs' biases, and the pairs' range biases, which return to zero.
+void TeamBelief::add_drift(const TeamInterval& interval) {
+  const ProcessNoise& noise = interval.settings.noise;
+  const double dt = to_seconds(interval.to - interval.from);
+  for (auto& [id, robot] : robots) {
+    P.diagonal().segment<3>(robot.bias_index).array() += noise.gyro_walk * noise.gyro_walk * dt;
+    const double turning =
+        interval.settings.priors.accel_scale * kGravityMps2 * turn_rate(*interval.member(id));
+    P.diagonal().segment<3>(robot.bias_index + 3).array() +=
+        noise.accel_walk * noise.accel_walk * dt + turning * turning * kTurnMemory * dt;
+  }
+  const double kept_bias = std::exp(-noise.range_bias_return / (1.0 - kShareOfModules) * dt);
+  for (auto& [pair, range] : ranges) {
+    range.bias_m *= kept_bias;
+    P.row(range.index) *= kept_bias;
+    P.col(range.index) *= kept_bias;
+    P(range.index, range.index) += noise.range_bias_walk * noise.range_bias_walk * dt;
+  }
+}
+
+}  // namespace crepes

@@ -1,0 +1,55 @@
+/// What the team's filter knows: robots, cameras and pairs with their joint covariance.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+
+#include "estimator/core/pose.hpp"
+#include "estimator/team/team_interval.hpp"
+#include "estimator/team/team_state.hpp"
+
+namespace crepes {
+
+/// Each robot's motion over an interval.
+using TeamTrajectories = std::map<RobotId, RobotTrajectory>;
+
+/// The frame falls freely with this robot at `stamp`, the keyframe. So this robot's motion there is
+/// known by definition, and gravity and the team's common motion are no states.
+struct TeamBelief {
+  RobotId self{};
+  Timestamp stamp{};
+  std::map<RobotId, TeamRobot> robots;  ///< with this robot
+  std::map<RobotPair, TeamRangeBias> ranges;
+  Eigen::MatrixXd P;
+
+  /// This robot alone, calibrated as well as the priors say.
+  [[nodiscard]] static TeamBelief beginning(const TeamInterval& interval);
+
+  /// Appends independent states of this sigma. Returns their index.
+  int append(int count, double sigma);
+  /// The states of a robot's IMU and UWB module.
+  int append_calibration(const Priors& priors);
+  /// For pairs that measure ranges for the first time.
+  void append_range_biases(const TeamInterval& interval);
+  void remove(RobotId id);
+
+  [[nodiscard]] TeamTrajectories trajectories(const TeamInterval& interval) const;
+  /// T_S_N with S this robot.
+  [[nodiscard]] GaussianPose pose(RobotId id) const;
+  /// Of the position of `to` relative to `from`.
+  [[nodiscard]] Eigen::Matrix3d position_covariance(RobotId from, RobotId to) const;
+
+  /// Adds an error to the states.
+  void inject(const Eigen::VectorXd& dx);
+  /// Moves the keyframe to the end of the interval.
+  void advance(const TeamInterval& interval);
+
+ private:
+  void erase(int index, int count);
+  void add_drift(const TeamInterval& interval);
+};
+
+/// Near hovering, an accelerometer's scale and axis errors act as a bias that gravity causes.
+[[nodiscard]] double accel_bias_variance(const Priors& priors);
+
+}  // namespace crepes

@@ -1,0 +1,223 @@
+#include "estimator/team/team_readings.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+namespace crepes {
+namespace {
+
+// Ranges about a robot that nobody sees would make its direction appear known, little by little.
+constexpr Duration kDark = std::chrono::seconds{1};
+
+bool is_inside(const TeamInterval& interval, Timestamp stamp) {
+  return stamp > interval.from && stamp <= interval.to;
+}
+
+bool takes_part(const TeamBelief& belief, RobotId observer, RobotId neighbor,
+                TeamReadings::Stage stage) {
+  const auto i = belief.robots.find(observer);
+  const auto j = belief.robots.find(neighbor);
+  if (i == belief.robots.end() || j == belief.robots.end()) return false;
+  return stage == TeamReadings::Stage::kTrusted ? i->second.is_trusted && j->second.is_trusted
+                                                : i->second.is_trusted != j->second.is_trusted;
+}
+
+std::vector<Sight> sights_of(const TeamInterval& interval, const TeamBelief& belief,
+                             TeamReadings::Stage stage) {
+  std::map<std::tuple<RobotId, RobotId, std::size_t>, Sight> sights;
+  for (const TeamBearing& reading : interval.bearings) {
+    const Bearing& z = reading.bearing;
+    if (!is_inside(interval, z.stamp) || !takes_part(belief, reading.observer, z.neighbor, stage))
+      continue;
+    const auto& cameras = belief.robots.at(reading.observer).cameras;
+    const auto camera = std::ranges::find(cameras, z.p_B_C, &TeamCamera::p_B_C);
+    if (camera == cameras.end() || camera->is_refused) continue;
+    const auto index = static_cast<std::size_t>(camera - cameras.begin());
+    const std::tuple key(reading.observer, z.neighbor, index);
+    sights.try_emplace(key, Sight{reading.observer, z.neighbor, index})
+        .first->second.bearings.push_back(&z);
+  }
+  std::vector<Sight> all;
+  for (auto& [key, sight] : sights) all.push_back(std::move(sight));
+  return all;
+}
+
+std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief& belief,
+                                 TeamReadings::Stage stage) {
+  const auto is_dark = [&](RobotId id) {
+    return interval.to - belief.robots.at(id).last_sighting > kDark;
+  };
+  std::map<std::pair<RobotId, RobotId>, Ranging> rangings;
+  for (const TeamRange& reading : interval.ranges) {
+    const auto [observer, neighbor] = std::pair(reading.observer, reading.neighbor);
+    if (!is_inside(interval, reading.stamp) || !takes_part(belief, observer, neighbor, stage) ||
+        is_dark(observer) || is_dark(neighbor))
+      continue;
+    rangings.try_emplace({observer, neighbor}, Ranging{observer, neighbor})
+        .first->second.ranges.push_back(&reading);
+  }
+  std::vector<Ranging> all;
+  for (auto& [key, ranging] : rangings) all.push_back(std::move(ranging));
+  return all;
+}
+
+/// What the robots of a reading are, at the time of an interval.
+struct Scene {
+  const TeamInterval& interval;
+  const TeamTrajectories& paths;
+  const TeamBelief& belief;
+
+  [[nodiscard]] TeamPair pair(RobotId observer, RobotId neighbor) const {
+    return {belief.robots.at(observer), belief.robots.at(neighbor), *interval.member(observer),
+            *interval.member(neighbor), paths.at(observer),         paths.at(neighbor)};
+  }
+  [[nodiscard]] double time_s(Timestamp stamp) const { return to_seconds(stamp - interval.from); }
+};
+
+void gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
+  const TeamPair pair = scene.pair(sight.observer, sight.neighbor);
+  const auto model = SightModel::at(pair, camera, sight.time_s(scene.interval), sight.sigma_rad());
+  if (!model) {
+    sight.bearings.clear();
+    return;
+  }
+  const Eigen::LLT<Eigen::Matrix2d> S(model->row().covariance(scene.belief.P));
+  Agreement& agreement = camera.agreement[sight.neighbor];
+  std::erase_if(sight.bearings, [&](const Bearing* z) {
+    const auto residual = model->residual(pair, camera, z->u_B, scene.time_s(z->stamp));
+    const bool fits =
+        residual && residual->dot(S.solve(*residual)) <= scene.interval.settings.bearing_gate;
+    agreement.add(fits);
+    return !fits;
+  });
+}
+
+void gate(const Scene& scene, TeamRangeBias& bias, Ranging& ranging) {
+  const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
+  const Eigen::Matrix3d covariance =
+      scene.belief.position_covariance(ranging.observer, ranging.neighbor);
+  std::erase_if(ranging.ranges, [&](const TeamRange* z) {
+    const auto row = range_row(pair, bias, z->reading, scene.time_s(z->stamp), covariance);
+    if (!row) return true;
+    const double residual = row->residual.x();
+    const double variance = row->covariance(scene.belief.P)(0, 0);
+    const bool fits = residual * residual <= scene.interval.settings.range_gate * variance;
+    bias.add(ranging.observer, fits, residual);
+    return !fits;
+  });
+}
+
+std::optional<TeamRow> mean_of(const Scene& scene, const Sight& sight) {
+  const TeamPair pair = scene.pair(sight.observer, sight.neighbor);
+  const TeamCamera& camera = pair.observer.cameras[sight.camera];
+  const auto model = SightModel::at(pair, camera, sight.time_s(scene.interval), sight.sigma_rad());
+  if (!model) return std::nullopt;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double count = 0.0;
+  for (const Bearing* z : sight.bearings) {
+    const auto residual = model->residual(pair, camera, z->u_B, scene.time_s(z->stamp));
+    if (!residual) continue;
+    sum += *residual;
+    count += 1.0;
+  }
+  if (count == 0.0) return std::nullopt;
+  TeamRow row = model->row();
+  row.residual = sum / count;
+  return row;
+}
+
+/// The mean of what a pair measured may be false, although its gate accepts it: then nothing in it
+/// is information. Mean and variance become those of the mixture (probabilistic data association,
+/// Bar-Shalom and Tse 1975). `S` is the innovation's variance. False if it is more likely false.
+bool associate(double S, TeamRow& row) {
+  constexpr double kFalseRanges = 0.05;  // 1/m, as for the pairs' filters
+  const double residual = row.residual.x();
+  const double nis = residual * residual / S;
+  const double density = std::exp(-0.5 * nis) / std::sqrt(2.0 * std::numbers::pi * S);
+  const double is_true = density / (density + kFalseRanges);
+  const double weight = is_true * (1.0 - (1.0 - is_true) * nis);
+  if (is_true < 0.5 || weight <= 0.0) return false;
+  row.variance += S / weight - S;
+  row.residual.x() *= is_true / weight;
+  return true;
+}
+
+std::optional<TeamRow> mean_of(const Scene& scene, const Ranging& ranging) {
+  const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
+  const TeamRangeBias& bias = scene.belief.ranges.at(ordered(ranging.observer, ranging.neighbor));
+  const Eigen::Matrix3d covariance =
+      scene.belief.position_covariance(ranging.observer, ranging.neighbor);
+  const double spread = std::sqrt(static_cast<double>(ranging.ranges.size()));
+  std::optional<TeamRow> mean;
+  double sum_m = 0.0;
+  double count = 0.0;
+  for (const TeamRange* z : ranging.ranges) {
+    const RangeReading weighed{z->reading.range_m, z->reading.sigma_m / spread};
+    const auto row = range_row(pair, bias, weighed, scene.time_s(z->stamp), covariance);
+    if (!row) continue;
+    mean = *row;
+    sum_m += row->residual.x();
+    count += 1.0;
+  }
+  if (!mean) return std::nullopt;
+  mean->residual.x() = sum_m / count;
+  if (!associate(mean->covariance(scene.belief.P)(0, 0), *mean)) return std::nullopt;
+  return mean;
+}
+
+}  // namespace
+
+double Sight::time_s(const TeamInterval& interval) const {
+  double sum_s = 0.0;
+  for (const Bearing* z : bearings) sum_s += to_seconds(z->stamp - interval.from);
+  return sum_s / static_cast<double>(bearings.size());
+}
+
+double Sight::sigma_rad() const {
+  double variance = 0.0;
+  for (const Bearing* z : bearings) variance += z->sigma_rad * z->sigma_rad;
+  return std::sqrt(variance / static_cast<double>(bearings.size()));
+}
+
+TeamReadings TeamReadings::of(const TeamInterval& interval, const TeamBelief& belief, Stage stage) {
+  return {sights_of(interval, belief, stage), rangings_of(interval, belief, stage)};
+}
+
+void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelief& belief,
+          TeamReadings& readings) {
+  const Scene scene{interval, paths, belief};
+  for (Sight& sight : readings.sights) {
+    gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight);
+    for (const Bearing* z : sight.bearings) {
+      for (const RobotId robot : {sight.observer, sight.neighbor}) {
+        Timestamp& last = belief.robots.at(robot).last_sighting;
+        last = std::max(last, z->stamp);
+      }
+    }
+  }
+  for (Ranging& ranging : readings.rangings)
+    gate(scene, belief.ranges.at(ordered(ranging.observer, ranging.neighbor)), ranging);
+  std::erase_if(readings.sights, [](const Sight& s) { return s.bearings.empty(); });
+  std::erase_if(readings.rangings, [](const Ranging& r) { return r.ranges.empty(); });
+}
+
+std::vector<TeamRow> linearized(const TeamInterval& interval, const TeamTrajectories& paths,
+                                const TeamBelief& belief, const TeamReadings& readings) {
+  const Scene scene{interval, paths, belief};
+  std::vector<TeamRow> rows;
+  rows.reserve(readings.sights.size() + readings.rangings.size());
+  const auto add = [&](const std::optional<TeamRow>& row) {
+    if (row) rows.push_back(*row);
+  };
+  for (const Sight& sight : readings.sights) add(mean_of(scene, sight));
+  for (const Ranging& ranging : readings.rangings) add(mean_of(scene, ranging));
+  return rows;
+}
+
+}  // namespace crepes

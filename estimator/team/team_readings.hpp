@@ -1,0 +1,55 @@
+/// The bearings and ranges of an interval, collected by camera and pair.
+#pragma once
+
+#include <vector>
+
+#include "estimator/team/team_belief.hpp"
+#include "estimator/team/team_measurement.hpp"
+
+namespace crepes {
+
+/// All bearings of one camera to one robot.
+struct Sight {
+  RobotId observer{};
+  RobotId neighbor{};
+  std::size_t camera = 0;  ///< of the observer's
+  std::vector<const Bearing*> bearings{};
+
+  /// Of their mean, after the beginning of the interval.
+  [[nodiscard]] double time_s(const TeamInterval& interval) const;
+  [[nodiscard]] double sigma_rad() const;
+};
+
+/// All ranges that one robot measured to another.
+struct Ranging {
+  RobotId observer{};
+  RobotId neighbor{};
+  std::vector<const TeamRange*> ranges{};
+};
+
+/// Refers to an interval, which must outlive it.
+struct TeamReadings {
+  /// Between trusted robots; or between a trusted robot and one on probation. Nothing is learned
+  /// from two robots on probation.
+  enum class Stage { kTrusted, kProbation };
+
+  std::vector<Sight> sights;
+  std::vector<Ranging> rangings;
+
+  [[nodiscard]] static TeamReadings of(const TeamInterval& interval, const TeamBelief& belief,
+                                       Stage stage);
+  [[nodiscard]] bool empty() const { return sights.empty() && rangings.empty(); }
+};
+
+/// Drops readings that are too unlikely. Counts how each camera and pair agrees, and when a robot
+/// was last seen.
+void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelief& belief,
+          TeamReadings& readings);
+
+/// One row a sight and one a pair's ranges: the mean of what was not gated.
+[[nodiscard]] std::vector<TeamRow> linearized(const TeamInterval& interval,
+                                              const TeamTrajectories& paths,
+                                              const TeamBelief& belief,
+                                              const TeamReadings& readings);
+
+}  // namespace crepes

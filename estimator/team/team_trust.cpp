@@ -1,0 +1,185 @@
+#include "estimator/team/team_trust.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/core/constants.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr double kMaxPosition = 3.0;                     // m; a robot known worse is dropped
+constexpr Duration kRefusal = std::chrono::seconds{20};  // of a camera; then it is tried again
+constexpr Duration kProbation = std::chrono::seconds{1};
+constexpr Duration kLossMemory = std::chrono::seconds{10};
+constexpr double kDoubtPerLoss = 4.0;
+// A misalignment is a fault beyond so many sigmas of its prior and of its estimate.
+constexpr double kWrongPriors = 4.0;
+constexpr double kWrongSigmas = 3.0;
+constexpr double kLeastMisalignment = radians(0.1);  // rad
+
+/// How many cameras agree with each robot's place, and how many contradict it.
+using Witnesses = std::map<RobotId, Agreement>;
+using Robots = std::map<RobotId, TeamRobot>;
+
+/// A camera may be misaligned by so much. A configuration may claim to know it exactly.
+double largest_misalignment(const Priors& priors) {
+  return kWrongPriors * std::max(priors.misalignment_rad, kLeastMisalignment);
+}
+
+/// A camera that is refused or excluded is no witness.
+template <class IsExcluded>
+Witnesses witnesses(const Robots& robots, const IsExcluded& is_excluded) {
+  Witnesses witnesses;
+  for (const auto& [id, robot] : robots) {
+    for (const TeamCamera& camera : robot.cameras) {
+      if (camera.is_refused || is_excluded(id, camera)) continue;
+      for (const auto& [neighbor, agreement] : camera.agreement) {
+        Agreement& of_neighbor = witnesses[neighbor];
+        if (agreement.is_contradiction()) {
+          of_neighbor.gated += 1.0;
+        } else if (agreement.fused > 1.0) {
+          of_neighbor.fused += 1.0;
+        }
+      }
+    }
+  }
+  return witnesses;
+}
+
+/// It contradicts most of the robots that it sees, at least two, and nobody contradicts the place
+/// of the robot that carries it.
+bool is_turned(const Robots& robots, RobotId observer, const TeamCamera& camera) {
+  const auto seen = std::ranges::count_if(camera.agreement, [](const auto& entry) {
+    return entry.second.fused + entry.second.gated > 1.0;
+  });
+  const auto contradicted = std::ranges::count_if(
+      camera.agreement, [](const auto& entry) { return entry.second.is_contradiction(); });
+  if (contradicted < 2 || 2 * contradicted <= seen) return false;
+  const auto all = witnesses(robots, [](RobotId, const TeamCamera&) { return false; });
+  const auto of_observer = all.find(observer);
+  return of_observer == all.end() || of_observer->second.gated == 0.0;
+}
+
+bool is_contradicted(const Robots& robots, const Witnesses& all, RobotId id) {
+  const auto found = all.find(id);
+  if (found == all.end() || found->second.gated == 0.0) return false;
+  const Agreement& of_robot = found->second;
+  const bool came_last = std::ranges::none_of(all, [&](const auto& other) {
+    return other.second.gated > 0.0 && robots.at(other.first).since > robots.at(id).since;
+  });
+  return of_robot.gated > of_robot.fused || (of_robot.gated == of_robot.fused && came_last);
+}
+
+void add_camera_faults(const TeamBelief& belief, RobotId id, const Priors& priors,
+                       std::vector<TeamFault>& faults) {
+  for (const TeamCamera& camera : belief.robots.at(id).cameras) {
+    const double angle = camera.misalignment.norm();
+    const double sigma = std::sqrt(belief.P.diagonal().segment<3>(camera.index).maxCoeff());
+    if (camera.is_refused) {
+      faults.push_back({id, TeamFault::Kind::kCameraRefused, angle});
+    } else if (angle > largest_misalignment(priors) && angle > kWrongSigmas * sigma) {
+      faults.push_back({id, TeamFault::Kind::kCameraTurned, angle});
+    }
+  }
+}
+
+/// A robot most of whose ranges, to at least two others, are refused.
+void add_range_fault(const TeamBelief& belief, RobotId id, std::vector<TeamFault>& faults) {
+  int measured = 0;
+  int contradicted = 0;
+  double sum_m = 0.0;
+  for (const auto& [pair, range] : belief.ranges) {
+    const auto agreement = range.agreement.find(id);
+    if (agreement == range.agreement.end()) continue;
+    measured += agreement->second.fused + agreement->second.gated > 1.0 ? 1 : 0;
+    if (!agreement->second.is_contradiction()) continue;
+    ++contradicted;
+    sum_m += range.refused_m.at(id);
+  }
+  if (contradicted >= 2 && 2 * contradicted > measured)
+    faults.push_back({id, TeamFault::Kind::kRanges, sum_m / contradicted});
+}
+
+}  // namespace
+
+std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBelief& belief) {
+  const Witnesses all = witnesses(belief.robots, [&](RobotId observer, const TeamCamera& camera) {
+    return is_turned(belief.robots, observer, camera);
+  });
+  // A robot that was away may have been repaired.
+  std::erase_if(realigned_,
+                [&](const auto& entry) { return interval.member(entry.first) == nullptr; });
+  std::vector<RobotId> lost;
+  for (const auto& [id, robot] : belief.robots) {
+    if (id == belief.self) continue;
+    const double variance = belief.P.diagonal().segment<3>(robot.motion_index).sum();
+    const bool is_wrong = is_contradicted(belief.robots, all, id);
+    if (is_wrong) losses_[id] = {belief.stamp, recent_losses(id, belief.stamp) + 1};
+    if (is_wrong || interval.member(id) == nullptr || !(variance < kMaxPosition * kMaxPosition))
+      lost.push_back(id);
+  }
+  return lost;
+}
+
+std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamBelief& belief) {
+  const double most = largest_misalignment(interval.settings.priors);
+  std::vector<RobotId> turned;
+  for (const auto& [id, robot] : belief.robots) {
+    const bool is_unknown = is_realigned(id, belief.stamp);
+    if (std::ranges::any_of(robot.cameras, [&](const TeamCamera& camera) {
+          return is_turned(belief.robots, id, camera) ||
+                 (!is_unknown && camera.misalignment.norm() > most);
+        }))
+      turned.push_back(id);
+  }
+  for (const RobotId id : turned)
+    realigned_[id] = {.since = belief.stamp, .is_refused = is_realigned(id, belief.stamp)};
+  return turned;
+}
+
+bool TeamTrust::is_realigned(RobotId robot, Timestamp now) const {
+  const auto found = realigned_.find(robot);
+  return found != realigned_.end() &&
+         (!found->second.is_refused || now - found->second.since < kRefusal);
+}
+
+double TeamTrust::doubt(RobotId robot, Timestamp now) const {
+  return std::pow(kDoubtPerLoss, std::min(recent_losses(robot, now), 2));
+}
+
+int TeamTrust::recent_losses(RobotId robot, Timestamp now) const {
+  const auto found = losses_.find(robot);
+  const bool is_recent = found != losses_.end() && now - found->second.last < kLossMemory;
+  return is_recent ? found->second.count : 0;
+}
+
+void end_probations(TeamBelief& belief) {
+  std::map<RobotId, Agreement> all;
+  for (const auto& [id, robot] : belief.robots) {
+    for (const TeamCamera& camera : robot.cameras) {
+      for (const auto& [neighbor, agreement] : camera.agreement) {
+        for (const RobotId end : {id, neighbor}) {
+          all[end].fused += agreement.fused;
+          all[end].gated += agreement.gated;
+        }
+      }
+    }
+  }
+  for (auto& [id, robot] : belief.robots) {
+    const Agreement& agreement = all[id];
+    const bool is_long_enough = belief.stamp - robot.since >= kProbation;
+    if (is_long_enough && agreement.fused > 4.0 * agreement.gated + 2.0) robot.is_trusted = true;
+  }
+}
+
+std::vector<TeamFault> faults_of(const TeamBelief& belief, const Priors& priors) {
+  std::vector<TeamFault> faults;
+  for (const auto& [id, robot] : belief.robots) {
+    add_camera_faults(belief, id, priors, faults);
+    add_range_fault(belief, id, faults);
+  }
+  return faults;
+}
+
+}  // namespace crepes
