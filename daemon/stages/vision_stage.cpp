@@ -68,6 +68,7 @@ SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::ui
           .counts = {{"delay_p50_us", median_us},
                      {"delay_p99_us", p99_us},
                      {"threshold", static_cast<std::uint64_t>(found.threshold)},
+                     {"hot_pixels", found.hot_pixels},
                      {"hot", rejected.hot},
                      {"huge", rejected.huge},
                      {"faint", rejected.faint},

@@ -13,6 +13,7 @@ constexpr int kPart = 64;
 constexpr int kChunk = 16;
 constexpr std::size_t kUsualRuns = 1U << 12U;
 constexpr std::size_t kMaxRuns = 1U << 15U;
+constexpr std::size_t kMostFaintPeaks = 1U << 11U;
 
 /// The extreme of kCount pixels by `pick`, in lanes that compilers turn into vector instructions:
 /// many lanes, or each would wait for the one before.
@@ -36,6 +37,34 @@ bool is_uniform(const std::uint8_t* pixels, bool is_open, std::uint8_t threshold
   return is_open
              ? extreme<kCount>(pixels, [](Level a, Level b) { return a < b ? a : b; }) >= threshold
              : extreme<kCount>(pixels, [](Level a, Level b) { return a > b ? a : b; }) < threshold;
+}
+
+/// Calls on_run(begin, end) for the runs of pixels at or above the threshold in [from, to).
+template <class OnRun>
+void scan(const std::uint8_t* row, int from, int to, std::uint8_t threshold, const OnRun& on_run) {
+  bool is_open = false;
+  int begin = from;
+  const auto visit = [&](int u) {
+    if ((row[u] >= threshold) == is_open) return;
+    if (is_open) on_run(begin, u);
+    begin = u;
+    is_open = !is_open;
+  };
+  const auto search_part = [&](int first) {
+    if (is_uniform<kPart>(row + first, is_open, threshold)) return;
+    for (int chunk = first; chunk < first + kPart; chunk += kChunk) {
+      if (is_uniform<kChunk>(row + chunk, is_open, threshold)) continue;
+      for (int u = chunk; u < chunk + kChunk; ++u) visit(u);
+    }
+  };
+  int u = from;
+  for (; u + kBlock <= to; u += kBlock) {
+    if (is_uniform<kBlock>(row + u, is_open, threshold)) continue;
+    for (int part = u; part < u + kBlock; part += kPart) search_part(part);
+  }
+  for (; u + kPart <= to; u += kPart) search_part(u);
+  for (; u < to; ++u) visit(u);
+  if (is_open) on_run(begin, to);
 }
 
 /// Adds the pixels of a run. The weight is zero just below the threshold, so that pixels that come
@@ -97,14 +126,20 @@ void Blob::absorb(const Blob& part) {
 BlobFinder::BlobFinder() {
   runs_.reserve(kUsualRuns);
   blob_of_.reserve(kUsualRuns);
+  faint_.reserve(kMostFaintPeaks + kUsualRuns);
 }
 
-bool BlobFinder::find(const GrayImage& image, int threshold, double max_area,
-                      std::vector<Blob>& blobs) {
+bool BlobFinder::find(const GrayImage& image, Levels levels, std::span<const MendedPixel> mended,
+                      double max_area, std::vector<Blob>& blobs) {
   runs_.clear();
+  faint_.clear();
+  mended_ = mended;
   for (int v = 0; v < image.height; ++v) {
-    find_runs(image.row(v), v, image.width, static_cast<std::uint8_t>(threshold));
+    find_runs(image, v, levels);
     if (runs_.size() > kMaxRuns) return false;
+    if (faint_.size() <= kMostFaintPeaks) continue;
+    faint_.clear();
+    levels.faint = levels.threshold;
   }
   link_rows();
   const std::size_t first = blobs.size();
@@ -113,7 +148,7 @@ bool BlobFinder::find(const GrayImage& image, int threshold, double max_area,
     const Run& run = runs_[i];
     Blob& blob = blobs[first + blob_of_[i]];
     if (blob.area <= max_area)
-      measure(image.row(run.row), run.row, run.begin, run.end, threshold, blob);
+      measure(image.row(run.row), run.row, run.begin, run.end, levels.threshold, blob);
   }
   return true;
 }
@@ -128,31 +163,50 @@ std::optional<std::size_t> BlobFinder::blob_at(int u, int v) const {
   return blob_of_[static_cast<std::size_t>(run - runs_.begin())];
 }
 
-void BlobFinder::find_runs(const std::uint8_t* row, int v, int width, std::uint8_t threshold) {
-  bool is_open = false;
-  const auto visit = [&](int u) {
-    if ((row[u] >= threshold) == is_open) return;
-    if (!is_open) {
-      runs_.push_back({v, u, width, static_cast<std::uint32_t>(runs_.size())});
-    } else {
-      runs_.back().end = u;
-    }
-    is_open = !is_open;
-  };
-  const auto search_part = [&](int begin) {
-    if (is_uniform<kPart>(row + begin, is_open, threshold)) return;
-    for (int chunk = begin; chunk < begin + kPart; chunk += kChunk) {
-      if (is_uniform<kChunk>(row + chunk, is_open, threshold)) continue;
-      for (int u = chunk; u < chunk + kChunk; ++u) visit(u);
-    }
-  };
-  int u = 0;
-  for (; u + kBlock <= width; u += kBlock) {
-    if (is_uniform<kBlock>(row + u, is_open, threshold)) continue;
-    for (int part = u; part < u + kBlock; part += kPart) search_part(part);
+void BlobFinder::find_runs(const GrayImage& image, int v, Levels levels) {
+  const std::uint8_t* const row = image.row(v);
+  const auto threshold = static_cast<std::uint8_t>(levels.threshold);
+  const auto add = [&](int begin, int end) { add_run(v, begin, end, levels.threshold); };
+  if (levels.faint >= levels.threshold) {
+    scan(row, 0, image.width, threshold, add);
+    return;
   }
-  for (; u + kPart <= width; u += kPart) search_part(u);
-  for (; u < width; ++u) visit(u);
+  scan(row, 0, image.width, static_cast<std::uint8_t>(levels.faint), [&](int begin, int end) {
+    const std::size_t before = runs_.size();
+    scan(row, begin, end, threshold, add);
+    if (runs_.size() == before) find_peak(image, v, begin, end);
+  });
+}
+
+/// Keeps the brightest pixel of the run, unless it has a brighter neighbor in the next rows.
+void BlobFinder::find_peak(const GrayImage& image, int v, int begin, int end) {
+  const std::uint8_t* const row = image.row(v);
+  const auto u = static_cast<int>(std::max_element(row + begin, row + end) - row);
+  for (const int y : {v - 1, v + 1}) {
+    if (y < 0 || y >= image.height) continue;
+    for (int x = std::max(0, u - 1); x <= std::min(image.width - 1, u + 1); ++x)
+      if (image.row(y)[x] > row[u]) return;
+  }
+  faint_.push_back({u, v});
+}
+
+/// Adds the run without mended pixels that are not that bright.
+void BlobFinder::add_run(int v, int begin, int end, int threshold) {
+  const auto is_before = [v](int u, const MendedPixel& p) {
+    return p.v < v || (p.v == v && p.u < u);
+  };
+  const auto add = [&](int from, int to) {
+    if (from < to) runs_.push_back({v, from, to, static_cast<std::uint32_t>(runs_.size())});
+  };
+  while (!mended_.empty() && is_before(begin, mended_.front())) mended_ = mended_.subspan(1);
+  while (!mended_.empty() && is_before(end, mended_.front())) {
+    const MendedPixel& pixel = mended_.front();
+    mended_ = mended_.subspan(1);
+    if (pixel.level >= threshold) continue;
+    add(begin, pixel.u);
+    begin = pixel.u + 1;
+  }
+  add(begin, end);
 }
 
 std::uint32_t BlobFinder::root_of(std::uint32_t run) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace crepes {
@@ -46,6 +47,19 @@ struct Blob {
   void absorb(const Blob& part);
 };
 
+/// A pixel that does not reach the threshold, and that no neighbor outshines.
+struct FaintPeak {
+  int u = 0;
+  int v = 0;
+};
+
+/// A pixel that errs, and what it should show.
+struct MendedPixel {
+  int u = 0;
+  int v = 0;
+  std::uint8_t level = 0;
+};
+
 /// Finds the blobs of one image after another.
 class BlobFinder {
  public:
@@ -55,7 +69,21 @@ class BlobFinder {
   /// pixels without their sums, ordered by first row. False, and nothing appended, when the image
   /// holds so many that it must be noise.
   [[nodiscard]] bool find(const GrayImage& image, int threshold, double max_area,
+                          std::vector<Blob>& blobs) {
+    return find(image, {threshold, threshold}, {}, max_area, blobs);
+  }
+  /// The same with `mended` pixels, ordered by row and column, taken for what they should show
+  /// where they end a blob.
+  struct Levels {
+    int threshold = 0;
+    int faint = 0;  ///< at most the threshold; if lower, faint_peaks() are the peaks from it on
+  };
+  [[nodiscard]] bool find(const GrayImage& image, Levels levels,
+                          std::span<const MendedPixel> mended, double max_area,
                           std::vector<Blob>& blobs);
+
+  /// What the last find() saw beside its blobs; nothing if it was so much that it is texture.
+  [[nodiscard]] std::span<const FaintPeak> faint_peaks() const { return faint_; }
 
   /// Which of the blobs that the last find() appended has the pixel, counted from 0.
   [[nodiscard]] std::optional<std::size_t> blob_at(int u, int v) const;
@@ -79,12 +107,16 @@ class BlobFinder {
     std::uint32_t parent = 0;  ///< union-find over runs
   };
 
-  void find_runs(const std::uint8_t* row, int v, int width, std::uint8_t threshold);
+  void find_runs(const GrayImage& image, int v, Levels levels);
+  void find_peak(const GrayImage& image, int v, int begin, int end);
+  void add_run(int v, int begin, int end, int threshold);
   [[nodiscard]] std::uint32_t root_of(std::uint32_t run);
   void link_rows();
   void outline(std::vector<Blob>& blobs);
 
   std::vector<Run> runs_;
+  std::vector<FaintPeak> faint_;
+  std::span<const MendedPixel> mended_;  ///< those of later rows, and of this
   std::vector<std::uint32_t> blob_of_;
 };
 

@@ -12,6 +12,8 @@ constexpr int kPixelStep = 9;  // columns; odd, against pictures that repeat eve
 constexpr int kMinContrast = 16;       // gray levels above the background
 constexpr double kSpreadSigmas = 8.0;  // noise above the background
 constexpr double kDarkShare = 0.05;    // a part smaller than this is no background
+constexpr double kFaintSigmas = 3.7;   // of noise; white Gaussian noise is above in 1 pixel of 10^4
+constexpr int kFaintContrast = 2;      // gray levels, where there is no noise
 
 }  // namespace
 
@@ -41,6 +43,26 @@ int BrightnessSample::quantile(int first, int last, double part) const {
   return std::min(last, static_cast<int>(above - below_.begin()) - 1);
 }
 
+/// The same between gray levels: each is as wide as one.
+double BrightnessSample::exact_quantile(int first, int last, double part) const {
+  const int level = quantile(first, last, part);
+  const int before = below_[static_cast<std::size_t>(first)];
+  const double wanted = before + part * (below_[static_cast<std::size_t>(last) + 1] - before);
+  const int below = below_[static_cast<std::size_t>(level)];
+  const int here = below_[static_cast<std::size_t>(level) + 1] - below;
+  return level - 0.5 + (wanted - below) / std::max(1, here);
+}
+
+/// Where noise is rare. The upper half and its tail count: black clips the lower half, and texture
+/// shows in the tail.
+int BrightnessSample::faint_from(int first, int last) const {
+  const double middle = exact_quantile(first, last, 0.5);
+  const double sigma = std::max(exact_quantile(first, last, 0.841) - middle,
+                                (exact_quantile(first, last, 0.99) - middle) / 2.326);
+  return static_cast<int>(
+      std::ceil(middle + std::max<double>(kFaintContrast, kFaintSigmas * sigma)));
+}
+
 double BrightnessSample::share_from(int level) const {
   const int all = below_.back();
   return static_cast<double>(all - below_[static_cast<std::size_t>(level)]) / std::max(1, all);
@@ -59,7 +81,9 @@ Background BrightnessSample::darkest_from(int level) const {
     const int previous = std::exchange(last, std::min(255, part.threshold - 1));
     if (last == previous) break;
   }
+  part.faint = faint_from(level, last);
   part.threshold = std::min(part.threshold, kHighestThreshold);
+  part.faint = std::min(part.faint, part.threshold);
   return part;
 }
 

@@ -27,6 +27,21 @@ constexpr int kMaxFragmented = 28;  // px; on a larger board every LED stands al
 constexpr int kSplitMinSide = 6;    // px; smaller blobs show no ring
 constexpr int kSplitMaxSide = 100;  // px; LEDs of larger rings do not touch
 
+constexpr int kMaxHot = 4;           // px; hot pixels side by side
+constexpr int kHotReach = 3;         // px; so far away they matter to a center
+constexpr int kFaintReach = 6;       // px; what is nearer to a light is of its flanks
+constexpr double kWorthALook = 6.5;  // of the filter, against a pixel from the faint threshold on
+constexpr int kMaxFaintReach = 5;    // px; so far a board may have moved since
+// Scores of a place, in pictures: a board is lit in half of them or more, noise in a few of 100.
+constexpr int kNewFaint = 8;
+constexpr int kFaintGain = 4;
+constexpr int kKnownFaint = 14;
+constexpr int kMostFaint = 32;
+constexpr double kFaintAgain = 4.3;  // sigmas, of a light where one was
+constexpr double kFaintKnown = 3.5;  // sigmas, where one was often
+constexpr std::size_t kMaxFaintPeaks = 256;
+constexpr std::size_t kMaxFaintLights = 64;  // more are texture
+
 constexpr double kRim = 1.25;       // of a ring's radius: what is nearer belongs to it
 constexpr double kSmallRing = 5.0;  // px radius; the center of its light is surer than that of LEDs
 constexpr double kSharpRing = 0.04;      // of its radius, the error of LEDs that stand apart
@@ -38,6 +53,13 @@ int shorter_side(const PixelBox& box) { return std::min(box.width(), box.height(
 
 PixelBox grown(const PixelBox& box, int by) {
   return {box.u_min - by, box.v_min - by, box.u_max + by, box.v_max + by};
+}
+
+/// Of a light of one pixel.
+PixelBox box_of(const Spot& spot) {
+  const auto u = static_cast<int>(std::lround(spot.u_px));
+  const auto v = static_cast<int>(std::lround(spot.v_px));
+  return {u, v, u, v};
 }
 
 double distance(double u, double v) { return std::sqrt(u * u + v * v); }
@@ -76,6 +98,7 @@ SpotDetector::SpotDetector(const VisionConfig& config) : config_(config) {
   parent_.reserve(kUsualBlobs);
   groups_.reserve(kUsualBlobs);
   candidates_.reserve(kUsualBlobs);
+  faint_.reserve(kUsualBlobs);
   spots_.reserve(kUsualBlobs);
 }
 
@@ -86,9 +109,11 @@ Detection SpotDetector::detect(const GrayImage& image) {
                 "an image of 1 to 2048 pixels a side");
   const BrightnessSample sample(image);
   const Background darkest = sample.darkest_from(0);
+  faint_.clear();
   Detection found;
   found.background = darkest.median;
   found.threshold = config_.threshold > 0 ? config_.threshold : darkest.threshold;
+  found.faint_threshold = config_.threshold > 0 ? config_.threshold : darkest.faint;
   found.saturated_share = sample.share_from(kSaturated);
   spots_.clear();
   bool is_noise = false;
@@ -98,6 +123,8 @@ Detection SpotDetector::detect(const GrayImage& image) {
       found.failure = failure_;
     }
   } else {
+    hot_pixels_.look(image, found.faint_threshold);
+    found.hot_pixels = hot_pixels_.known().size();
     is_noise = !search_levels(image, sample, found);
     select(found.rejected);
   }
@@ -112,10 +139,11 @@ bool SpotDetector::search_levels(const GrayImage& image, const BrightnessSample&
                                  Detection& found) {
   candidates_.clear();
   huge_.assign(1, {0, 0, image.width - 1, image.height - 1});
-  Background level{found.background, found.threshold};
+  Background level{found.background, found.threshold, found.faint_threshold};
   for (int count = 1;; ++count) {
     const double contrast = kLeastContrast * (level.threshold - level.median);
-    const bool is_complete = search(image, level.threshold, contrast, found.rejected);
+    const bool is_complete = search(image, level, contrast, found.rejected);
+    if (count == 1) remember_faint();
     if (is_complete && huge_.empty()) return true;
     const Background next = sample.darkest_from(level.threshold);
     if (count == kMaxSearches || config_.threshold > 0 || next.median >= kNoContrastLeft ||
@@ -127,10 +155,15 @@ bool SpotDetector::search_levels(const GrayImage& image, const BrightnessSample&
 
 /// Looks in the boxes of huge_ for spots and puts there what is huge at this threshold. False, and
 /// nothing changed, when all is noise.
-bool SpotDetector::search(const GrayImage& image, int threshold, double contrast,
+bool SpotDetector::search(const GrayImage& image, const Background& level, double contrast,
                           Rejected& rejected) {
+  const int threshold = level.threshold;
   blobs_.clear();
-  if (!finder_.find(image, threshold, config_.max_area_px2, blobs_)) return false;
+  if (!finder_.find(image, {threshold, level.faint}, hot_pixels_.known(), config_.max_area_px2,
+                    blobs_))
+    return false;
+  suspect_specks();
+  find_faint(image, level, rejected);
   sort_out(image, threshold, contrast, rejected);
   find_lights(image, threshold);
   for (const Ring& ring : ring_finder_.find(lights_, image, threshold))
@@ -143,12 +176,145 @@ bool SpotDetector::search(const GrayImage& image, int threshold, double contrast
     take_arcs(image, threshold, arcs);
   close();
   join_fragments();
+  measure_open(image, threshold);
+  for (const FaintLight& light : faint_) candidates_.push_back({light.spot, box_of(light.spot)});
+  return true;
+}
+
+/// Pixels of a few may be hot.
+void SpotDetector::suspect_specks() {
+  for (std::size_t i = 0; i < blobs_.size() && hot_pixels_.has_room(); ++i)
+    if (blobs_[i].area <= kMaxHot)
+      finder_.visit(i, blobs_[i].box, [&](int u, int v) { hot_pixels_.suspect(u, v); });
+}
+
+void SpotDetector::measure_open(const GrayImage& image, int threshold) {
   for (const std::uint32_t i : open_) {
     if (is_open_[i] == 0) continue;
-    const Surroundings around = surroundings_of(image, blobs_[i].box, threshold);
-    candidates_.push_back({measure_spot(image, blobs_[i], threshold, around), blobs_[i].box});
+    const PixelBox& box = blobs_[i].box;
+    if (longer_side(box) <= kSplitMaxSide && hot_pixels_.is_in(grown(box, kHotReach))) {
+      if (const auto spot = measure_mended(image, box, threshold))
+        candidates_.push_back({*spot, box});
+    } else {
+      const Surroundings around = surroundings_of(image, box, threshold);
+      candidates_.push_back({measure_spot(image, blobs_[i], threshold, around), box});
+    }
   }
-  return true;
+}
+
+/// The spot in the box without the hot pixels in it; empty if it is nothing without them.
+std::optional<Spot> SpotDetector::measure_mended(const GrayImage& image, const PixelBox& box,
+                                                 int threshold) {
+  const PixelBox wide = grown(box, 2 * kHotReach);
+  const PixelBox around{std::max(0, wide.u_min), std::max(0, wide.v_min),
+                        std::min(image.width - 1, wide.u_max),
+                        std::min(image.height - 1, wide.v_max)};
+  patch_.clear();
+  for (int v = around.v_min; v <= around.v_max; ++v)
+    patch_.insert(patch_.end(), image.row(v) + around.u_min, image.row(v) + around.u_max + 1);
+  for (const MendedPixel& pixel : hot_pixels_.in_rows_of(around))
+    if (around.u_min <= pixel.u && pixel.u <= around.u_max)
+      patch_[static_cast<std::size_t>((pixel.v - around.v_min) * around.width() + pixel.u -
+                                      around.u_min)] = pixel.level;
+  const GrayImage patch{patch_.data(), around.width(), around.height(), around.width()};
+  const PixelBox inside{box.u_min - around.u_min, box.v_min - around.v_min,
+                        box.u_max - around.u_min, box.v_max - around.v_min};
+  cores_.clear();
+  if (!splitter_.find(patch, threshold, config_.max_area_px2, cores_)) return std::nullopt;
+  std::erase_if(cores_, [&](const Blob& core) { return !core.box.overlaps(inside); });
+  if (cores_.empty()) return std::nullopt;
+  for (std::size_t i = 1; i < cores_.size(); ++i) cores_[0].absorb(cores_[i]);
+  const Surroundings near = surroundings_of(patch, cores_[0].box, threshold);
+  Spot spot = measure_spot(patch, cores_[0], threshold, near);
+  spot.u_px += around.u_min;
+  spot.v_px += around.v_min;
+  return spot;
+}
+
+/// Lights between blobs that noise does not explain. So many that they are texture are none.
+void SpotDetector::find_faint(const GrayImage& image, const Background& level, Rejected& rejected) {
+  faint_.clear();
+  if (blobs_.size() > kMaxBlobs) return;
+  FaintSearch anywhere;
+  anywhere.least_light =
+      16 * level.median + static_cast<int>(kWorthALook * (level.faint - level.median));
+  for (const FaintPeak& peak : finder_.faint_peaks())
+    add_faint(image, peak.u, peak.v, anywhere, rejected);
+  for (const FaintPlace& place : faint_places_) {
+    FaintSearch again;
+    again.reach = std::min(place.age + 1, kMaxFaintReach);
+    again.significance = place.score < kKnownFaint ? kFaintAgain : kFaintKnown;
+    add_faint(image, place.u, place.v, again, rejected);
+  }
+  std::sort(faint_.begin(), faint_.end(), [](const FaintLight& a, const FaintLight& b) {
+    if (a.significance != b.significance) return a.significance > b.significance;
+    return a.spot.v_px != b.spot.v_px ? a.spot.v_px < b.spot.v_px : a.spot.u_px < b.spot.u_px;
+  });
+  if (faint_.size() <= kMaxFaintPeaks) thin_out_faint();
+  if (faint_.size() > kMaxFaintLights) {
+    rejected.faint += faint_.size();
+    faint_.clear();
+  }
+}
+
+void SpotDetector::add_faint(const GrayImage& image, int u, int v, const FaintSearch& search,
+                             Rejected& rejected) {
+  const PixelBox box{u, v, u, v};
+  if (!is_news(box) || hot_pixels_.is_in(box)) return;
+  const auto light = find_faint_light(image, u, v, search);
+  if (!light) return;
+  const PixelBox found = box_of(light->spot);
+  hot_pixels_.suspect(found.u_min, found.v_min);
+  if (light->is_hot) {
+    ++rejected.hot;
+  } else {
+    faint_.push_back(*light);
+  }
+}
+
+/// Keeps those with neither a blob nor a more significant one near them.
+void SpotDetector::thin_out_faint() {
+  std::size_t kept = 0;
+  for (const FaintLight& light : faint_) {
+    const auto is_same = [&](const FaintLight& other) {
+      return distance(other.spot.u_px - light.spot.u_px, other.spot.v_px - light.spot.v_px) <
+             kFaintReach;
+    };
+    const auto end = faint_.begin() + static_cast<std::ptrdiff_t>(kept);
+    if (std::none_of(faint_.begin(), end, is_same) && !is_near_blob(light.spot))
+      faint_[kept++] = light;
+  }
+  faint_.resize(kept);
+}
+
+/// A board is found again where it was with less significance: there are fewer places to err.
+void SpotDetector::remember_faint() {
+  const std::size_t before = faint_places_.size();
+  for (FaintPlace& place : faint_places_) {
+    ++place.age;
+    --place.score;
+  }
+  for (const FaintLight& light : faint_) {
+    const PixelBox box = box_of(light.spot);
+    FaintPlace now{box.u_min, box.v_min, 0, kNewFaint};
+    for (std::size_t i = 0; i < before; ++i) {
+      FaintPlace& place = faint_places_[i];
+      if (distance(place.u - now.u, place.v - now.v) > kFaintReach) continue;
+      now.score = std::clamp(place.score + kFaintGain, now.score, kMostFaint);
+      place.score = 0;
+    }
+    if (faint_places_.size() < before + kMaxFaintLights) faint_places_.push_back(now);
+  }
+  std::erase_if(faint_places_, [&](const FaintPlace& place) {
+    return place.score <= 0 || is_near_blob({.u_px = double(place.u), .v_px = double(place.v)});
+  });
+}
+
+bool SpotDetector::is_near_blob(const Spot& spot) const {
+  const PixelBox near = grown(box_of(spot), kFaintReach);
+  return std::any_of(blobs_.begin(), blobs_.end(), [&](const Blob& blob) {
+    return blob.area <= config_.max_area_px2 && blob.box.overlaps(near);
+  });
 }
 
 /// Leaves open what may be a board or a part of one.

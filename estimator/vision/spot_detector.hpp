@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +14,8 @@
 #include "estimator/vision/arc_joiner.hpp"
 #include "estimator/vision/blob_finder.hpp"
 #include "estimator/vision/brightness_sample.hpp"
+#include "estimator/vision/faint_light.hpp"
+#include "estimator/vision/hot_pixel_map.hpp"
 #include "estimator/vision/ring_finder.hpp"
 #include "estimator/vision/spot_measure.hpp"
 #include "estimator/vision/vision_config.hpp"
@@ -39,13 +42,18 @@ struct Detection {
   std::span<const Spot> spots;  ///< brightest first; valid until the next detect()
   int background = 0;           ///< median gray level of the darkest part of the picture
   int threshold = 0;            ///< gray level from which a pixel there belongs to a spot
+  int faint_threshold = 0;      ///< from which it may; then the noise around it decides
   Exposure exposure = Exposure::kGood;
   double saturated_share = 0.0;  ///< of the picture, 0..1
   Rejected rejected;
-  std::string_view failure;  ///< why the detector failed on this picture; empty when it did not
+  std::size_t hot_pixels = 0;  ///< known ones; they no longer count as rejected
+  std::string_view failure;    ///< why the detector failed on this picture; empty when it did not
 };
 
 /// Finds LED boards: a ring of LEDs is one spot, be it a blob for each LED or one for all.
+///
+/// What is fainter than the threshold is a spot where the noise around it does not explain it.
+/// Pixels that shine in every picture are learned and left out.
 ///
 /// A picture with something huge and bright in it, as the sun or a window, is searched a second
 /// and at last a third time, for what stands out before that. Each search is bounded, and all
@@ -65,8 +73,18 @@ class SpotDetector {
 
   [[nodiscard]] bool search_levels(const GrayImage& image, const BrightnessSample& sample,
                                    Detection& found);
-  [[nodiscard]] bool search(const GrayImage& image, int threshold, double contrast,
+  [[nodiscard]] bool search(const GrayImage& image, const Background& level, double contrast,
                             Rejected& rejected);
+  void suspect_specks();
+  void measure_open(const GrayImage& image, int threshold);
+  [[nodiscard]] std::optional<Spot> measure_mended(const GrayImage& image, const PixelBox& box,
+                                                   int threshold);
+  void find_faint(const GrayImage& image, const Background& level, Rejected& rejected);
+  void add_faint(const GrayImage& image, int u, int v, const FaintSearch& search,
+                 Rejected& rejected);
+  void thin_out_faint();
+  void remember_faint();
+  [[nodiscard]] bool is_near_blob(const Spot& spot) const;
   void sort_out(const GrayImage& image, int threshold, double contrast, Rejected& rejected);
   [[nodiscard]] bool is_news(const PixelBox& box) const;
   void find_lights(const GrayImage& image, int threshold);
@@ -84,6 +102,17 @@ class SpotDetector {
   BlobFinder splitter_;
   RingFinder ring_finder_;
   ArcJoiner arc_joiner_;
+  HotPixelMap hot_pixels_;
+  std::vector<FaintLight> faint_;
+  /// Where a faint light was.
+  struct FaintPlace {
+    int u = 0;
+    int v = 0;
+    int age = 0;    ///< pictures since
+    int score = 0;  ///< rises with each picture that shows it, falls with each that does not
+  };
+  std::vector<FaintPlace> faint_places_;
+  std::vector<std::uint8_t> patch_;
   std::vector<std::uint32_t> of_ring_;  ///< its blobs
   std::vector<Blob> blobs_;
   std::vector<std::uint32_t> open_;  ///< blobs that are not accounted for yet, by first row

@@ -6,10 +6,10 @@
 namespace crepes {
 namespace {
 
-constexpr int kMargin = 2;             // px
-constexpr int kMaxFlankSide = 64;      // px; larger spots have nothing to gain from their flanks
-constexpr std::int32_t kFew = 4;       // pixels
-constexpr double kPixel = 1.0 / 12.0;  // variance of a single pixel's own extent
+constexpr int kMargin = 2;              // px
+constexpr int kMaxFlankSide = 64;       // px; larger spots have nothing to gain from their flanks
+constexpr std::int32_t kFewPixels = 4;  // pixels
+constexpr double kPixel = 1.0 / 12.0;   // variance of a single pixel's own extent
 
 PixelBox grown(const PixelBox& box, int by, const GrayImage& image) {
   return {std::max(0, box.u_min - by), std::max(0, box.v_min - by),
@@ -111,7 +111,7 @@ Surroundings surroundings_of(const GrayImage& image, const PixelBox& box, int th
 }
 
 int area_of(const GrayImage& image, const Blob& blob, int threshold, const Surroundings& around) {
-  if (blob.area >= kFew || !around.is_known) return blob.area;
+  if (blob.area >= kFewPixels || !around.is_known) return blob.area;
   const double half = 0.5 * (around.background + threshold);
   return std::max(blob.area, count_from(image, grown(blob.box, 1, image), half));
 }

@@ -1,0 +1,49 @@
+/// The pixels of a camera that shine by themselves.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "estimator/vision/blob_finder.hpp"
+
+namespace crepes {
+
+/// Learns pixels that shine in every picture. A board is dark in some of a few hundred, wherever it
+/// rests; a lamp that is as steady is no board. A pixel is known after kKnown pictures, and
+/// forgotten within a few that do not show it. Bounded.
+class HotPixelMap {
+ public:
+  static constexpr int kKnown = 400;  ///< pictures: 2 s at 200 Hz
+  static constexpr std::size_t kMaxSuspects = 8192;
+
+  /// Looks at all suspects in the next picture; they shine from `level` on.
+  void look(const GrayImage& image, int level);
+  /// A pixel of a speck of light. Takes effect with the next look().
+  void suspect(int u, int v);
+  /// Whether a suspect that is new would be taken before the next look().
+  [[nodiscard]] bool has_room() const;
+
+  /// Ordered by row and column, with the median of their neighbors in the last picture.
+  [[nodiscard]] std::span<const MendedPixel> known() const { return known_; }
+  /// Those in the rows of the box; some may lie beside it.
+  [[nodiscard]] std::span<const MendedPixel> in_rows_of(const PixelBox& box) const;
+  [[nodiscard]] bool is_in(const PixelBox& box) const;
+
+ private:
+  struct Suspect {
+    int u = 0;
+    int v = 0;
+    int score = 0;
+  };
+  [[nodiscard]] static bool is_before(const Suspect& a, const Suspect& b);
+  void admit();
+
+  int width_ = 0;
+  int height_ = 0;
+  std::vector<Suspect> suspects_;  ///< ordered by row and column
+  std::vector<Suspect> new_;
+  std::vector<MendedPixel> known_;
+};
+
+}  // namespace crepes
