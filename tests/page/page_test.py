@@ -100,6 +100,19 @@ class Live(PageTest):
         page.wait("document.querySelectorAll('#links tbody tr').length === 4", "links")
         page.wait("/r3: no pose .*not seen/.test(document.getElementById('events').textContent)", "the event")
 
+    def test_measurements_are_drawn_from_the_side_that_has_them(self):
+        self.daemon.blind.add(4)
+        page = self.open(self.viewer, width=1280)
+        page.wait("crepes.scene.robots.length === 4", "four robots")
+        self.assertTrue(page.value("crepes.scene.robots.every(({ measured }) => measured === undefined)"))
+        page.key("m")
+        page.wait("crepes.scene.robots.every(({ measured }) => measured?.bearing && measured.range)", "rays and circles")
+        page.wait("crepes.scene.robots.every(({ name, measured }) => measured.peer_bearing === (name !== 'r4'))", "a blind side")
+        self.assertFalse(page.value("document.querySelector('[data-measured]').hidden"))
+        # The table of links marks the same: sees us, and what is lost now.
+        marked = "[...document.querySelectorAll('#links tbody tr')].map((row) => [...row.cells].filter((cell) => cell.classList.contains('bad')).map(({ cellIndex }) => cellIndex).join())"
+        page.wait(f"JSON.stringify({marked}) === JSON.stringify(['', '', '2,10', ''])", "marked cells of r4")
+
     def test_a_screen_reader_finds_names(self):
         page = self.open(self.viewer, width=1280)
         page.wait("document.querySelectorAll('#sensors .tile').length === 3", "tiles")
@@ -195,6 +208,12 @@ class Replay(PageTest):
         page.value("crepes.charts.setFocus('r2'); crepes.seek(10)")
         page.wait("crepes.charts.figures.length > 10 && crepes.charts.figures.every(({ lines }) => lines?.some(({ points }) => points.length > 100))",
                   "charts of all records")
+
+    def test_measurements_of_a_replay_are_drawn(self):
+        page = self.open(self.viewer)
+        page.value("crepes.seek(12)")
+        page.key("m")
+        page.wait("crepes.scene.time === 12 && crepes.scene.robots[0].measured?.bearing && crepes.scene.robots[0].measured.range", "rays and circles")
 
     def test_the_outline_of_an_ellipsoid_is_that_of_its_points(self):
         page = self.open(self.viewer)
