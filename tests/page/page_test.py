@@ -2,6 +2,7 @@
 """The page of crepesctl view in a real browser: what it draws, read back."""
 import json
 import math
+import subprocess
 import sys
 import tempfile
 import time
@@ -10,7 +11,7 @@ from urllib.parse import urlsplit
 
 from devtools import Browser, CannotStart
 from fake_daemon import FakeDaemon, position_of
-from viewer import RECORDING, Viewer, replayed
+from viewer import RECORDING, TOOL, Viewer, replayed
 
 class PageTest(unittest.TestCase):
     """A page per test; whatever it does, it neither complains nor speaks to any other host."""
@@ -246,6 +247,66 @@ class Replay(PageTest):
             }
             return worst; })()""")
         self.assertLess(worst, 0.05)  # px; the sampling of the surface
+
+
+class Plot(unittest.TestCase):
+    """The page of crepesctl plot: a file that needs nothing else."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.browser = Browser()
+        cls.directory = tempfile.TemporaryDirectory()
+        cls.file = f"{cls.directory.name}/plot.html"
+        subprocess.run([TOOL, "plot", str(replayed(cls.directory.name)), "--truth", str(RECORDING), "--out", cls.file], check=True, capture_output=True)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.directory.cleanup()
+
+    def open(self, **options):
+        page = self.browser.page(f"file://{self.file}", **options)
+        self.addCleanup(self.check, page)
+        page.wait("document.querySelectorAll('.charts svg[tabindex]').length > 20", "charts")
+        return page
+
+    def check(self, page):
+        self.assertEqual(page.complaints(), [])
+        self.assertEqual(page.requests(), [f"file://{self.file}"])
+        page.close()
+
+    def test_charts_enlarge_and_zoom(self):
+        page = self.open()
+        box = "(({ x, y, width, height }) => [x, y, width, height])(document.querySelectorAll('.charts svg')[1].getBoundingClientRect())"
+        page.value("document.querySelectorAll('.charts svg')[1].scrollIntoView({ block: 'center' })")
+        x, y, width, height = page.value(box)
+        page.click(x + width / 2, y + height / 2)
+        page.wait(f"{box}[2] > {1.5 * width}", "a large chart")
+        page.value("document.querySelectorAll('.charts svg')[1].focus()")
+        shown = "document.querySelectorAll('.charts svg')[1].getAttribute('viewBox').split(' ').map(Number)"
+        whole = page.value(shown)
+        page.key("+")
+        page.wait(f"{shown}[2] < {0.8 * whole[2]}", "a part of it")
+        page.key("ArrowLeft")
+        for _ in range(30):
+            page.key("-")
+        self.assertEqual(page.value(shown), whole)
+
+    def test_colors_follow_the_system(self):
+        seen = set()
+        for dark in (False, True):
+            page = self.open(dark=dark)
+            back, line = page.value("[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.querySelectorAll('.charts svg path[stroke^=var]')[0]).stroke]")
+            self.assertTrue(line.startswith("rgb("), line)
+            seen.add((back, line))
+        self.assertEqual(len(seen), 2)
+
+    def test_it_says_what_nees_and_nis_are_and_fits_a_phone(self):
+        page = self.open(width=360, height=640)
+        self.assertIn("normalized innovation squared", page.value("document.querySelector('details').textContent"))
+        self.assertLessEqual(page.value("document.documentElement.scrollWidth"), 360)
+        unnamed = [role for role, name in page.accessible() if role in ("image", "img") and not name.strip()]
+        self.assertEqual(unnamed, [])
 
 
 if __name__ == "__main__":

@@ -66,8 +66,10 @@ std::optional<std::string> unknown_subcommand(const CLI::App& app,
                                               const std::vector<std::string>& words) {
   const CLI::App* level = &app;
   for (const std::string& word : words) {
-    std::vector<std::string> names;
-    for (const CLI::App* sub : level->get_subcommands({})) names.push_back(sub->get_name());
+    const std::vector<const CLI::App*> known = level->get_subcommands({});
+    std::vector<std::string> names(known.size());
+    std::ranges::transform(known, names.begin(),
+                           [](const CLI::App* sub) { return sub->get_name(); });
     if (names.empty() || word.starts_with('-')) return std::nullopt;
     if (std::ranges::find(names, word) != names.end()) {
       level = level->get_subcommand(word);

@@ -26,7 +26,7 @@ struct MessageStream {
 /// Of `rows`; `time_s(row)` and `json(time_ns, row)`.
 template <class Row, class Time, class Json>
 MessageStream stream_of(std::string topic, MessageKind kind, const std::vector<Row>& rows,
-                        Time time_s, Json json) {
+                        const Time& time_s, const Json& json) {
   return {.topic = std::move(topic),
           .kind = std::move(kind),
           .size = rows.size(),

@@ -266,6 +266,7 @@ class Demo {
     ScreenFormat format = format_of_output();
     format.is_interactive = is_interactive;
     std::vector<DemoRow> rows;
+    rows.reserve(pairs_.size());
     for (const Pair& pair : pairs_) rows.push_back(live_row(pair));
     const std::string page = page_ ? fmt::format("page: {}\n", page_->url()) : "";
     const std::string head = fmt::format("{}world time {} s of {}\n", page, fixed(world_s(), 1),

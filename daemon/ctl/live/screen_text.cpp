@@ -112,6 +112,7 @@ std::string screen_row(const std::vector<ScreenColumn>& columns,
 
 std::string screen_titles(const std::vector<ScreenColumn>& columns, const ScreenFormat& format) {
   std::vector<std::string> titles;
+  titles.reserve(columns.size());
   for (const ScreenColumn& column : columns) titles.push_back(column.title);
   return toned(screen_row(columns, titles), Tone::kTitle, format);
 }
