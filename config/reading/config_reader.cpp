@@ -5,9 +5,10 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <limits>
-#include <numeric>
 
+#include "config/reading/spelling.hpp"
 #include "drivers/base/number_text.hpp"
 
 namespace crepes {
@@ -34,21 +35,6 @@ std::string read_numbers(const ConfigNode& node, std::string_view what, std::siz
     if (std::string reason = set(i, node.items[i]); !reason.empty()) return reason;
   }
   return "";
-}
-
-/// Levenshtein distance: the number of letters to insert, delete or replace.
-std::size_t edits_between(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
 }
 
 /// Row by row.
@@ -190,17 +176,10 @@ void ConfigReader::finish() {
 
 /// The known key that is missing and has the most similar spelling, if any is similar.
 std::optional<std::string> ConfigReader::nearest_key(std::string_view key) const {
-  constexpr std::size_t kLongest = 64;
-  if (key.size() > kLongest) return std::nullopt;
-  std::optional<std::string> nearest;
-  std::size_t fewest = 1 + key.size() / 3;
-  for (const std::string& known : known_) {
-    const std::size_t edits = edits_between(known, key);
-    if (edits > fewest || (nearest && edits == fewest) || node_.find(known) != nullptr) continue;
-    nearest = known;
-    fewest = edits;
-  }
-  return nearest;
+  std::vector<std::string> absent;
+  std::ranges::copy_if(known_, std::back_inserter(absent),
+                       [&](const std::string& known) { return node_.find(known) == nullptr; });
+  return nearest_spelling(key, absent);
 }
 
 const ConfigNode* ConfigReader::find_known(std::string_view key) {

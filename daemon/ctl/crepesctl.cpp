@@ -26,7 +26,12 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? kDone : kUsageWrong;
+    const bool is_wrong = e.get_exit_code() != 0;
+    const auto unknown = is_wrong ? unknown_subcommand(app, {argv + 1, argv + argc}) : std::nullopt;
+    if (!unknown) return app.exit(e) == 0 ? kDone : kUsageWrong;
+    std::fprintf(stderr, "crepesctl: %s\nRun with --help for more information.\n",
+                 unknown->c_str());
+    return kUsageWrong;
   }
   const Result<void> done = line.execute();
   if (done) return kDone;

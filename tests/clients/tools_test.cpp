@@ -128,6 +128,64 @@ TEST(ToolsAlone, EndWithTwoWhenTheyAreUsedWrongly) {
   EXPECT_NE(crepesctl({"--help"}).output.find("Exit codes: 0"), std::string::npos);
 }
 
+TEST(ToolsAlone, NameTheNearestSubcommand) {
+  const Ending misspelled = crepesctl({"wacht", "--once"});
+  EXPECT_EQ(misspelled.how, "exit code 2");
+  EXPECT_NE(misspelled.errors.find("crepesctl: there is no 'wacht'; did you mean 'watch'?"),
+            std::string::npos)
+      << misspelled.errors;
+
+  const Ending inner = crepesctl({"calibrate", "camrea", "--out", "x"});
+  EXPECT_NE(inner.errors.find("did you mean 'calibrate camera'?"), std::string::npos)
+      << inner.errors;
+
+  const Ending unlike = crepesctl({"xylophone"});
+  EXPECT_EQ(unlike.how, "exit code 2");
+  EXPECT_EQ(unlike.errors.find("did you mean"), std::string::npos) << unlike.errors;
+}
+
+/// Under script(1), which gives it a terminal of 80 columns: standard output and error as one.
+std::string on_a_terminal(const std::string& command, const std::string& environment = "") {
+  const Ending ending = run("/usr/bin/env", {"-u", "NO_COLOR", "TERM=xterm", "script", "-qec",
+                                             "stty cols 80 rows 24; " + environment + " " +
+                                                 crepesctl_path() + " " + command + " </dev/null",
+                                             "/dev/null"});
+  return ending.output;
+}
+
+TEST(ToolsOnATerminal, ShowABarAndRemoveIt) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const std::string replay =
+      "replay " + source_dir() + "/config/examples/recordings/two-robots --out ";
+
+  const std::string shown = on_a_terminal(replay + (scratch.path() / "out").string());
+
+  EXPECT_NE(shown.find("[#"), std::string::npos) << shown;
+  // What remains on the last line is the summary alone.
+  const std::size_t end = shown.find("2 robots");
+  ASSERT_NE(end, std::string::npos) << shown;
+  EXPECT_EQ(shown.substr(end - 2, 2), " \r");
+}
+
+/// Of one second, at ports that were free.
+std::string demo_on_a_terminal(const std::string& environment) {
+  std::string shown;
+  do {
+    shown = on_a_terminal("demo --scenario two --for 1 --port " + std::to_string(free_port()),
+                          environment);
+  } while (shown.find("choose another --port") != std::string::npos);
+  return shown;
+}
+
+TEST(ToolsOnATerminal, UseColorsUnlessTheUserDoesNotWantThem) {
+  const std::string colored = demo_on_a_terminal("");
+  const std::string plain = demo_on_a_terminal("NO_COLOR=1");
+
+  EXPECT_NE(colored.find("\x1b[1mpair"), std::string::npos) << colored;
+  EXPECT_NE(plain.find("pair"), std::string::npos) << plain;
+  EXPECT_EQ(plain.find("\x1b[1mpair"), std::string::npos) << plain;
+}
+
 TEST(ToolsAlone, MakeAKeyOnceOnly) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
   const std::string file = scratch.path() / "mesh.key";

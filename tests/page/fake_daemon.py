@@ -23,6 +23,7 @@ class FakeDaemon:
         self.watchers = {}
         self.is_over = False
         self.lost = set()  # neighbors without a pose
+        self.blind = set()  # neighbors that do not see us
         self.broken = {}  # sensors by name, with what they say
         self.sent = 0
         self.start = time.monotonic()
@@ -74,6 +75,9 @@ class FakeDaemon:
         if "about" not in request:
             wanted = [r for r in self.neighbors if request.get("peer", r) == r]
             status["neighbors"] = [self.neighbor(r, now) for r in wanted]
+            if "peer" in request:
+                for each in status["neighbors"]:
+                    each["ages_s"] = {"bearing": 0.01, "peer_bearing": 9.0 if each["peer"] in self.blind else 0.02, "range": 0.03, "imu": 0.01}
             status["clocks"] = [{"peer": r, "offset_s": -10.0 * r, "skew_ppm": 3, "sigma_s": 2e-5} for r in wanted]
         if "peer" not in request:
             status["sensors"] = [{"name": name, "rate_hz": rate, "ok": name not in self.broken, **({"message": self.broken[name]} if name in self.broken else {})}
@@ -84,4 +88,4 @@ class FakeDaemon:
         count = int(20 * (now - self.start))
         state = {"state": "none", "reason": "not seen"} if robot in self.lost else {"state": "direct"}
         return {"peer": robot, "name": f"r{robot}", **state, "measurements": {"bearing": {"fused": count, "gated": count // 50}, "range": {"fused": count}},
-                "reports": {"received": count, "lost": count // 40, "restarts": 0, "age_s": 0.02}}
+                "reports": {"received": count, "lost": count // 40, "restarts": 0, "age_s": 0.02, "loss": 0.25 if robot in self.blind else 0.0}}

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What the page costs: its size, and the server's bytes and CPU with robots at 50 Hz and open pages.
+"""What the page costs: its size, the server's bytes and CPU with robots at 50 Hz and open pages, latency and rate of the pictures.
     tests/page/measure.py [SECONDS]"""
 import gzip
 import select
@@ -62,6 +62,26 @@ def first_picture():
     return took, latency
 
 
+def live_pictures(robots, seconds):
+    """Milliseconds from the time of a POSE (sent at once) to the frame that shows it, and the pictures drawn in a second."""
+    daemon = FakeDaemon(neighbors=robots - 1)
+    viewer = Viewer("--port", daemon.port)
+    browser = Browser()
+    page = browser.page(viewer.url)
+    page.wait(f"globalThis.crepes && crepes.scene.robots.length === {robots - 1}")
+    time.sleep(1)
+    offset = time.time() - time.monotonic()  # the daemon's stamps are monotonic, the page's time is that of the wall
+    latencies, rate = page.value(f"""new Promise((done) => {{ const late = []; let last, drawn = 0; const {{ scene }} = crepes; const draw = scene.draw;
+        scene.draw = function (t) {{ ++drawn; return draw.call(this, t); }}; const start = performance.now();
+        const look = () => {{ const {{ newest }} = crepes.store;
+          if (newest.t !== last) {{ last = newest.t; late.push(performance.timeOrigin + performance.now() - 1000 * ({offset!r} + last)); }}
+          const took = performance.now() - start; took < {1000 * seconds} ? requestAnimationFrame(look) : done([late, 1000 * drawn / took]); }}; look(); }})""")
+    browser.close()
+    viewer.stop()
+    daemon.stop()
+    return sorted(latencies), rate
+
+
 if __name__ == "__main__":
     duration = float(sys.argv[1]) if len(sys.argv) > 1 else 10
     print("page: {} bytes, {} compressed".format(*size_of_the_page()))
@@ -70,6 +90,9 @@ if __name__ == "__main__":
         print(f"{robots} robots, {pages} pages: {100 * share:.1f} % of a core, {rate / 1000:.1f} kB/s to each page")
     try:
         times, period = first_picture()
+        for robots in (2, 5, 20):
+            late, pictures = live_pictures(robots, duration)
+            print(f"{robots} robots: POSE to picture {late[len(late) // 2]:.0f} ms median, {late[len(late) * 95 // 100]:.0f} ms 95 %; {pictures:.1f} pictures a second")
         print(f"first robot in the scene after {', '.join(f'{t:.2f}' for t in times)} s; frames every {1000 * period:.0f} ms")
     except CannotStart as why:
         print(why)

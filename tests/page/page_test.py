@@ -2,6 +2,7 @@
 """The page of crepesctl view in a real browser: what it draws, read back."""
 import json
 import math
+import subprocess
 import sys
 import tempfile
 import time
@@ -10,7 +11,7 @@ from urllib.parse import urlsplit
 
 from devtools import Browser, CannotStart
 from fake_daemon import FakeDaemon, position_of
-from viewer import RECORDING, Viewer, replayed
+from viewer import RECORDING, TOOL, Viewer, replayed
 
 class PageTest(unittest.TestCase):
     """A page per test; whatever it does, it neither complains nor speaks to any other host."""
@@ -99,6 +100,19 @@ class Live(PageTest):
         page.wait("document.querySelector('#neighbors .bad')?.textContent.includes('Are its LEDs on?')", "the neighbor's advice")
         page.wait("document.querySelectorAll('#links tbody tr').length === 4", "links")
         page.wait("/r3: no pose .*not seen/.test(document.getElementById('events').textContent)", "the event")
+
+    def test_measurements_are_drawn_from_the_side_that_has_them(self):
+        self.daemon.blind.add(4)
+        page = self.open(self.viewer, width=1280)
+        page.wait("crepes.scene.robots.length === 4", "four robots")
+        self.assertTrue(page.value("crepes.scene.robots.every(({ measured }) => measured === undefined)"))
+        page.key("m")
+        page.wait("crepes.scene.robots.every(({ measured }) => measured?.bearing && measured.range)", "rays and circles")
+        page.wait("crepes.scene.robots.every(({ name, measured }) => measured.peer_bearing === (name !== 'r4'))", "a blind side")
+        self.assertFalse(page.value("document.querySelector('[data-measured]').hidden"))
+        # The table of links marks the same: sees us, and what is lost now.
+        marked = "[...document.querySelectorAll('#links tbody tr')].map((row) => [...row.cells].filter((cell) => cell.classList.contains('bad')).map(({ cellIndex }) => cellIndex).join())"
+        page.wait(f"JSON.stringify({marked}) === JSON.stringify(['', '', '2,10', ''])", "marked cells of r4")
 
     def test_a_screen_reader_finds_names(self):
         page = self.open(self.viewer, width=1280)
@@ -196,6 +210,12 @@ class Replay(PageTest):
         page.wait("crepes.charts.figures.length > 10 && crepes.charts.figures.every(({ lines }) => lines?.some(({ points }) => points.length > 100))",
                   "charts of all records")
 
+    def test_measurements_of_a_replay_are_drawn(self):
+        page = self.open(self.viewer)
+        page.value("crepes.seek(12)")
+        page.key("m")
+        page.wait("crepes.scene.time === 12 && crepes.scene.robots[0].measured?.bearing && crepes.scene.robots[0].measured.range", "rays and circles")
+
     def test_the_outline_of_an_ellipsoid_is_that_of_its_points(self):
         page = self.open(self.viewer)
         # The farthest point of the ellipsoid's surface in any direction of the picture lies on the outline.
@@ -227,6 +247,66 @@ class Replay(PageTest):
             }
             return worst; })()""")
         self.assertLess(worst, 0.05)  # px; the sampling of the surface
+
+
+class Plot(unittest.TestCase):
+    """The page of crepesctl plot: a file that needs nothing else."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.browser = Browser()
+        cls.directory = tempfile.TemporaryDirectory()
+        cls.file = f"{cls.directory.name}/plot.html"
+        subprocess.run([TOOL, "plot", str(replayed(cls.directory.name)), "--truth", str(RECORDING), "--out", cls.file], check=True, capture_output=True)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.directory.cleanup()
+
+    def open(self, **options):
+        page = self.browser.page(f"file://{self.file}", **options)
+        self.addCleanup(self.check, page)
+        page.wait("document.querySelectorAll('.charts svg[tabindex]').length > 20", "charts")
+        return page
+
+    def check(self, page):
+        self.assertEqual(page.complaints(), [])
+        self.assertEqual(page.requests(), [f"file://{self.file}"])
+        page.close()
+
+    def test_charts_enlarge_and_zoom(self):
+        page = self.open()
+        box = "(({ x, y, width, height }) => [x, y, width, height])(document.querySelectorAll('.charts svg')[1].getBoundingClientRect())"
+        page.value("document.querySelectorAll('.charts svg')[1].scrollIntoView({ block: 'center' })")
+        x, y, width, height = page.value(box)
+        page.click(x + width / 2, y + height / 2)
+        page.wait(f"{box}[2] > {1.5 * width}", "a large chart")
+        page.value("document.querySelectorAll('.charts svg')[1].focus()")
+        shown = "document.querySelectorAll('.charts svg')[1].getAttribute('viewBox').split(' ').map(Number)"
+        whole = page.value(shown)
+        page.key("+")
+        page.wait(f"{shown}[2] < {0.8 * whole[2]}", "a part of it")
+        page.key("ArrowLeft")
+        for _ in range(30):
+            page.key("-")
+        self.assertEqual(page.value(shown), whole)
+
+    def test_colors_follow_the_system(self):
+        seen = set()
+        for dark in (False, True):
+            page = self.open(dark=dark)
+            back, line = page.value("[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.querySelectorAll('.charts svg path[stroke^=var]')[0]).stroke]")
+            self.assertTrue(line.startswith("rgb("), line)
+            seen.add((back, line))
+        self.assertEqual(len(seen), 2)
+
+    def test_it_says_what_nees_and_nis_are_and_fits_a_phone(self):
+        page = self.open(width=360, height=640)
+        self.assertIn("normalized innovation squared", page.value("document.querySelector('details').textContent"))
+        self.assertLessEqual(page.value("document.documentElement.scrollWidth"), 360)
+        unnamed = [role for role, name in page.accessible() if role in ("image", "img") and not name.strip()]
+        self.assertEqual(unnamed, [])
 
 
 if __name__ == "__main__":

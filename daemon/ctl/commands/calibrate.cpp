@@ -22,6 +22,12 @@ Result<void> finish(const Result<CalibrationReport>& report) {
   return fail(ErrorCode::kFormat, message);
 }
 
+Result<CalibrationReport> calibrate_camera_with_progress(CalibrateCameraOptions options) {
+  const TerminalProgress progress;
+  options.on_progress = progress.sink();
+  return calibrate_camera(options);
+}
+
 void add_imu(CommandLine& line, CLI::App* calibrate) {
   auto& options = line.make<CalibrateImuOptions>();
   CLI::App* sub = calibrate->add_subcommand(
@@ -69,10 +75,7 @@ void add_camera(CommandLine& line, CLI::App* calibrate) {
                   "crepesd.yaml")
       ->check(CLI::Range(60.0, 220.0));
   add_json_flag(sub, options.json);
-  line.run(sub, [&options] {
-    options.on_progress = progress_on_terminal();
-    return finish(calibrate_camera(options));
-  });
+  line.run(sub, [&options] { return finish(calibrate_camera_with_progress(options)); });
 }
 
 }  // namespace

@@ -1,15 +1,23 @@
 #include "daemon/ctl/commands/command_line.hpp"
 
+#include <fmt/core.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <fstream>
 #include <system_error>
 
+#include "config/reading/spelling.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
 
 namespace crepes {
+namespace {
+
+constexpr int kBarColumns = 79;
+
+}  // namespace
 
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon) {
   sub->add_option("--address", daemon.address, "where the daemon serves poses")
@@ -38,9 +46,41 @@ Result<void> write_output(const std::string& text, const std::string& file) {
   return {};
 }
 
-std::function<void(double)> progress_on_terminal() {
-  if (::isatty(STDERR_FILENO) != 1) return {};
-  return [](double share) { std::fprintf(stderr, "\r%3.0f %%\r", 100.0 * share); };
+TerminalProgress::TerminalProgress()
+    : is_terminal_(::isatty(STDERR_FILENO) == 1), bar_(clock_.now()) {}
+
+TerminalProgress::~TerminalProgress() { clear(); }
+
+std::function<void(double)> TerminalProgress::sink() const {
+  if (!is_terminal_) return {};
+  return [this](double share) {
+    std::fprintf(stderr, "\r%-*s\r", kBarColumns, bar_.text(share, clock_.now()).c_str());
+  };
+}
+
+void TerminalProgress::clear() const {
+  if (is_terminal_) std::fprintf(stderr, "\r%*s\r", kBarColumns, "");
+}
+
+std::optional<std::string> unknown_subcommand(const CLI::App& app,
+                                              const std::vector<std::string>& words) {
+  const CLI::App* level = &app;
+  for (const std::string& word : words) {
+    const std::vector<const CLI::App*> known = level->get_subcommands({});
+    std::vector<std::string> names(known.size());
+    std::ranges::transform(known, names.begin(),
+                           [](const CLI::App* sub) { return sub->get_name(); });
+    if (names.empty() || word.starts_with('-')) return std::nullopt;
+    if (std::ranges::find(names, word) != names.end()) {
+      level = level->get_subcommand(word);
+      continue;
+    }
+    const auto nearest = nearest_spelling(word, names);
+    const std::string whole = level == &app ? "" : level->get_name() + " ";
+    return fmt::format("there is no '{}{}'{}", whole, word,
+                       nearest ? fmt::format("; did you mean '{}{}'?", whole, *nearest) : "");
+  }
+  return std::nullopt;
 }
 
 }  // namespace crepes

@@ -6,10 +6,13 @@
 #include <array>
 #include <deque>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "config/schema/config.hpp"
+#include "daemon/ctl/live/progress_bar.hpp"
+#include "drivers/base/monotonic_clock.hpp"
 #include "estimator/core/result.hpp"
 #include "net/client/daemon_client.hpp"
 
@@ -74,7 +77,31 @@ void add_json_flag(CLI::App* sub, bool& json, const std::string& which = "one ob
 /// Writes to `file`, or to standard output if the name is empty.
 [[nodiscard]] Result<void> write_output(const std::string& text, const std::string& file);
 
-/// Shows progress (0 to 1) on standard error; empty if that is not a terminal.
-[[nodiscard]] std::function<void(double)> progress_on_terminal();
+/// A progress bar with the time left on standard error, if that is a terminal; its end removes it.
+class TerminalProgress {
+ public:
+  TerminalProgress();
+  TerminalProgress(const TerminalProgress&) = delete;
+  TerminalProgress& operator=(const TerminalProgress&) = delete;
+  TerminalProgress(TerminalProgress&&) = delete;
+  TerminalProgress& operator=(TerminalProgress&&) = delete;
+  ~TerminalProgress();
+
+  /// Shows the share that is done (0 to 1); empty if standard error is no terminal. Not to be
+  /// called after the end of this object.
+  [[nodiscard]] std::function<void(double)> sink() const;
+  /// Removes the bar, so that a line can be printed in its place.
+  void clear() const;
+
+ private:
+  bool is_terminal_;
+  MonotonicClock clock_;
+  ProgressBar bar_;
+};
+
+/// The subcommand that was misspelled on the command line, and the nearest one; empty if all are
+/// known. `words` are the arguments.
+[[nodiscard]] std::optional<std::string> unknown_subcommand(const CLI::App& app,
+                                                            const std::vector<std::string>& words);
 
 }  // namespace crepes

@@ -10,6 +10,7 @@ class CommandLine;
 void add_calibrate(CommandLine& line);
 void add_codebook(CommandLine& line);
 void add_completion(CommandLine& line);
+void add_convert(CommandLine& line);
 void add_demo(CommandLine& line);
 void add_devices(CommandLine& line);
 void add_evaluate(CommandLine& line);
@@ -28,24 +29,12 @@ void add_view(CommandLine& line);
 void add_watch(CommandLine& line);
 
 /// In the order of --help: running daemons, recordings, setup.
-inline constexpr std::array kCommands{&add_status,
-                                      &add_watch,
-                                      &add_view,
-                                      &add_sources,
-                                      &add_waitpose,
-                                      &add_record,
-                                      &add_replay,
-                                      &add_evaluate,
-                                      &add_plot,
-                                      &add_spots,
-                                      &add_demo,
-                                      &add_devices,
-                                      &add_calibrate,
-                                      &add_import_calibration,
-                                      &add_codebook,
-                                      &add_led,
-                                      &add_setup_witmotion,
-                                      &add_keygen,
-                                      &add_completion};
+inline constexpr std::array kCommands{&add_status,   &add_watch,     &add_view,
+                                      &add_sources,  &add_waitpose,  &add_record,
+                                      &add_replay,   &add_evaluate,  &add_plot,
+                                      &add_convert,  &add_spots,     &add_demo,
+                                      &add_devices,  &add_calibrate, &add_import_calibration,
+                                      &add_codebook, &add_led,       &add_setup_witmotion,
+                                      &add_keygen,   &add_completion};
 
 }  // namespace crepes

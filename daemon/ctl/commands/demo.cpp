@@ -8,10 +8,16 @@ namespace {
 
 constexpr double kViewFor_s = 600.0;  ///< with a page, unless --for is given
 
-Result<void> run_demo(DemoOptions options, bool json) {
+/// A live table, or a bar where standard output is for one object.
+Result<DemoSummary> demo_with_progress(DemoOptions options, bool json) {
+  const TerminalProgress progress;
   options.show_table = !json;
-  if (json) options.on_progress = progress_on_terminal();
-  return demo(options).and_then([&](const DemoSummary& summary) {
+  if (json) options.on_progress = progress.sink();
+  return demo(options);
+}
+
+Result<void> run_demo(const DemoOptions& options, bool json) {
+  return demo_with_progress(options, json).and_then([&](const DemoSummary& summary) {
     return print_result(json ? demo_json(summary) : demo_text(summary)).and_then([&] {
       return check_poses(summary);
     });

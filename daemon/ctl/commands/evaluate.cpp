@@ -4,6 +4,15 @@
 #include "daemon/ctl/commands/commands.hpp"
 
 namespace crepes {
+namespace {
+
+Result<std::string> evaluate_with_progress(EvaluateOptions options) {
+  const TerminalProgress progress;
+  options.on_progress = progress.sink();
+  return evaluate(options);
+}
+
+}  // namespace
 
 void add_evaluate(CommandLine& line) {
   auto& options = line.make<EvaluateOptions>();
@@ -19,10 +28,7 @@ void add_evaluate(CommandLine& line) {
   sub->add_option("--against", options.against,
                   "other results of the same data set; both are scored over their common rows");
   add_json_flag(sub, options.json);
-  line.run(sub, [&options] {
-    options.on_progress = progress_on_terminal();
-    return print_result(evaluate(options));
-  });
+  line.run(sub, [&options] { return print_result(evaluate_with_progress(options)); });
 }
 
 }  // namespace crepes

@@ -25,9 +25,14 @@ std::string json_of(const ReplaySummary& summary, const std::string& out) {
                     {"refused", summary.faults.counts()}});
 }
 
-Result<void> run_replay(ReplayOptions options, bool json) {
-  options.on_progress = progress_on_terminal();
-  const Result<ReplaySummary> summary = replay_swarm(options);
+Result<ReplaySummary> replay_with_progress(ReplayOptions options) {
+  const TerminalProgress progress;
+  options.on_progress = progress.sink();
+  return replay_swarm(options);
+}
+
+Result<void> run_replay(const ReplayOptions& options, bool json) {
+  const Result<ReplaySummary> summary = replay_with_progress(options);
   if (!summary) return tl::unexpected(summary.error());
   for (const std::string& fault : summary->faults.list())
     std::fprintf(stderr, "refused: %s\n", fault.c_str());

@@ -10,11 +10,16 @@ namespace crepes {
 namespace {
 
 Result<void> run_spots(SpotsOptions options) {
-  options.on_text = [](const std::string& text) { print(text); };
-  options.on_fault = [](const std::string& fault) {
+  const TerminalProgress progress;
+  options.on_text = [&](const std::string& text) {
+    progress.clear();
+    print(text);
+  };
+  options.on_fault = [&](const std::string& fault) {
+    progress.clear();
     std::fprintf(stderr, "refused: %s\n", fault.c_str());
   };
-  options.on_progress = progress_on_terminal();
+  options.on_progress = progress.sink();
   return inspect_spots(options).map([](const SpotsSummary&) {});
 }
 

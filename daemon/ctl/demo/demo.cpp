@@ -13,6 +13,7 @@
 #include "config/reading/config_file.hpp"
 #include "daemon/ctl/demo/child_process.hpp"
 #include "daemon/ctl/demo/demo_page.hpp"
+#include "daemon/ctl/demo/demo_screen.hpp"
 #include "daemon/ctl/demo/demo_swarm.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
@@ -29,7 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
-using Row = std::vector<std::string>;
 
 constexpr double kInFlight = 0.1;  // s; the last poses have not arrived when the time is over
 
@@ -93,12 +93,14 @@ class Demo {
   /// Runs until the time is over, a daemon ends, or a signal arrives.
   Result<void> run(StopSignals& stop) {
     std::optional<LiveScreen> screen;
+    std::optional<KeyReader> keys;
     if (options_.show_table) screen.emplace();
+    if (screen && screen->is_terminal()) keys.emplace();
     const Duration redraw_period =
         screen && !screen->is_terminal() ? Duration{5s} : Duration{200ms};
     Timestamp redraw = start_;
     Timestamp renewal = start_;
-    while (world_s() < options_.for_s && !stop.requested()) {
+    while (world_s() < options_.for_s && !stop.requested() && !table_.should_quit()) {
       if (auto alive = check_daemons(); !alive) return alive;
       if (clock_.now() >= renewal) {
         ask_all();
@@ -106,9 +108,13 @@ class Demo {
         renewal = clock_.now() + (has_all_poses() ? Duration{1s} : Duration{50ms});
       }
       if (auto done = listen(); !done) return done;
+      for (auto key = next_key(keys); key; key = next_key(keys)) {
+        table_.handle_key(*key);
+        redraw = clock_.now();
+      }
       if (clock_.now() < redraw) continue;
       redraw = clock_.now() + redraw_period;
-      if (screen) screen->show(table());
+      if (screen) screen->show(table(keys && keys->is_terminal()));
       if (options_.on_progress) options_.on_progress(world_s() / options_.for_s);
     }
     return {};
@@ -252,34 +258,38 @@ class Demo {
                        [](const Pair& pair) { return pair.first_pose.has_value(); });
   }
 
-  [[nodiscard]] std::string table() const {
-    std::vector<Row> rows{{"pair", "mode", "range m", "error m", "error deg", "sigma m", "deg",
-                           "age ms", "first pose s", "why not"}};
-    for (const Pair& pair : pairs_) rows.push_back(live_row(pair));
-    const std::string page = page_ ? fmt::format("page: {}\n", page_->url()) : "";
-    return fmt::format("{}world time {} s of {}\n\n{}", page, fixed(world_s(), 1),
-                       fixed(options_.for_s, 0), text_table(rows));
+  static std::optional<char> next_key(const std::optional<KeyReader>& keys) {
+    return keys ? keys->next() : std::nullopt;
   }
 
-  [[nodiscard]] Row live_row(const Pair& pair) const {
-    const std::string first = pair.first_pose ? fixed(to_seconds(*pair.first_pose), 2) : "";
+  [[nodiscard]] std::string table(bool is_interactive) const {
+    ScreenFormat format = format_of_output();
+    format.is_interactive = is_interactive;
+    std::vector<DemoRow> rows;
+    rows.reserve(pairs_.size());
+    for (const Pair& pair : pairs_) rows.push_back(live_row(pair));
+    const std::string page = page_ ? fmt::format("page: {}\n", page_->url()) : "";
+    const std::string head = fmt::format("{}world time {} s of {}\n", page, fixed(world_s(), 1),
+                                         fixed(options_.for_s, 0));
+    return table_.text(head, rows, format);
+  }
+
+  [[nodiscard]] DemoRow live_row(const Pair& pair) const {
+    DemoRow row{.pair = name_of(pair), .known = {}, .reason = pair.view.reason()};
+    if (pair.first_pose) row.first_pose_s = to_seconds(*pair.first_pose);
     const NeighborPose* pose = pair.view.pose(clock_.now());
-    if (pose == nullptr) {
-      return {name_of(pair), "-", "", "", "", "", "", "", first, pair.view.reason()};
-    }
+    if (pose == nullptr) return row;
     const Pose T_B_N = truth(pair, pose->stamp);
     const Vector6d d = pose_difference(pose->T_B_N.pose, T_B_N);
     const PoseSigma sigma = sigma_of(pose->T_B_N.covariance);
-    return {name_of(pair),
-            std::string(crepes::name_of(pose->mode)),
-            fixed(T_B_N.p.norm(), 2),
-            fixed(d.head<3>().norm(), 3),
-            fixed(kDegPerRad * d.tail<3>().norm(), 2),
-            fixed(sigma.position_m, 3),
-            fixed(kDegPerRad * sigma.rotation_rad, 2),
-            fixed(1e3 * to_seconds(pose->published - pose->stamp), 1),
-            first,
-            ""};
+    row.known = {.mode = std::string(crepes::name_of(pose->mode)),
+                 .range_m = T_B_N.p.norm(),
+                 .error_m = d.head<3>().norm(),
+                 .error_deg = kDegPerRad * d.tail<3>().norm(),
+                 .sigma_m = sigma.position_m,
+                 .sigma_deg = kDegPerRad * sigma.rotation_rad,
+                 .age_ms = 1e3 * to_seconds(pose->published - pose->stamp)};
+    return row;
   }
 
   [[nodiscard]] PairScore score_of(const Pair& pair) const {
@@ -296,6 +306,7 @@ class Demo {
   std::vector<RunningRobot> robots_;
   std::vector<ChildProcess> daemons_;  ///< one for each of robots_, while they run
   std::optional<DemoPage> page_;
+  DemoScreen table_;
   std::vector<Pair> pairs_;
   std::map<std::pair<RobotId, RobotId>, std::size_t> pair_index_;
   double end_s_ = 0.0;  ///< world time at the end

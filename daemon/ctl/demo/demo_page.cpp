@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -27,8 +28,12 @@ Result<DemoPage> DemoPage::start(const std::filesystem::path& tool,
 Result<void> DemoPage::check() {
   const auto& reason = process_.exit_reason();
   if (!reason) return {};
-  return fail(ErrorCode::kIo, fmt::format("crepesctl view ended: {}\n{}", *reason,
-                                          read_text_file(log_).value_or("")));
+  // The program says its name before each of its messages, and ours comes before this one.
+  constexpr std::string_view kName = "crepesctl: ";
+  std::string text = read_text_file(log_).value_or("");
+  if (text.starts_with(kName)) text.erase(0, kName.size());
+  text.erase(text.find_last_not_of('\n') + 1);
+  return fail(ErrorCode::kIo, fmt::format("the page ended, {}: {}", *reason, text));
 }
 
 std::string DemoPage::url() const {

@@ -5,10 +5,35 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <sstream>
+#include <string_view>
 
 namespace crepes {
+namespace {
+
+/// Of the terminal at standard output; as of old where it does not say.
+winsize size_of_terminal() {
+  winsize size{};
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_row == 0 || size.ws_col == 0)
+    size = {.ws_row = 24, .ws_col = 80, .ws_xpixel = 0, .ws_ypixel = 0};
+  return size;
+}
+
+std::string_view environment(const char* name) {
+  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing sets it
+  return value == nullptr ? std::string_view() : value;
+}
+
+}  // namespace
+
+ScreenFormat format_of_output() {
+  if (::isatty(STDOUT_FILENO) != 1) return {};
+  return {.columns = size_of_terminal().ws_col,
+          .is_interactive = false,
+          .has_color = environment("NO_COLOR").empty() && environment("TERM") != "dumb"};
+}
 
 StopSignals::StopSignals() {
   sigemptyset(&signals_);
@@ -63,14 +88,12 @@ void LiveScreen::show(const std::string& text) const {
     print(text + "\n");
     return;
   }
-  winsize size{};
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_row == 0 || size.ws_col == 0)
-    size = {.ws_row = 24, .ws_col = 80, .ws_xpixel = 0, .ws_ypixel = 0};
+  const winsize size = size_of_terminal();
   std::string screen = "\x1b[H";
   std::istringstream lines(text);
   std::string line;
   for (int row = 1; row < size.ws_row && std::getline(lines, line); ++row)
-    screen += line.substr(0, size.ws_col) + "\x1b[K\n";
+    screen += "\x1b[K" + cut(line, size.ws_col) + "\n";
   print(screen + "\x1b[J");
 }
 

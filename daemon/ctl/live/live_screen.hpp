@@ -7,6 +7,8 @@
 #include <optional>
 #include <string>
 
+#include "daemon/ctl/live/screen_text.hpp"
+
 namespace crepes {
 
 /// Blocks SIGINT, SIGTERM and SIGHUP during its lifetime, so that child processes can be stopped
@@ -28,6 +30,10 @@ class StopSignals {
   sigset_t before_{};
   bool requested_ = false;
 };
+
+/// The width of the terminal at standard output, and whether it shows colors: not where the
+/// environment has NO_COLOR (no-color.org) or TERM=dumb. A file has room for all columns.
+[[nodiscard]] ScreenFormat format_of_output();
 
 /// Standard output: the terminal's alternate screen, which the destructor leaves again. Plain lines
 /// if it is not a terminal.

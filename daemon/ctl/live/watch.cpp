@@ -79,7 +79,7 @@ Result<void> show_once(const WatchOptions& options) {
   Completeness complete;
   return converse(options, screen, [&](const auto& /*answer*/, Timestamp now) {
     if (!complete.reached(screen, now)) return true;
-    print(screen.text(now, false));
+    print(screen.text(now, format_of_output()));
     return false;
   });
 }
@@ -98,7 +98,9 @@ Result<void> show_live(const WatchOptions& options) {
     }
     if (now < next) return !screen.should_quit();
     next = now + period;
-    terminal.show(screen.text(now, is_interactive));
+    ScreenFormat format = format_of_output();
+    format.is_interactive = is_interactive;
+    terminal.show(screen.text(now, format));
     return !screen.should_quit();
   });
 }

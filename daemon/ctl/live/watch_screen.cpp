@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "daemon/ctl/text_table.hpp"
 #include "estimator/core/constants.hpp"
@@ -21,29 +22,78 @@ constexpr Duration kMaxPoseAge =
     std::chrono::seconds{3};  ///< a daemon silent for longer does not run
 constexpr std::array<std::string_view, 5> kOrders{"id", "name", "distance", "sigma", "age"};
 
-/// "x y z" with a fixed width, so that columns do not move.
-std::string triple(const Eigen::Vector3d& v, int decimals) {
-  std::string text;
-  for (const double x : v) {
-    const std::string cell = fixed(x, decimals);
-    text += std::string(cell.size() < 8 ? 8 - cell.size() : 1, ' ') + cell;
+/// The columns of the table, and the decimals of its numbers.
+struct Layout {
+  std::vector<ScreenColumn> columns;
+  int position;
+  int angle;
+  int sigma_deg;
+};
+
+/// Of 79 columns, or of 109 where there is room for more digits.
+Layout layout_of(const ScreenFormat& format) {
+  constexpr std::size_t kWide = 109;
+  if (format.columns >= kWide) {
+    return {.columns = {{"neighbor", 14},
+                        {"mode", 10},
+                        {"x m", 9},
+                        {"y m", 9},
+                        {"z m", 9},
+                        {"roll", 8},
+                        {"pitch", 8},
+                        {"yaw deg", 8},
+                        {"sigma m", 10},
+                        {"sigma deg", 10},
+                        {"age ms", 7},
+                        {"Hz", 7}},
+            .position = 3,
+            .angle = 1,
+            .sigma_deg = 2};
   }
-  return text;
+  return {.columns = {{"neighbor", 10},
+                      {"mode", 10},
+                      {"x m", 7},
+                      {"y m", 7},
+                      {"z m", 7},
+                      {"roll", 5},
+                      {"pitch", 6},
+                      {"yaw", 5},
+                      {"+-m", 7},
+                      {"+-deg", 6},
+                      {"ms", 5},
+                      {"Hz", 4}},
+          .position = 2,
+          .angle = 0,
+          .sigma_deg = 1};
 }
 
-Row row_of(const std::string& name, const NeighborView& view, Timestamp now) {
+/// Instead of numbers, the reason why there is no pose, in full.
+std::string reason_line(const std::string& name, const std::string& reason, const Layout& layout,
+                        const ScreenFormat& format) {
+  const Row cells{name, toned_mode("none", format)};
+  const std::string begin = screen_row(layout.columns, cells) + "  ";
+  const std::size_t indent = columns_of(begin);
+  return begin + wrapped(reason, format.columns, indent, indent);
+}
+
+std::string line_of(const std::string& name, const NeighborView& view, Timestamp now,
+                    const ScreenFormat& format) {
+  const Layout layout = layout_of(format);
   const NeighborPose* pose = view.pose(now);
-  if (pose == nullptr) return {name, "-", "", "", "", "", "", "", view.reason()};
+  if (pose == nullptr) return reason_line(name, view.reason(), layout, format);
   const PoseSigma sigma = sigma_of(pose->T_B_N.covariance);
-  return {name,
-          std::string(name_of(pose->mode)),
-          triple(pose->T_B_N.pose.p, 3),
-          triple(kDegPerRad * roll_pitch_yaw_of(pose->T_B_N.pose.q), 1),
-          fixed(sigma.position_m, 3),
-          fixed(kDegPerRad * sigma.rotation_rad, 2),
-          fixed(1e3 * pose->age_s, 0),
-          fixed(view.rate_hz(now), 0),
-          ""};
+  Row cells{name, toned_mode(name_of(pose->mode), format)};
+  const auto add = [&](double value, int decimals) {
+    cells.push_back(fitted(value, decimals, layout.columns[cells.size()].width - 1));
+  };
+  for (const double x : pose->T_B_N.pose.p) add(x, layout.position);
+  for (const double angle : roll_pitch_yaw_of(pose->T_B_N.pose.q))
+    add(kDegPerRad * angle, layout.angle);
+  add(sigma.position_m, 3);
+  add(kDegPerRad * sigma.rotation_rad, layout.sigma_deg);
+  add(1e3 * pose->age_s, 0);
+  add(view.rate_hz(now), 0);
+  return screen_row(layout.columns, cells);
 }
 
 /// The sort key of a neighbor; neighbors without a pose come last.
@@ -62,21 +112,51 @@ double rank_of(const NeighborView& view, WatchScreen::Order order, Timestamp now
   }
 }
 
-std::string details_of(const StatusMessage::Neighbor& neighbor) {
-  std::vector<Row> rows{{"source", "age ms", "totals"}};
+/// The age and the totals of each kind of measurement.
+std::string details_of(const StatusMessage::Neighbor& neighbor, const ScreenFormat& format) {
+  const std::vector<ScreenColumn> columns{{"source", 14}, {"age ms", 8}};
+  std::string text =
+      screen_titles(columns, format) + toned("  totals", Tone::kTitle, format) + "\n";
+  const auto add = [&](const std::string& kind, double age_s, const std::string& totals) {
+    const std::string begin = screen_row(columns, {kind, fixed(1e3 * age_s, 0)}) + "  ";
+    const std::size_t indent = columns_of(begin);
+    text += begin + wrapped(totals, format.columns, indent, indent) + "\n";
+  };
   for (const auto& [kind, totals] : neighbor.measurements) {
-    std::string text;
+    std::string counts;
     for (const auto& [verdict, total] : totals)
-      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", verdict, total);
+      counts += fmt::format("{}{} {}", counts.empty() ? "" : ", ", verdict, total);
     const auto age = neighbor.ages_s.find(kind);
-    rows.push_back({kind, age == neighbor.ages_s.end() ? "-" : fixed(1e3 * age->second, 0), text});
+    add(kind, age == neighbor.ages_s.end() ? std::nan("") : age->second, counts);
   }
   if (neighbor.reports) {
-    rows.push_back(
-        {"reports", fixed(1e3 * neighbor.reports->age_s, 0),
-         fmt::format("received {}, lost {}", neighbor.reports->received, neighbor.reports->lost)});
+    add("reports", neighbor.reports->age_s,
+        fmt::format("received {}, lost {}", neighbor.reports->received, neighbor.reports->lost));
   }
-  return text_table(rows);
+  return text;
+}
+
+std::string help_text(const ScreenFormat& format) {
+  return toned("Keys", Tone::kTitle, format) +
+         R"(
+  q              quit
+  ?              this help; any other key closes it
+  s              sort by the next of id, name, distance, sigma, age
+  j k, arrows    pick a neighbor
+  Enter          its measurements, or no longer
+
+)" + toned("Columns", Tone::kTitle, format) +
+         R"(
+  mode           direct: measured by this robot within the last second or so
+                 graph: located through other robots
+                 predicted: carried on by both IMUs, nothing is measured
+                 none: no pose, and why
+  x y z          the neighbor in this robot's body: ahead, left, up, meters
+  roll pitch yaw its attitude against this robot's, degrees
+  +-m, +-deg     one sigma of position and attitude, in the worst direction
+  ms             age of the pose when it was published
+  Hz             poses per second
+)";
 }
 
 }  // namespace
@@ -118,9 +198,17 @@ void WatchScreen::handle_key(char key) {
     escape_.clear();
     return;
   }
+  handle_command(key);
+}
+
+void WatchScreen::handle_command(char key) {
+  if (std::exchange(shows_help_, false) && key != 'q') return;
   switch (key) {
     case 'q':
       quit_ = true;
+      break;
+    case '?':
+      shows_help_ = true;
       break;
     case 's':
       order_ = static_cast<Order>((static_cast<std::size_t>(order_) + 1) % kOrders.size());
@@ -170,38 +258,57 @@ std::vector<RobotId> WatchScreen::ordered(Timestamp now) const {
   return ids;
 }
 
-std::string WatchScreen::head(Timestamp now) const {
+std::string WatchScreen::head(Timestamp now, const ScreenFormat& format) const {
   std::string head = "waiting for the daemon\n";
+  const auto add = [&](const std::string& what, Tone tone) {
+    head += toned(wrapped(what, format.columns, 2), tone, format) + "\n";
+  };
   if (status_) {
-    head = fmt::format("robot {} {}, up {} s, {} % of a core, {} MB\n", status_->self.value,
-                       status_->name, fixed(status_->uptime_s, 0), fixed(100.0 * cpu_share_, 1),
-                       fixed(status_->rss_mb, 0));
+    head.clear();
+    add(fmt::format("robot {} {}, up {} s, {} % of a core, {} MB", status_->self.value,
+                    status_->name, fixed(status_->uptime_s, 0), fixed(100.0 * cpu_share_, 1),
+                    fixed(status_->rss_mb, 0)),
+        Tone::kTitle);
     for (const StatusMessage::Sensor& sensor : status_->sensors) {
-      if (!sensor.ok) {
-        head +=
-            fmt::format("{}: {}\n", sensor.name, sensor.message.empty() ? "fault" : sensor.message);
-      }
+      if (sensor.ok) continue;
+      const std::string what = sensor.message.empty() ? "fault" : sensor.message;
+      add(fmt::format("{}: {}", sensor.name, what), Tone::kBad);
     }
   }
-  if (last_message_time_ && now - *last_message_time_ > kMaxPoseAge)
-    head += fmt::format("no answer for {} s\n", fixed(to_seconds(now - *last_message_time_), 0));
-  if (!error_.empty()) head += fmt::format("daemon: {}\n", error_);
+  if (last_message_time_ && now - *last_message_time_ > kMaxPoseAge) {
+    add(fmt::format("no answer for {} s", fixed(to_seconds(now - *last_message_time_), 0)),
+        Tone::kBad);
+  }
+  if (!error_.empty()) add("daemon: " + error_, Tone::kBad);
   return head;
 }
 
-std::string WatchScreen::text(Timestamp now, bool is_interactive) const {
-  std::vector<Row> rows{{"neighbor", "mode", "position x y z [m]", "roll pitch yaw [deg]",
-                         "sigma m", "deg", "age ms", "rate Hz", "why not"}};
+std::string WatchScreen::table(Timestamp now, const ScreenFormat& format) const {
+  std::string text = screen_titles(layout_of(format).columns, format) + "\n";
   for (const RobotId id : ordered(now)) {
-    const std::string mark = !is_interactive ? "" : (picked_ == id ? "> " : "  ");
-    rows.push_back(row_of(mark + name_of_robot(id), neighbors_.at(id), now));
+    const std::string mark = !format.is_interactive ? "" : (picked_ == id ? "> " : "  ");
+    text += line_of(mark + name_of_robot(id), neighbors_.at(id), now, format) + "\n";
   }
-  std::string text = head(now) + "\n" + text_table(rows);
-  if (!is_interactive) return text;
-  if (shows_details_ && picked_ && details_ && details_->neighbor == *picked_)
-    text += fmt::format("\n{}\n{}", name_of_robot(*picked_), details_of(*details_));
-  return text + "\nq quit   s sort (" + std::string(kOrders.at(static_cast<std::size_t>(order_))) +
-         ")   j k or arrows pick   Enter details\n";
+  return text;
+}
+
+std::string WatchScreen::foot(const ScreenFormat& format) const {
+  const std::string legend = "direct: measured now   graph: by way of others   predicted: by IMUs";
+  const std::string keys =
+      fmt::format("q quit   ? help   s sort ({})   j k or arrows pick   Enter details",
+                  kOrders.at(static_cast<std::size_t>(order_)));
+  return toned(legend, Tone::kDim, format) + "\n" + toned(keys, Tone::kDim, format) + "\n";
+}
+
+std::string WatchScreen::text(Timestamp now, const ScreenFormat& format) const {
+  if (shows_help_) return help_text(format);
+  std::string text = head(now, format) + "\n" + table(now, format);
+  if (!format.is_interactive) return text;
+  if (shows_details_ && picked_ && details_ && details_->neighbor == *picked_) {
+    text += "\n" + toned(name_of_robot(*picked_), Tone::kTitle, format) + "\n" +
+            details_of(*details_, format);
+  }
+  return text + "\n" + foot(format);
 }
 
 }  // namespace crepes

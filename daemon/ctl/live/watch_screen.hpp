@@ -1,4 +1,4 @@
-/// The screen of crepesctl watch, and its keys. Pure: keys and messages in, text out.
+/// The screen of crepesctl watch, its keys and its help. Pure: keys and messages in, text out.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/ctl/live/neighbor_view.hpp"
+#include "daemon/ctl/live/screen_text.hpp"
 #include "net/client/daemon_client.hpp"
 
 namespace crepes {
@@ -18,8 +19,9 @@ class WatchScreen {
 
   /// `now` is the client's time.
   void handle_message(const DaemonMessage& message, Timestamp now);
-  /// q quits; s sorts by the next column; j and k (or the arrows, as ESC [ B and ESC [ A) pick a
-  /// neighbor; Enter shows or hides its details. Other keys do nothing.
+  /// q quits; ? shows the help, which any other key closes; s sorts by the next column; j and k (or
+  /// the arrows, as ESC [ B and ESC [ A) pick a neighbor; Enter shows or hides its details. Other
+  /// keys do nothing.
   void handle_key(char key);
 
   [[nodiscard]] bool should_quit() const { return quit_; }
@@ -28,12 +30,16 @@ class WatchScreen {
   [[nodiscard]] std::optional<Timestamp> last_message_time() const { return last_message_time_; }
   [[nodiscard]] bool has_status() const { return status_.has_value(); }
 
-  /// The table; with a help line and the picked neighbor's details if `is_interactive`.
-  [[nodiscard]] std::string text(Timestamp now, bool is_interactive) const;
+  /// The table. If the format is interactive, also a legend, the keys and the picked neighbor's
+  /// details, or the help. No line is longer than the format has columns, if it has at least 80.
+  [[nodiscard]] std::string text(Timestamp now, const ScreenFormat& format) const;
 
  private:
   void handle_status(const StatusMessage& status, Timestamp now);
-  [[nodiscard]] std::string head(Timestamp now) const;
+  void handle_command(char key);
+  [[nodiscard]] std::string head(Timestamp now, const ScreenFormat& format) const;
+  [[nodiscard]] std::string table(Timestamp now, const ScreenFormat& format) const;
+  [[nodiscard]] std::string foot(const ScreenFormat& format) const;
   [[nodiscard]] std::string name_of_robot(RobotId id) const;
   [[nodiscard]] std::vector<RobotId> ordered(Timestamp now) const;
   void pick(int step);
@@ -49,6 +55,7 @@ class WatchScreen {
   std::optional<RobotId> picked_;
   Timestamp last_{};  ///< of the last message
   bool shows_details_ = false;
+  bool shows_help_ = false;
   bool quit_ = false;
   std::string escape_;  ///< the bytes so far of a key that sends several
 };

@@ -11,7 +11,7 @@
 #include "daemon/ctl/dataset/swarm_manifest.hpp"
 #include "daemon/ctl/dataset/truth.hpp"
 #include "daemon/ctl/score/plot_pair.hpp"
-#include "daemon/ctl/score/plot_style.hpp"
+#include "daemon/ctl/score/plot_parts.hpp"
 #include "daemon/ctl/score/svg_chart.hpp"
 #include "drivers/dataset/part_file.hpp"
 
@@ -50,6 +50,7 @@ Result<PairData> load_pair(const PlotOptions& options, const PairName& name) {
                     .measurements = std::move(files.measurements),
                     .calibrations = std::move(files.calibrations),
                     .truth = {},
+                    .observer_truth = {},
                     .seconds = {},
                     .duration_s = 0.0};
   });
@@ -70,6 +71,9 @@ Result<void> set_time_axis(const std::optional<PlottedRecording>& recording,
   if (!neighbor) return tl::unexpected(neighbor.error());
   pair.truth = [&recording, B = observer->id, N = neighbor->id](Timestamp local) {
     return recording->truth.relative(B, N, local);
+  };
+  pair.observer_truth = [&recording, B = *observer](Timestamp local) {
+    return recording->truth.pose(B.id, B.clock.true_s(local));
   };
   pair.seconds = [clock = observer->clock](Timestamp local) { return clock.true_s(local); };
   pair.duration_s = recording->manifest.duration_s;
@@ -95,9 +99,13 @@ std::string table_row(const std::vector<std::string>& cells, const char* tag,
 
 std::string page_of(const PlotOptions& options, const std::vector<PairData>& pairs) {
   const std::string title = "CREPES replay " + xml_escaped(options.results.string());
+  // The page loads nothing: neither style, nor script, nor picture of anybody else.
   std::string html = fmt::format(
-      "<!DOCTYPE html>\n<html lang='en'><head><meta "
-      "charset='utf-8'><title>{0}</title>\n<style>{1}</style></head><body>\n<h1>{0}</h1>\n",
+      "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
+      "<meta name='viewport' content='width=device-width, initial-scale=1'>"
+      "<meta http-equiv='Content-Security-Policy' content=\"default-src 'none'; "
+      "style-src 'unsafe-inline'; script-src 'unsafe-inline'\">"
+      "<title>{0}</title>\n<style>{1}</style></head><body>\n<h1>{0}</h1>\n",
       title, kPlotStyle);
   html += options.swarm.empty() ? "<p>Without truth: uncertainties only.</p>\n"
                                 : fmt::format("<p>Against the truth of {}.</p>\n",
@@ -109,14 +117,15 @@ std::string page_of(const PlotOptions& options, const std::vector<PairData>& pai
     html += fmt::format("<a href='#{}'>{} → {}</a>", xml_escaped(anchor(pair)),
                         xml_escaped(pair.observer), xml_escaped(pair.neighbor));
   }
-  html += "</nav>\n<table>" + table_row(summary_header(), "th");
+  html += fmt::format("</nav>\n{}<div class='wide'><table>", kPlotReading) +
+          table_row(summary_header(), "th");
   for (const PairData& pair : pairs) html += table_row(summary_row(pair), "td", anchor(pair));
-  html += "</table>\n";
+  html += "</table></div>\n";
   for (const PairData& pair : pairs) {
     html += fmt::format("<h2 id='{}'>{} as seen by {}</h2>\n{}", xml_escaped(anchor(pair)),
                         xml_escaped(pair.neighbor), xml_escaped(pair.observer), pair_charts(pair));
   }
-  return html + "</body></html>\n";
+  return fmt::format("{}<script>{}</script></body></html>\n", html, kPlotScript);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,12 +18,17 @@ namespace {
 constexpr std::size_t kBuckets = 220;  // per line, to keep the page small
 constexpr std::size_t kSlow = 100;     // points of a slowly changing line
 constexpr std::size_t kMostPoints = 400;
+constexpr std::size_t kMostPathPoints = 1000;
 constexpr double kMaxLineGap = 0.3;  // s; a longer one breaks a line
 constexpr std::array kAxes{"x", "y", "z"};
-constexpr std::array kAxisColors{"#c0392b", "#27853b", "#2464b4"};
-constexpr std::string_view kErrorColor = "#1f4e9c";
-constexpr std::string_view kGatedColor = "#d62728";
-constexpr std::array<std::string_view, 3> kModeColors{"#3a9d5d", "#e3a21a", "#9a9a9a"};
+// Of the page's style sheet, light or dark.
+constexpr std::array kAxisColors{"var(--axis-x)", "var(--axis-y)", "var(--axis-z)"};
+constexpr std::string_view kErrorColor = "var(--accent)";
+constexpr std::string_view kGatedColor = "var(--bad)";
+constexpr std::string_view kTruthColor = "var(--soft)";
+constexpr std::string_view kObserverColor = "var(--axis-y)";
+constexpr std::array<std::string_view, 3> kModeColors{"var(--direct)", "var(--graph)",
+                                                      "var(--predicted)"};
 
 std::string heading(const std::string& text, const std::string& remark = {}) {
   return fmt::format("<h3>{}</h3>\n{}", text,
@@ -82,6 +88,81 @@ SvgChart component_chart(const PairData& pair, Eigen::Index component) {
   return chart;
 }
 
+/// Where both robots went: in the world, or with no truth the neighbor in the observer's body.
+struct Paths {
+  std::vector<Eigen::Vector3d> observer;
+  std::vector<Eigen::Vector3d> neighbor;
+  std::vector<Eigen::Vector3d> estimate;  ///< of the neighbor, from the observer's true pose
+};
+
+Paths paths_of(const PairData& pair) {
+  Paths paths;
+  const std::size_t stride = pair.poses.size() / kMostPathPoints + 1;
+  for (std::size_t i = 0; i < pair.poses.size(); i += stride) {
+    const NeighborPose& pose = pair.poses[i];
+    if (!pair.truth) {
+      paths.estimate.push_back(pose.T_B_N.pose.p);
+      continue;
+    }
+    const auto T_W_B = pair.observer_truth(pose.stamp);
+    const auto T_B_N = pair.truth(pose.stamp);
+    if (!T_W_B || !T_B_N) continue;
+    paths.observer.push_back(T_W_B->p);
+    paths.neighbor.push_back(*T_W_B * T_B_N->p);
+    paths.estimate.push_back(*T_W_B * pose.T_B_N.pose.p);
+  }
+  return paths;
+}
+
+Series projected(const std::vector<Eigen::Vector3d>& path, Eigen::Index right, Eigen::Index up) {
+  Series series;
+  series.reserve(path.size());
+  for (const Eigen::Vector3d& p : path) series.push_back({p(right), p(up)});
+  return series;
+}
+
+/// The smallest square around all points, and a little more: axes have the same scale.
+void set_square(SvgChart& chart, const std::vector<Series>& all) {
+  Eigen::AlignedBox2d box;
+  for (const Series& series : all)
+    for (const ChartPoint& point : series) box.extend(Eigen::Vector2d(point.x, point.y));
+  if (box.isEmpty()) return;
+  const double half = 0.54 * std::max(0.1, box.sizes().maxCoeff());
+  const Eigen::Vector2d center = box.center();
+  chart.set_x_range(center.x() - half, center.x() + half);
+  chart.set_y_range(center.y() - half, center.y() + half);
+}
+
+/// The paths as seen along an axis; `right` and `up` are the axes that are drawn.
+SvgChart path_chart(const PairData& pair, const Paths& paths, const std::string& title,
+                    Eigen::Index right, Eigen::Index up) {
+  const auto axis = [](Eigen::Index i) {
+    return fmt::format("{} [m]", kAxes.at(static_cast<std::size_t>(i)));
+  };
+  // The plotting area of this size is a square.
+  SvgChart chart({.title = title, .x = axis(right), .y = axis(up)}, {.width = 520, .height = 520});
+  const Series observer = projected(paths.observer, right, up);
+  const Series neighbor = projected(paths.neighbor, right, up);
+  const Series estimate = projected(paths.estimate, right, up);
+  set_square(chart, {observer, neighbor, estimate});
+  chart.add_points(estimate, kErrorColor, pair.neighbor + ", estimate");
+  if (pair.truth) {
+    chart.add_line(observer, kObserverColor, pair.observer + ", truth");
+    chart.add_line(neighbor, kTruthColor, pair.neighbor + ", truth");
+  }
+  return chart;
+}
+
+std::string path_charts(const PairData& pair) {
+  const Paths paths = paths_of(pair);
+  const std::string remark =
+      pair.truth ? "In the world. The estimate is drawn from where the observer truly is."
+                 : "The neighbor in the observer's body, x ahead and y left: without truth nobody "
+                   "knows where the observer is.";
+  return heading("Paths", remark) + group({path_chart(pair, paths, "from above", 0, 1),
+                                           path_chart(pair, paths, "from the side", 0, 2)});
+}
+
 SvgChart mode_strip(const PairData& pair) {
   SvgChart chart({.title = "availability", .x = "time [s]", .y = ""},
                  {.width = 1060, .height = 96});
@@ -116,7 +197,7 @@ SvgChart age_histogram(const PairData& pair) {
   }
   SvgChart chart({.title = "age of the state when it leaves", .x = "age [ms]", .y = "poses"});
   chart.set_x_range(0.0, kBin * kBins);
-  chart.add_bars(bars, 0.9 * kBin, "#6b8fc7");
+  chart.add_bars(bars, 0.9 * kBin, kErrorColor);
   return chart;
 }
 
@@ -275,8 +356,8 @@ std::string pair_charts(const PairData& pair) {
     components.push_back(component_chart(pair, i + 3));
   }
   return group({mode_strip(pair)}) + heading(pair.truth ? "Errors" : "Uncertainty") +
-         group(components) + innovation_charts(pair) + calibration_charts(pair) +
-         heading("Latency") + group({age_histogram(pair)});
+         group(components) + path_charts(pair) + innovation_charts(pair) +
+         calibration_charts(pair) + heading("Latency") + group({age_histogram(pair)});
 }
 
 }  // namespace crepes

@@ -18,7 +18,8 @@ struct PairData {
   std::vector<NeighborPose> poses;
   std::vector<MeasurementRecord> measurements;  ///< empty if replay wrote none
   std::vector<CalibrationRecord> calibrations;
-  RelativeTruth truth;                       ///< empty without truth
+  RelativeTruth truth;                       ///< T_B_N; empty without truth
+  RelativeTruth observer_truth;              ///< T_W_B; empty without truth
   std::function<double(Timestamp)> seconds;  ///< since the recording began
   double duration_s = 0.0;
 };

@@ -128,7 +128,7 @@ void SvgChart::add_points(const Series& series, std::string_view color, std::str
 }
 
 void SvgChart::add_level(double y, std::string_view name) {
-  add(Kind::kLevel, {}, "#555", name);
+  add(Kind::kLevel, {}, "var(--soft)", name);
   layers_.back().value = y;
 }
 

@@ -26,7 +26,8 @@ using Series = std::vector<ChartPoint>;
 /// Escapes `&`, `<`, `>` and quotes for XML.
 [[nodiscard]] std::string xml_escaped(std::string_view text);
 
-/// One pair of axes. The axes fit the content unless a range is set.
+/// One pair of axes. The axes fit the content unless a range is set. Colors are those of CSS, and
+/// may be variables of the page's style sheet.
 class SvgChart {
  public:
   struct Labels {

@@ -1,5 +1,6 @@
 #include "daemon/ctl/score/plot.hpp"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -121,10 +122,37 @@ TEST_F(Plot, DrawsErrorsInnovationsAndBiasesOnOnePage) {
   EXPECT_NE(html.find("gyro bias of the observer"), std::string::npos);
   EXPECT_NE(html.find("age of the state"), std::string::npos);
   EXPECT_NE(html.find(">predicted<"), std::string::npos);
-  EXPECT_EQ(count_of(html, "<svg"), 1U + 6U + 1U + 7U + 1U);
+  EXPECT_EQ(count_of(html, "<svg"), 1U + 6U + 2U + 1U + 7U + 1U);
   EXPECT_EQ(count_of(html, "<svg"), count_of(html, "</svg>"));
   EXPECT_EQ(count_of(html, "nan"), 0U);
-  EXPECT_EQ(count_of(html, "<script"), 0U);
+  EXPECT_EQ(count_of(html, "<script>"), 1U);
+  EXPECT_NE(html.find("default-src 'none'"), std::string::npos);
+  EXPECT_EQ(html.find("http://"), std::string::npos) << "the page needs nobody else";
+}
+
+TEST_F(Plot, DrawsPathsWithEqualScales) {
+  write_results(ReplayOutput::Detail::kPoses);
+
+  const std::string html = page({.results = results(), .swarm = swarm_.dir(), .out = {}});
+
+  const std::string above = html.substr(html.find(">from above<"));
+  EXPECT_NE(above.find("r1, truth"), std::string::npos);
+  EXPECT_NE(above.find("r2, estimate"), std::string::npos);
+  // r1 at 0, the true r2 at 2 and the estimate at 2.1 on 448 px for 1.08 * 2.1 m.
+  const double scale = 448.0 / (1.08 * 2.1);
+  const auto u = [&](double x) {
+    return fmt::format("M{:.1f},", 62.0 + 224.0 + scale * (x - 1.05));
+  };
+  for (const double x : {0.0, 2.0, 2.1}) EXPECT_NE(above.find(u(x)), std::string::npos) << u(x);
+}
+
+TEST_F(Plot, ExplainsItsWords) {
+  write_results(ReplayOutput::Detail::kPoses);
+
+  const std::string html = page({.results = results(), .swarm = {}, .out = {}});
+
+  for (const char* word : {"NEES, normalized", "NIS, normalized", "3 sigma", "gated"})
+    EXPECT_NE(html.find(word), std::string::npos) << word;
 }
 
 TEST_F(Plot, ExplainsWhyFewBearingsLieAboveTheBoundOfTheNis) {

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
+#include <numbers>
+#include <sstream>
 
 namespace crepes {
 namespace {
@@ -10,6 +13,8 @@ namespace {
 using std::chrono::seconds;
 
 constexpr Timestamp kStart{seconds{1000}};
+constexpr ScreenFormat kFile{};
+constexpr ScreenFormat kTerminal{.columns = 80, .is_interactive = true};
 
 PoseMessage pose_of(std::uint16_t id, double x, double sigma_m) {
   PoseMessage message;
@@ -60,7 +65,7 @@ void type(WatchScreen& screen, const std::string& keys) {
 }
 
 TEST(WatchScreen, ShowsPosesReasonsAndWhatIsWrong) {
-  const std::string text = some_screen().text(kStart, false);
+  const std::string text = some_screen().text(kStart, kFile);
 
   EXPECT_TRUE(is_before(text, "r2", "r3"));
   EXPECT_NE(text.find("not seen"), std::string::npos);
@@ -70,21 +75,21 @@ TEST(WatchScreen, ShowsPosesReasonsAndWhatIsWrong) {
 
 TEST(WatchScreen, TellsTheLoadOfTheLastSecondNotOfAllTime) {
   WatchScreen screen = some_screen();
-  EXPECT_NE(screen.text(kStart, false).find("10.0 % of a core"), std::string::npos);
+  EXPECT_NE(screen.text(kStart, kFile).find("10.0 % of a core"), std::string::npos);
 
   screen.handle_message(status_of(12.0, 2.0), kStart + seconds{2});
 
-  EXPECT_NE(screen.text(kStart, false).find("50.0 % of a core"), std::string::npos);
+  EXPECT_NE(screen.text(kStart, kFile).find("50.0 % of a core"), std::string::npos);
 }
 
 TEST(WatchScreen, SortsByTheNextColumnAtEachS) {
   WatchScreen screen = some_screen();
-  EXPECT_TRUE(is_before(screen.text(kStart, true), "r2 ", "r3 "));  // by id
+  EXPECT_TRUE(is_before(screen.text(kStart, kTerminal), "r2 ", "r3 "));  // by id
 
   type(screen, "ss");
-  const std::string by_distance = screen.text(kStart, true);
+  const std::string by_distance = screen.text(kStart, kTerminal);
   type(screen, "s");
-  const std::string by_sigma = screen.text(kStart, true);
+  const std::string by_sigma = screen.text(kStart, kTerminal);
 
   EXPECT_TRUE(is_before(by_distance, "r3 ", "r2 "));
   EXPECT_NE(by_distance.find("sort (distance)"), std::string::npos);
@@ -95,7 +100,7 @@ TEST(WatchScreen, SortsByTheNextColumnAtEachS) {
 TEST(WatchScreen, PicksNeighborsByLettersAndArrows) {
   WatchScreen screen = some_screen();
   const auto picks = [&](const std::string& name) {
-    return screen.text(kStart, true).find("> " + name) != std::string::npos;
+    return screen.text(kStart, kTerminal).find("> " + name) != std::string::npos;
   };
 
   type(screen, "j");
@@ -123,8 +128,8 @@ TEST(WatchScreen, WantsTheDetailsOfWhomEnterPicks) {
   told.ages_s["bearing"] = 0.125;
   answer.neighbors = {told};
   screen.handle_message(answer, kStart);
-  EXPECT_NE(screen.text(kStart, true).find("fused 77, gated 5"), std::string::npos);
-  EXPECT_NE(screen.text(kStart, true).find("125"), std::string::npos);
+  EXPECT_NE(screen.text(kStart, kTerminal).find("fused 77, gated 5"), std::string::npos);
+  EXPECT_NE(screen.text(kStart, kTerminal).find("125"), std::string::npos);
 
   type(screen, "\n");
   EXPECT_FALSE(screen.detailed_neighbor());
@@ -139,8 +144,90 @@ TEST(WatchScreen, QuitsAtQAndMindsNoOtherKeys) {
   EXPECT_TRUE(screen.should_quit());
 }
 
+std::size_t widest_line(const std::string& text) {
+  std::istringstream lines(text);
+  std::size_t widest = 0;
+  for (std::string line; std::getline(lines, line);) widest = std::max(widest, columns_of(line));
+  return widest;
+}
+
+/// As wide as numbers get: far away, turned by nearly 180 degrees, badly known.
+PoseMessage widest_pose(std::uint16_t id) {
+  PoseMessage message = pose_of(id, -123.456, 0.999);
+  message.name = "reconnaissance-12";
+  message.pose.mode = PoseMode::kPredicted;
+  message.pose.T_B_N.pose.p = {-123.456, -98.765, -43.21};
+  message.pose.T_B_N.pose.q =
+      Eigen::AngleAxisd(-179.9 / 180.0 * std::numbers::pi, Eigen::Vector3d::UnitZ());
+  message.pose.age_s = 0.0199;
+  return message;
+}
+
+TEST(WatchScreen, FitsEightyColumnsWithTheWholeReason) {
+  const std::string reason =
+      "a reason that is much longer than any that the daemon has at the moment, because the next "
+      "one may be longer";
+  StatusMessage status = status_of(123456.0, 1.0);
+  status.sensors.front().message = reason;
+  status.neighbors.front().reason = reason;
+  WatchScreen screen;
+  screen.handle_message(status, kStart);
+  screen.handle_message(widest_pose(2), kStart);
+  type(screen, "jj\n");
+
+  const std::string text = screen.text(kStart, kTerminal);
+
+  EXPECT_LE(widest_line(text), 80U) << text;
+  std::istringstream words(reason);
+  for (std::string word; words >> word;) EXPECT_NE(text.find(word), std::string::npos) << word;
+  EXPECT_NE(text.find("-123.5"), std::string::npos) << "numbers lose decimals, not digits";
+}
+
+TEST(WatchScreen, UsesTheRoomOfAWideTerminal) {
+  const ScreenFormat wide{.columns = 120, .is_interactive = true};
+  WatchScreen screen;
+  screen.handle_message(widest_pose(2), kStart);
+
+  const std::string text = screen.text(kStart, wide);
+
+  EXPECT_NE(text.find("-123.456"), std::string::npos) << text;
+  EXPECT_NE(text.find("-179.9"), std::string::npos) << text;
+  EXPECT_LE(widest_line(text), 120U);
+}
+
+TEST(WatchScreen, ColorsOnlyWhereTheyAreSeen) {
+  const ScreenFormat colored{.columns = 80, .is_interactive = true, .has_color = true};
+  const WatchScreen screen = some_screen();
+
+  EXPECT_EQ(screen.text(kStart, kTerminal).find('\x1b'), std::string::npos);
+  EXPECT_NE(screen.text(kStart, colored).find("\x1b["), std::string::npos);
+  EXPECT_EQ(widest_line(screen.text(kStart, colored)), widest_line(screen.text(kStart, kTerminal)));
+}
+
+TEST(WatchScreen, ExplainsKeysAndColumnsUntilTheNextKey) {
+  WatchScreen screen = some_screen();
+
+  type(screen, "?");
+  const std::string help = screen.text(kStart, kTerminal);
+  EXPECT_NE(help.find("any other key closes it"), std::string::npos);
+  EXPECT_NE(help.find("predicted"), std::string::npos);
+  EXPECT_LE(widest_line(help), 80U);
+
+  type(screen, "s");
+  EXPECT_NE(screen.text(kStart, kTerminal).find("sort (id)"), std::string::npos)
+      << "the key that closes the help does nothing else";
+  type(screen, "?q");
+  EXPECT_TRUE(screen.should_quit());
+}
+
+TEST(WatchScreen, HasALegendAndKeysForThoseWhoCanPressThem) {
+  EXPECT_NE(some_screen().text(kStart, kTerminal).find("by way of others"), std::string::npos);
+  EXPECT_NE(some_screen().text(kStart, kTerminal).find("? help"), std::string::npos);
+  EXPECT_EQ(some_screen().text(kStart, kFile).find("help"), std::string::npos);
+}
+
 TEST(WatchScreen, SaysSinceWhenTheDaemonIsSilent) {
-  EXPECT_NE(some_screen().text(kStart + seconds{7}, false).find("no answer for 7 s"),
+  EXPECT_NE(some_screen().text(kStart + seconds{7}, kFile).find("no answer for 7 s"),
             std::string::npos);
 }
 

@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <regex>
 
+#include "drivers/base/text_file.hpp"
 #include "net/subscription/subscription_json.hpp"
+#include "tests/support/places.hpp"
 
 namespace crepes {
 namespace {
@@ -56,6 +60,19 @@ TEST(PlotJson, HoldsNumbersAlone) {
   for (const auto& [key, value] : json["2"].items()) EXPECT_TRUE(value.is_number()) << key;
   EXPECT_FALSE(json["2"].contains("vx"));
   EXPECT_TRUE(json["timestamp"].is_number());
+}
+
+TEST(PlotJson, HasWhatTheExampleLayoutDraws) {
+  const std::string layout =
+      read_text_file(source_dir() + "/config/examples/plotjuggler/crepes.xml").value();
+  const Json sent = Json::parse(plot_json(poses_of(3)).at(0));
+  const std::regex curve(R"re(<curve name="/(\d+)/(\w+)")re");
+
+  const std::sregex_iterator begin(layout.begin(), layout.end(), curve);
+  EXPECT_EQ(std::distance(begin, std::sregex_iterator()), 30);
+  std::for_each(begin, std::sregex_iterator(), [&](const std::smatch& found) {
+    EXPECT_TRUE(sent.contains(found[1]) && sent[found[1].str()].contains(found[2])) << found.str();
+  });
 }
 
 TEST(PlotJson, DistributesManyNeighborsOverWholeDatagrams) {

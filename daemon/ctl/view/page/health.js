@@ -2,7 +2,7 @@
 
 import { degrees, element, fit, fixed, length, setText, style } from "./dom.js";
 import { norm } from "./geometry.js";
-import { AGE, MODE, MODES, SIGMA, SIGMA_ROTATION, T, indexAt, positionOf } from "./store.js";
+import { AGE, FRESH_SECONDS, MODE, MODES, SIGMA, SIGMA_ROTATION, T, indexAt, positionOf } from "./store.js";
 
 // What to do where there is no pose; at length in config/docs/troubleshooting.md.
 const ADVICE = {
@@ -72,6 +72,9 @@ const lossOf = (about) => about?.reports?.loss > 0 ? `, ${fixed(100 * about.repo
 const verdicts = (neighbor, kind, verdict) => neighbor.measurements?.[kind]?.[verdict] || 0;
 const allOf = (neighbor, verdict) => Object.values(neighbor.measurements || {}).reduce((sum, kind) => sum + (kind[verdict] || 0), 0);
 
+/** Rate and age of a kind of measurement; an old one is marked. */
+const measuredCells = (rate, ageMs) => [[fixed(rate, 1)], [fixed(ageMs, 0), ageMs > 1000 * FRESH_SECONDS]];
+
 /** Measurements per second between two looks at the totals. */
 export class Rates {
   constructor() {
@@ -117,7 +120,7 @@ export class Health {
     this.drawNeighbors(t);
     if (!this.store.isLive) return;
     this.drawSensors(wallSeconds);
-    this.drawLinks();
+    this.drawLinks(t);
     this.drawEvents();
     const { status } = this.store;
     const share = status.uptime_s > 0 ? (100 * status.cpu_s) / status.uptime_s : NaN;
@@ -159,23 +162,37 @@ export class Health {
     }
   }
 
-  drawLinks() {
-    const head = ["neighbor", "heard ms ago", "lost %", "clock s", "± ms", "we see /s", "sees us /s", "ranges /s", "gated"];
+  /** One row a neighbor; of each kind of measurement the rate and how long ago the newest was taken. */
+  drawLinks(t) {
+    const head = ["neighbor", "heard ms ago", "lost now %", "lost %", "clock s", "± ms", "ppm", "we see /s", "ms ago", "sees us /s", "ms ago", "ranges /s", "ms ago", "gated"];
     const rows = (this.store.status.neighbors || []).map((neighbor) => {
       const clock = (this.store.status.clocks || []).find(({ peer }) => peer === neighbor.peer) || {};
-      const { received = 0, lost = 0, age_s: age } = neighbor.reports || {};
-      const rates = this.store.neighbor(String(neighbor.peer)).rates || {};
+      const { received = 0, lost = 0, age_s: age, loss } = neighbor.reports || {};
+      const known = this.store.neighbor(String(neighbor.peer));
+      const rates = known.rates || {};
+      const since = (...kinds) => 1000 * Math.min(...kinds.map((kind) => this.store.ageOf(known, kind, t)));
       const range = (rates.range ?? NaN) + (rates.peer_range ?? 0);
-      return [neighbor.name || String(neighbor.peer), fixed(1000 * age, 0), fixed((100 * lost) / (received + lost), 1), fixed(clock.offset_s, 6),
-        fixed(1000 * clock.sigma_s, 3), fixed(rates.bearing, 1), fixed(rates.peer_bearing, 1), fixed(range, 1), String(allOf(neighbor, "gated"))];
+      return [
+        [neighbor.name || String(neighbor.peer)],
+        [fixed(1000 * age, 0), age > 1],
+        [fixed(100 * loss, 0), loss > 0.1],
+        [fixed((100 * lost) / (received + lost), 1), lost > 0.1 * (received + lost)],
+        [fixed(clock.offset_s, 6)], [fixed(1000 * clock.sigma_s, 3)], [fixed(clock.skew_ppm, 1)],
+        ...measuredCells(rates.bearing, since("bearing")),
+        ...measuredCells(rates.peer_bearing, since("peer_bearing")),
+        ...measuredCells(range, since("range", "peer_range")),
+        [String(allOf(neighbor, "gated"))],
+      ];
     });
     const table = this.nodes.links;
     if (table.rows.length !== rows.length + 1) {
       table.replaceChildren(element("thead", {}, element("tr", {}, ...head.map((text) => element("th", { scope: "col" }, text)))),
-        element("tbody", {}, ...rows.map((cells) => element("tr", {}, ...cells.map(() => element("td"))))));
+        element("tbody", {}, ...rows.map((cells) => element("tr", {}, ...cells.map((_, j) => element(j === 0 ? "th" : "td", j === 0 ? { scope: "row" } : {}))))));
     }
-    rows.forEach((cells, i) => cells.forEach((text, j) => setText(table.rows[i + 1].cells[j], text)));
-    rows.forEach((cells, i) => table.rows[i + 1].cells[2].classList.toggle("bad", parseFloat(cells[2]) > 10));
+    rows.forEach((cells, i) => cells.forEach(([text, isBad = false], j) => {
+      setText(table.rows[i + 1].cells[j], text);
+      table.rows[i + 1].cells[j].classList.toggle("bad", isBad);
+    }));
   }
 
   drawEvents() {

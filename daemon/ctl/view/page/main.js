@@ -78,6 +78,7 @@ async function show(index) {
   isPlaying = source.live;
   setSource(source);
   byId("truth-label").hidden = byId("ghost-legend").hidden = true;
+  byId("measurements-label").hidden = false;
   for (const node of document.querySelectorAll("[data-live]")) node.hidden = !source.live;
   byId("speed-label").hidden = source.live;
   redraw();
@@ -91,6 +92,7 @@ async function show(index) {
   const replay = await load(`/replay?robot=${robot}`);
   store.addReplay(replay);
   charts.build();
+  byId("measurements-label").hidden = ![...store.neighbors.values()].some(({ innovations }) => innovations?.length);
   byId("truth-label").hidden = byId("ghost-legend").hidden = !store.hasTruth;
   showLink();
 }
@@ -276,6 +278,7 @@ const KEYS = {
   3: () => showPanel("time"),
   f: () => setView("follow"),
   t: () => setView("top"),
+  m: () => byId("measurements").click(),
   d: flipTheme,
   "?": () => byId("help-dialog").showModal(),
   " ": () => play(!isPlaying),
@@ -300,6 +303,10 @@ function listenToPage() {
   on("help", "click", () => byId("help-dialog").showModal());
   on("sigma", "change", ({ value }) => { scene.settings.sigma = Number(value); });
   on("trail", "change", ({ value }) => { scene.settings.trail = Number(value); });
+  on("measurements", "change", ({ checked }) => {
+    scene.settings.measurements = checked;
+    for (const node of document.querySelectorAll("[data-measured]")) node.hidden = !checked;
+  });
   on("truth", "change", ({ checked }) => { scene.settings.truth = checked; });
   on("focus", "change", ({ value }) => charts.setFocus(value));
   on("zoom-in", "click", () => charts.zoom(0.6));

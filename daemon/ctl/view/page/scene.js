@@ -10,13 +10,15 @@ const BODY = [[0.3, 0, 0], [-0.2, 0.18, 0], [-0.1, 0, 0], [-0.2, -0.18, 0]]; // 
 const MIN_BODY_PX = 26;
 const DASHES = { direct: [], graph: [9, 5], predicted: [2, 4] };
 const MAX_PITCH = 1.57;
+const RAY = 0.42; // of the distance: the rays from both sides do not touch
+const CIRCLE_STEPS = 72;
 
 export class Scene {
   constructor(canvas, store) {
     this.canvas = canvas;
     this.store = store;
     this.camera = new Camera();
-    this.settings = { sigma: 3, trail: 10, truth: true };
+    this.settings = { sigma: 3, trail: 10, truth: true, measurements: false };
     this.view = "follow";
     this.isFitted = false;
     this.time = NaN; // of the picture
@@ -73,6 +75,7 @@ export class Scene {
     this.drawGrid();
     for (const robot of this.robots) this.drawTrail(robot, t);
     for (const robot of this.robots) this.drawLine(robot);
+    if (this.settings.measurements) for (const robot of this.robots) this.drawMeasurements(robot, t);
     for (const ghost of this.ghosts) this.drawGhost(ghost);
     for (const robot of this.robots) this.drawEllipsoid(robot);
     this.drawBody([0, 0, 0], this.level, this.colors.text, 1);
@@ -205,6 +208,23 @@ export class Scene {
     const ground = [position[0], position[1], 0];
     this.line(position, ground, this.colors.soft, 1, [1, 3], 0.8);
     if (mode !== "none") this.line([0, 0, 0], position, this.colors[mode], 2, DASHES[mode], 0.9);
+  }
+
+  /**
+   * What was measured within the last second or so, where the estimate is: a ray from each side that sees
+   * the other, and a circle around the observer through a neighbor to which a range was measured.
+   */
+  drawMeasurements(robot, t) {
+    const { position, neighbor, mode, color } = robot;
+    const has = (kind) => this.store.isMeasured(neighbor, kind, t);
+    robot.measured = { bearing: has("bearing"), peer_bearing: has("peer_bearing"), range: has("range") || has("peer_range") };
+    if (mode === "none") return;
+    if (robot.measured.bearing) this.line([0, 0, 0], scale(RAY, position), color, 5, [], 0.75);
+    if (robot.measured.peer_bearing) this.line(scale(1 - RAY, position), position, color, 5, [], 0.75);
+    if (!robot.measured.range) return;
+    const radius = Math.hypot(position[0], position[1]);
+    const at = (i) => [radius * Math.cos((2 * Math.PI * i) / CIRCLE_STEPS), radius * Math.sin((2 * Math.PI * i) / CIRCLE_STEPS), position[2]];
+    for (let i = 0; i < CIRCLE_STEPS; i += 2) this.line(at(i), at(i + 1), color, 1.2, [], 0.8);
   }
 
   drawEllipsoid({ position, covariance, color }) {

@@ -15,6 +15,9 @@ export const MODES = ["direct", "graph", "predicted"];
 const LIVE_SECONDS = 300; // kept of a live swarm
 const STALE_SECONDS = 0.5; // an older pose is none
 const MAX_EVENTS = 200;
+const FUSED = 0; // of the verdicts of an innovation
+export const KINDS = ["bearing", "peer_bearing", "range", "peer_range"];
+export const FRESH_SECONDS = 1.5; // STATUS tells of a neighbor's measurements once a second
 
 export const positionOf = (row) => row.slice(P, P + 3);
 export const quaternionOf = (row) => row.slice(Q, Q + 4);
@@ -105,7 +108,7 @@ export class Store {
 
   forget() {
     this.ups = [];
-    for (const neighbor of this.neighbors.values()) neighbor.rows = [];
+    for (const neighbor of this.neighbors.values()) Object.assign(neighbor, { rows: [], measured: [] });
     this.newest = null;
     this.cursor = null;
   }
@@ -123,8 +126,33 @@ export class Store {
     merge("neighbors", neighbors.concat(more.map((peer) => ({ peer }))));
     merge("clocks", clocks);
     for (const { peer, name } of this.status.neighbors) this.neighbor(String(peer), name);
+    for (const { peer, ages_s: ages } of neighbors) if (ages) this.addAges(this.neighbor(String(peer)), ages);
     this.tellChanges(before, this.status);
     this.changed();
+  }
+
+  /** When each kind of measurement was last taken, as a row of its own time. */
+  addAges(neighbor, ages) {
+    if (!this.newest) return;
+    const { t } = this.newest;
+    const times = Object.fromEntries(Object.entries(ages).map(([kind, age]) => [kind, t - age]));
+    neighbor.measured = [...(neighbor.measured || []).filter((row) => row[T] < t && row[T] > t - LIVE_SECONDS), [t, times]];
+  }
+
+  /** Seconds since the newest measurement of a kind that was known at `t`; infinite without any. */
+  ageOf(neighbor, kind, t) {
+    if (this.isLive) {
+      const row = (neighbor.measured || [])[indexAt(neighbor.measured || [], t)];
+      return row && row[1][kind] !== undefined ? t - row[1][kind] : Infinity;
+    }
+    const rows = neighbor.innovations || [];
+    for (let i = indexAt(rows, t); i >= 0 && t - rows[i][T] < FRESH_SECONDS; --i)
+      if (rows[i][1] === KINDS.indexOf(kind) && rows[i][2] === FUSED) return t - rows[i][T];
+    return Infinity;
+  }
+
+  isMeasured(neighbor, kind, t) {
+    return this.ageOf(neighbor, kind, t) < FRESH_SECONDS;
   }
 
   tellChanges(before, after) {
