@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "config/schema/config.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 #include "estimator/core/result.hpp"
-#include "net/client/daemon_client.hpp"
 
 namespace crepes {
 

@@ -62,7 +62,7 @@ double rank_of(const NeighborView& view, WatchScreen::Order order, Timestamp now
   }
 }
 
-std::string details_of(const StatusMessage::Neighbor& neighbor) {
+std::string details_of(const client::Status::Neighbor& neighbor) {
   std::vector<Row> rows{{"source", "age ms", "totals"}};
   for (const auto& [kind, totals] : neighbor.measurements) {
     std::string text;
@@ -81,22 +81,23 @@ std::string details_of(const StatusMessage::Neighbor& neighbor) {
 
 }  // namespace
 
-void WatchScreen::handle_message(const DaemonMessage& message, Timestamp now) {
+void WatchScreen::handle_message(const client::Message& message, Timestamp now) {
   last_message_time_ = last_ = now;
-  if (const auto* pose = std::get_if<PoseMessage>(&message)) {
-    names_[pose->pose.neighbor] = pose->name;
-    neighbors_[pose->pose.neighbor].update(pose->pose, now);
-  } else if (const auto* status = std::get_if<StatusMessage>(&message)) {
+  if (const auto* pose = std::get_if<client::Pose>(&message)) {
+    names_[RobotId{pose->peer}] = pose->name;
+    neighbors_[RobotId{pose->peer}].update(neighbor_pose_of(*pose), now);
+  } else if (const auto* status = std::get_if<client::Status>(&message)) {
     handle_status(*status, now);
-  } else if (const auto* refusal = std::get_if<ErrorMessage>(&message)) {
+  } else if (const auto* refusal = std::get_if<client::Error>(&message)) {
     error_ = refusal->message;
   }
 }
 
-void WatchScreen::handle_status(const StatusMessage& status, Timestamp /*now*/) {
-  for (const StatusMessage::Neighbor& neighbor : status.neighbors) {
-    if (!neighbor.name.empty()) names_[neighbor.neighbor] = neighbor.name;
-    neighbors_[neighbor.neighbor].set_reason(neighbor.reason);
+void WatchScreen::handle_status(const client::Status& status, Timestamp /*now*/) {
+  for (const client::Status::Neighbor& neighbor : status.neighbors) {
+    const RobotId id{neighbor.peer};
+    if (!neighbor.name.empty()) names_[id] = neighbor.name;
+    neighbors_[id].set_reason(neighbor.reason);
   }
   if (status.sensors.empty()) {  // the answer about one neighbor
     if (!status.neighbors.empty()) details_ = status.neighbors.front();
@@ -173,10 +174,10 @@ std::vector<RobotId> WatchScreen::ordered(Timestamp now) const {
 std::string WatchScreen::head(Timestamp now) const {
   std::string head = "waiting for the daemon\n";
   if (status_) {
-    head = fmt::format("robot {} {}, up {} s, {} % of a core, {} MB\n", status_->self.value,
+    head = fmt::format("robot {} {}, up {} s, {} % of a core, {} MB\n", status_->self,
                        status_->name, fixed(status_->uptime_s, 0), fixed(100.0 * cpu_share_, 1),
                        fixed(status_->rss_mb, 0));
-    for (const StatusMessage::Sensor& sensor : status_->sensors) {
+    for (const client::Status::Sensor& sensor : status_->sensors) {
       if (!sensor.ok) {
         head +=
             fmt::format("{}: {}\n", sensor.name, sensor.message.empty() ? "fault" : sensor.message);
@@ -198,7 +199,7 @@ std::string WatchScreen::text(Timestamp now, bool is_interactive) const {
   }
   std::string text = head(now) + "\n" + text_table(rows);
   if (!is_interactive) return text;
-  if (shows_details_ && picked_ && details_ && details_->neighbor == *picked_)
+  if (shows_details_ && picked_ && details_ && details_->peer == picked_->value)
     text += fmt::format("\n{}\n{}", name_of_robot(*picked_), details_of(*details_));
   return text + "\nq quit   s sort (" + std::string(kOrders.at(static_cast<std::size_t>(order_))) +
          ")   j k or arrows pick   Enter details\n";

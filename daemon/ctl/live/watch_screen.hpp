@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/neighbor_view.hpp"
-#include "net/client/daemon_client.hpp"
 
 namespace crepes {
 
@@ -17,7 +17,7 @@ class WatchScreen {
   enum class Order : std::uint8_t { kId, kName, kDistance, kSigma, kAge };
 
   /// `now` is the client's time.
-  void handle_message(const DaemonMessage& message, Timestamp now);
+  void handle_message(const client::Message& message, Timestamp now);
   /// q quits; s sorts by the next column; j and k (or the arrows, as ESC [ B and ESC [ A) pick a
   /// neighbor; Enter shows or hides its details. Other keys do nothing.
   void handle_key(char key);
@@ -32,7 +32,7 @@ class WatchScreen {
   [[nodiscard]] std::string text(Timestamp now, bool is_interactive) const;
 
  private:
-  void handle_status(const StatusMessage& status, Timestamp now);
+  void handle_status(const client::Status& status, Timestamp now);
   [[nodiscard]] std::string head(Timestamp now) const;
   [[nodiscard]] std::string name_of_robot(RobotId id) const;
   [[nodiscard]] std::vector<RobotId> ordered(Timestamp now) const;
@@ -40,8 +40,8 @@ class WatchScreen {
 
   std::map<RobotId, NeighborView> neighbors_;
   std::map<RobotId, std::string> names_;
-  std::optional<StatusMessage> status_;
-  std::optional<StatusMessage::Neighbor> details_;
+  std::optional<client::Status> status_;
+  std::optional<client::Status::Neighbor> details_;
   std::optional<Timestamp> last_message_time_;
   double cpu_share_ = 0.0;
   std::string error_;

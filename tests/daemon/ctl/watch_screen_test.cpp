@@ -11,19 +11,21 @@ using std::chrono::seconds;
 
 constexpr Timestamp kStart{seconds{1000}};
 
-PoseMessage pose_of(std::uint16_t id, double x, double sigma_m) {
-  PoseMessage message;
-  message.self = RobotId{1};
+client::Pose pose_of(std::uint16_t id, double x, double sigma_m) {
+  client::Pose message;
+  message.self = 1;
   message.name = "r" + std::to_string(id);
-  message.pose.neighbor = RobotId{id};
-  message.pose.T_B_N.pose.p = {x, 0.0, 0.0};
-  message.pose.T_B_N.covariance = sigma_m * sigma_m * Matrix6d::Identity();
+  message.peer = id;
+  message.position = {x, 0.0, 0.0};
+  message.covariance.emplace();
+  for (const std::size_t diagonal : {0, 6, 11, 15, 18, 20})
+    message.covariance->at(diagonal) = sigma_m * sigma_m;
   return message;
 }
 
-StatusMessage status_of(double uptime_s, double cpu_s) {
-  StatusMessage status;
-  status.self = RobotId{1};
+client::Status status_of(double uptime_s, double cpu_s) {
+  client::Status status;
+  status.self = 1;
   status.name = "r1";
   status.uptime_s = uptime_s;
   status.cpu_s = cpu_s;
@@ -33,8 +35,8 @@ StatusMessage status_of(double uptime_s, double cpu_s) {
                      .message = "unplugged",
                      .faults = {},
                      .counts = {}}};
-  StatusMessage::Neighbor hidden;
-  hidden.neighbor = RobotId{4};
+  client::Status::Neighbor hidden;
+  hidden.peer = 4;
   hidden.name = "r4";
   hidden.state = "none";
   hidden.reason = "not seen";
@@ -115,9 +117,9 @@ TEST(WatchScreen, WantsTheDetailsOfWhomEnterPicks) {
   type(screen, "jj\n");
   EXPECT_EQ(screen.detailed_neighbor(), RobotId{3});
 
-  StatusMessage answer;
-  StatusMessage::Neighbor told;
-  told.neighbor = RobotId{3};
+  client::Status answer;
+  client::Status::Neighbor told;
+  told.peer = 3;
   told.state = "direct";
   told.measurements["bearing"] = {{"fused", 77}, {"gated", 5}};
   told.ages_s["bearing"] = 0.125;
