@@ -48,6 +48,8 @@ done
 inside bash -c '. /usr/share/bash-completion/bash_completion; _completion_loader crepesctl; complete -p crepesctl' | grep -v _minimal
 inside test -s /usr/share/zsh/vendor-completions/_crepesctl -a -s /usr/share/fish/vendor_completions.d/crepesctl.fish
 inside id crepes
+inside test -s /usr/include/crepes/client.hpp
+inside sh -c 'test -s /usr/lib/*/libcrepes-client.a -a -s /usr/lib/*/cmake/crepes-client/crepes-client-config.cmake'
 
 step "upgrade, remove, install again, purge"
 inside dpkg -i /tmp/crepes.deb

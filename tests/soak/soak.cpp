@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "daemon/ctl/demo/scratch_directory.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/runtime.hpp"
 #include "daemon/service/logging.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/uwb/nlink_frame.hpp"
 #include "estimator/core/contract.hpp"
-#include "net/client/daemon_client.hpp"
 #include "net/mesh/peer_message.hpp"
 #include "net/udp_socket.hpp"
 #include "tests/soak/soak_camera.hpp"
@@ -93,8 +93,8 @@ class Soak {
         uwb_(scratch_.path() / "uwb", {50.0, 10.0, 100.0}, &uwb_frame, plan.seed + 1, clock_.now()),
         config_(make_config()),
         mesh_(*UdpSocket::open_broadcast("lo", static_cast<std::uint16_t>(config_.net.port))),
-        client_(*DaemonClient::open("127.0.0.1",
-                                    static_cast<std::uint16_t>(config_.subscription.port))) {}
+        daemon_(*connect({.port = static_cast<std::uint16_t>(config_.subscription.port)},
+                         {.watch = false, .polls = {{.period_s = 0.1}}})) {}
 
   SoakReport run() {
     const LogSession log(LogLevel::kError);
@@ -208,12 +208,10 @@ class Soak {
 
   /// How the camera is, ten times a second.
   void ask(Timestamp now) {
-    while (true) {
-      const auto answer = client_.receive(milliseconds{0});
-      if (!answer || !*answer) break;
-      const auto* status = std::get_if<StatusMessage>(&(*answer)->message);
+    while (const auto answer = daemon_.receive(milliseconds{0})) {
+      const auto* status = std::get_if<client::Status>(&answer->message);
       if (status == nullptr) continue;
-      for (const StatusMessage::Sensor& sensor : status->sensors) {
+      for (const client::Status::Sensor& sensor : status->sensors) {
         if (sensor.name != "cam0" || !sensor.ok || sensor.rate_hz < 10.0) continue;
         const auto took = camera_.heard(now);
         if (!took) continue;
@@ -221,9 +219,6 @@ class Soak {
         report_.longest_camera = std::max(report_.longest_camera, *took);
       }
     }
-    if (now < next_question_) return;
-    next_question_ = now + milliseconds{100};
-    static_cast<void>(client_.poll());
   }
 
   void judge(Timestamp now) {
@@ -247,11 +242,10 @@ class Soak {
   SoakDevice uwb_;
   Config config_;
   UdpSocket mesh_;
-  DaemonClient client_;
+  client::Connection daemon_;
   SoakReport report_;
   Timestamp last_sample_{};
   Timestamp last_range_{};
-  Timestamp next_question_{};
   std::function<bool()> is_well_ = [this] {
     return imu_.is_well() && uwb_.is_well() && camera_.is_well();
   };

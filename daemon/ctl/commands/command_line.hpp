@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "config/schema/config.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/progress_bar.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "estimator/core/result.hpp"
-#include "net/client/daemon_client.hpp"
 
 namespace crepes {
 

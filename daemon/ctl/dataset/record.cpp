@@ -16,13 +16,13 @@
 
 #include "config/reading/config_file.hpp"
 #include "daemon/ctl/dataset/recorded_manifest.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
 #include "daemon/recording/recorder_stage.hpp"
 #include "daemon/recording/unix_socket.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/base/number_text.hpp"
 #include "drivers/dataset/robot_folder.hpp"
-#include "net/client/daemon_client.hpp"
 
 namespace crepes {
 namespace {
@@ -112,7 +112,7 @@ class Recording {
   }
 
   /// swarm.yaml for the measurements so far.
-  [[nodiscard]] Result<void> write_manifest(const std::vector<StatusMessage::Clock>& clocks) {
+  [[nodiscard]] Result<void> write_manifest(const std::vector<client::Status::Clock>& clocks) {
     if (!folder_ || first_ > last_) return {};
     return write_text_file(dir_ / "swarm.yaml", recorded_manifest(config_, first_, last_, clocks));
   }
@@ -192,15 +192,16 @@ class Recording {
 };
 
 /// The peers' clocks as the daemon knows them; empty without an answer.
-std::vector<StatusMessage::Clock> ask_for_clocks(const SubscriptionConfig& subscription) {
+std::vector<client::Status::Clock> ask_for_clocks(const SubscriptionConfig& subscription) {
   if (subscription.listen.empty()) return {};
-  auto client = DaemonClient::open(subscription.listen.front(),
-                                   static_cast<std::uint16_t>(subscription.port));
-  if (!client || !client->poll()) return {};
+  auto daemon =
+      connect({subscription.listen.front(), static_cast<std::uint16_t>(subscription.port)},
+              {.watch = false, .polls = {{}}});
+  if (!daemon) return {};
   for (int i = 0; i < 10; ++i) {
-    const auto answer = client->receive(50ms);
-    if (!answer || !*answer) continue;
-    if (const auto* status = std::get_if<StatusMessage>(&(*answer)->message)) return status->clocks;
+    const auto answer = daemon->receive(50ms);
+    const auto* status = answer ? std::get_if<client::Status>(&answer->message) : nullptr;
+    if (status != nullptr) return status->clocks;
   }
   return {};
 }

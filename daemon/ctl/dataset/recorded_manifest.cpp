@@ -23,7 +23,7 @@ SwarmRobot robot_of(const Config& config, RobotId id, const RobotClock& clock) {
 std::string own_robot_name(const Config& config) { return name_of(config.swarm, config.robot.id); }
 
 std::string recorded_manifest(const Config& config, Timestamp first, Timestamp last,
-                              const std::vector<StatusMessage::Clock>& clocks) {
+                              const std::vector<client::Status::Clock>& clocks) {
   const RobotClock own{to_seconds(first.time_since_epoch()), 0.0};
   SwarmManifest manifest;
   manifest.scenario = "recorded";
@@ -39,11 +39,11 @@ std::string recorded_manifest(const Config& config, Timestamp first, Timestamp l
       manifest_text(manifest);
   if (!clocks.empty())
     text += "# As this robot knew its peers' clocks; uncomment each robot whose folder is here:\n";
-  for (const StatusMessage::Clock& clock : clocks) {
+  for (const client::Status::Clock& clock : clocks) {
     // local = true (1 + skew) + offset, and at `last` local = last + clock.offset_s.
     const double turned_s = manifest.duration_s * clock.skew_ppm * 1e-6;
     const RobotClock peer{own.offset_s + clock.offset_s - turned_s, clock.skew_ppm};
-    text += "# " + robot_text(robot_of(config, clock.peer, peer));
+    text += "# " + robot_text(robot_of(config, RobotId{clock.peer}, peer));
   }
   return text;
 }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "config/schema/config.hpp"
-#include "net/client/daemon_client.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 
 namespace crepes {
 
@@ -16,6 +16,6 @@ namespace crepes {
 /// `first`. Robots with known clocks (as of `last`) are listed in comments, for users who add the
 /// recordings of those robots.
 [[nodiscard]] std::string recorded_manifest(const Config& config, Timestamp first, Timestamp last,
-                                            const std::vector<StatusMessage::Clock>& clocks);
+                                            const std::vector<client::Status::Clock>& clocks);
 
 }  // namespace crepes

@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "config/reading/config_file.hpp"
@@ -16,6 +17,7 @@
 #include "daemon/ctl/demo/demo_screen.hpp"
 #include "daemon/ctl/demo/demo_swarm.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
 #include "daemon/ctl/live/neighbor_view.hpp"
 #include "daemon/ctl/text_table.hpp"
@@ -23,7 +25,7 @@
 #include "drivers/base/text_file.hpp"
 #include "drivers/sim/world.hpp"
 #include "estimator/core/constants.hpp"
-#include "net/client/daemon_client.hpp"
+#include "net/udp_socket.hpp"
 
 namespace crepes {
 namespace {
@@ -33,11 +35,11 @@ using namespace std::chrono_literals;
 
 constexpr double kInFlight = 0.1;  // s; the last poses have not arrived when the time is over
 
-/// One robot and the client of its daemon.
+/// One robot, and the connection to its daemon.
 struct RunningRobot {
   DemoRobot robot;
   fs::path log;
-  DaemonClient client;
+  client::Connection daemon;
 };
 
 /// One ordered pair: all its poses, and the time of the first one.
@@ -99,15 +101,9 @@ class Demo {
     const Duration redraw_period =
         screen && !screen->is_terminal() ? Duration{5s} : Duration{200ms};
     Timestamp redraw = start_;
-    Timestamp renewal = start_;
     while (world_s() < options_.for_s && !stop.requested() && !table_.should_quit()) {
       if (auto alive = check_daemons(); !alive) return alive;
-      if (clock_.now() >= renewal) {
-        ask_all();
-        // More often at first, while the daemons open their sockets.
-        renewal = clock_.now() + (has_all_poses() ? Duration{1s} : Duration{50ms});
-      }
-      if (auto done = listen(); !done) return done;
+      listen();
       for (auto key = next_key(keys); key; key = next_key(keys)) {
         table_.handle_key(*key);
         redraw = clock_.now();
@@ -176,9 +172,10 @@ class Demo {
     out << write_config(robot.config);
     out.close();
     if (!out) return fail(ErrorCode::kIo, file.string() + ": cannot be written");
-    auto client =
-        DaemonClient::open("127.0.0.1", static_cast<std::uint16_t>(robot.config.subscription.port));
-    if (!client) return tl::unexpected(client.error());
+    // Often at first, while the daemon opens its sockets.
+    auto connection = connect({.port = static_cast<std::uint16_t>(robot.config.subscription.port)},
+                              {.polls = {{}}, .retry_s = 0.05});
+    if (!connection) return tl::unexpected(connection.error());
     auto process = ChildProcess::start(daemon, {"--config", file.string()}, log);
     if (!process) return tl::unexpected(process.error());
     for (const RobotId other : world_.robots()) {
@@ -190,7 +187,7 @@ class Demo {
                         .poses = {},
                         .first_pose = {}});
     }
-    robots_.push_back({std::move(robot), log, std::move(*client)});
+    robots_.push_back({std::move(robot), log, std::move(*connection)});
     daemons_.push_back(std::move(*process));
     return {};
   }
@@ -212,35 +209,24 @@ class Demo {
     return page_ ? page_->check() : Result<void>();
   }
 
-  /// Requests to a daemon that does not run yet are lost.
-  void ask_all() {
-    for (RunningRobot& robot : robots_)
-      (void)robot.client.watch().and_then([&] { return robot.client.poll(); });
-  }
-
   /// Waits briefly, then processes everything that has arrived.
-  Result<void> listen() {
+  void listen() {
     std::chrono::milliseconds patience = 5ms;
     for (RunningRobot& robot : robots_) {
-      for (;;) {
-        auto answer = robot.client.receive(patience);
-        if (!answer) return tl::unexpected(answer.error());
-        patience = 0ms;
-        if (!*answer) break;
-        handle(robot, (*answer)->message);
-      }
+      while (const auto answer = robot.daemon.receive(std::exchange(patience, 0ms)))
+        handle(robot, answer->message);
     }
-    return {};
   }
 
-  void handle(const RunningRobot& robot, const DaemonMessage& message) {
+  void handle(const RunningRobot& robot, const client::Message& message) {
     const RobotId self = robot.robot.config.robot.id;
-    if (const auto* heard = std::get_if<PoseMessage>(&message)) {
-      const auto index = pair_index_.find({self, heard->pose.neighbor});
-      if (index != pair_index_.end()) add_pose(pairs_[index->second], robot, heard->pose);
-    } else if (const auto* status = std::get_if<StatusMessage>(&message)) {
-      for (const StatusMessage::Neighbor& neighbor : status->neighbors) {
-        const auto index = pair_index_.find({self, neighbor.neighbor});
+    if (const auto* heard = std::get_if<client::Pose>(&message)) {
+      const auto index = pair_index_.find({self, RobotId{heard->peer}});
+      if (index != pair_index_.end())
+        add_pose(pairs_[index->second], robot, neighbor_pose_of(*heard));
+    } else if (const auto* status = std::get_if<client::Status>(&message)) {
+      for (const client::Status::Neighbor& neighbor : status->neighbors) {
+        const auto index = pair_index_.find({self, RobotId{neighbor.peer}});
         if (index != pair_index_.end()) pairs_[index->second].view.set_reason(neighbor.reason);
       }
     }
@@ -251,11 +237,6 @@ class Demo {
     pair.view.update(pose, clock_.now());
     if (!pair.first_pose) pair.first_pose = clock_.now() - start_;
     if (pair.poses.empty() || pose.stamp > pair.poses.back().stamp) pair.poses.push_back(pose);
-  }
-
-  [[nodiscard]] bool has_all_poses() const {
-    return std::all_of(pairs_.begin(), pairs_.end(),
-                       [](const Pair& pair) { return pair.first_pose.has_value(); });
   }
 
   static std::optional<char> next_key(const std::optional<KeyReader>& keys) {

@@ -14,27 +14,22 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kAttempts = 3;  // a datagram may get lost
-constexpr Duration kReplyTimeout = std::chrono::seconds{1};
+constexpr Duration kPatience = std::chrono::seconds{3};  ///< a datagram may get lost
 constexpr std::chrono::milliseconds kStep{100};
 
-/// Sends `question` and returns the first answer that satisfies `wanted`; empty without one.
-Result<std::optional<Json>> ask(DaemonClient& client,
-                                const std::function<Result<void>(DaemonClient&)>& question,
+/// The first answer to `question` that satisfies `wanted`; empty without one.
+Result<std::optional<Json>> ask(client::Connection& daemon, const client::Poll& question,
                                 const std::function<bool(const Json&)>& wanted) {
+  daemon.ask({.watch = false, .polls = {question}});
   const MonotonicClock clock;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (auto sent = question(client); !sent) return tl::unexpected(sent.error());
-    const Timestamp end = clock.now() + kReplyTimeout;
-    while (clock.now() < end) {
-      const auto answer = client.receive(kStep);
-      if (!answer) return tl::unexpected(answer.error());
-      if (!*answer) continue;
-      if (const auto* refusal = std::get_if<ErrorMessage>(&(*answer)->message))
-        return fail(ErrorCode::kIo, "daemon: " + refusal->message);
-      Json json = Json::parse((*answer)->text, nullptr, /*allow_exceptions=*/false);
-      if (std::holds_alternative<StatusMessage>((*answer)->message) && wanted(json)) return json;
-    }
+  const Timestamp end = clock.now() + kPatience;
+  while (clock.now() < end) {
+    const auto answer = daemon.receive(kStep);
+    if (!answer) continue;
+    if (const auto* refusal = std::get_if<client::Error>(&answer->message))
+      return fail(ErrorCode::kIo, "daemon: " + refusal->message);
+    Json json = Json::parse(answer->text, nullptr, /*allow_exceptions=*/false);
+    if (std::holds_alternative<client::Status>(answer->message) && wanted(json)) return json;
   }
   return std::nullopt;
 }
@@ -45,20 +40,17 @@ void replace(Json& whole, const Json& part, std::initializer_list<const char*> k
 }
 
 /// Requests the full status of every neighbor in the short STATUS.
-Result<void> ask_neighbors(DaemonClient& client, Json& whole) {
+Result<void> ask_neighbors(client::Connection& daemon, Json& whole) {
   Json ids = Json::array();
   for (const Json& neighbor : whole["neighbors"]) ids.push_back(neighbor["peer"]);
   for (const Json& id : whole.value("more", Json::array())) ids.push_back(id);
   Json neighbors = Json::array();
   Json clocks = Json::array();
   for (const Json& id : ids) {
-    const RobotId peer{id.get<std::uint16_t>()};
-    auto part = ask(
-        client, [&](DaemonClient& c) { return c.poll(peer); },
-        [&](const Json& json) {
-          return !json.contains("sensors") && json.contains("neighbors") &&
-                 json["neighbors"].size() == 1 && json["neighbors"][0]["peer"] == id;
-        });
+    auto part = ask(daemon, {.peer = id.get<std::uint16_t>()}, [&](const Json& json) {
+      return !json.contains("sensors") && json.contains("neighbors") &&
+             json["neighbors"].size() == 1 && json["neighbors"][0]["peer"] == id;
+    });
     if (!part) return tl::unexpected(part.error());
     if (!*part) continue;
     neighbors.push_back((**part)["neighbors"][0]);
@@ -69,25 +61,24 @@ Result<void> ask_neighbors(DaemonClient& client, Json& whole) {
   return {};
 }
 
-Result<void> ask_part(DaemonClient& client, std::string_view part, const char* mark, Json& whole) {
-  auto answer = ask(
-      client, [&](DaemonClient& c) { return c.poll(part); },
-      [&](const Json& json) { return json.contains(mark) && !json.contains("neighbors"); });
+Result<void> ask_part(client::Connection& daemon, const std::string& part, Json& whole) {
+  auto answer = ask(daemon, {.about = part}, [&](const Json& json) {
+    return json.contains(part) && !json.contains("neighbors");
+  });
   if (!answer) return tl::unexpected(answer.error());
   if (*answer) replace(whole, **answer, {"sensors", "queues", "estimator", "mesh", "network"});
   return {};
 }
 
-Result<Json> ask_all(DaemonClient& client, const DaemonAddress& daemon) {
-  auto brief = ask(
-      client, [](DaemonClient& c) { return c.poll(); },
-      [](const Json& json) { return json.contains("neighbors") && json.contains("sensors"); });
+Result<Json> ask_all(client::Connection& daemon, const DaemonAddress& address) {
+  auto brief = ask(daemon, {}, [](const Json& json) {
+    return json.contains("neighbors") && json.contains("sensors");
+  });
   if (!brief) return tl::unexpected(brief.error());
-  if (!*brief) return tl::unexpected(no_answer_from(daemon));
+  if (!*brief) return tl::unexpected(no_answer_from(address, daemon.send_fault()));
   Json whole = std::move(**brief);
-  for (const auto& done :
-       {ask_part(client, "sensors", "sensors", whole),
-        ask_part(client, "network", "network", whole), ask_neighbors(client, whole)})
+  for (const auto& done : {ask_part(daemon, "sensors", whole), ask_part(daemon, "network", whole),
+                           ask_neighbors(daemon, whole)})
     if (!done) return tl::unexpected(done.error());
   whole.erase("truncated");
   whole.erase("more");
@@ -96,15 +87,16 @@ Result<Json> ask_all(DaemonClient& client, const DaemonAddress& daemon) {
 
 }  // namespace
 
-Result<FullStatus> request_full_status(const DaemonAddress& daemon) try {
-  Result<DaemonClient> client = DaemonClient::open(daemon);
-  if (!client) return tl::unexpected(client.error());
-  const Result<Json> whole = ask_all(*client, daemon);
+Result<FullStatus> request_full_status(const DaemonAddress& address) try {
+  Result<client::Connection> daemon = connect(address, {.watch = false});
+  if (!daemon) return tl::unexpected(daemon.error());
+  const Result<Json> whole = ask_all(*daemon, address);
   if (!whole) return tl::unexpected(whole.error());
   const std::string text = dump(*whole);
-  return parse_message(text).map([&](DaemonMessage&& message) {
-    return FullStatus{text, std::get<StatusMessage>(message)};
-  });
+  const std::optional<client::Message> message = client::parse(text);
+  const auto* status = message ? std::get_if<client::Status>(&*message) : nullptr;
+  if (status == nullptr) return fail(ErrorCode::kFormat, "a STATUS that makes no sense");
+  return FullStatus{text, *status};
 } catch (const Json::exception& e) {  // a daemon of another version
   return fail(ErrorCode::kFormat, std::string("a STATUS that makes no sense: ") + e.what());
 }

@@ -3,17 +3,17 @@
 
 #include <string>
 
-#include "net/client/daemon_client.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 
 namespace crepes {
 
 struct FullStatus {
   std::string json;  ///< one STATUS object of any length
-  StatusMessage message;
+  client::Status message;
 };
 
 /// Sends the requests and waits for the answers, up to three times one second for each. A daemon
 /// that never answers is an error.
-[[nodiscard]] Result<FullStatus> request_full_status(const DaemonAddress& daemon);
+[[nodiscard]] Result<FullStatus> request_full_status(const DaemonAddress& address);
 
 }  // namespace crepes

@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kUnknownAge = std::numeric_limits<double>::quiet_NaN();
 constexpr std::string_view kUsed = name_of(Verdict::kFused);
 
-std::uint64_t sum_of(const StatusMessage::Totals& totals) {
+std::uint64_t sum_of(const client::Status::Totals& totals) {
   std::uint64_t sum = 0;
   for (const auto& [name, total] : totals) sum += total;
   return sum;
@@ -37,11 +37,11 @@ double rate_of(std::uint64_t before, std::uint64_t after, double elapsed_s) {
   return after > before ? static_cast<double>(after - before) / elapsed_s : 0.0;
 }
 
-Source measured(const StatusMessage::Neighbor& before, const StatusMessage::Neighbor& after,
+Source measured(const client::Status::Neighbor& before, const client::Status::Neighbor& after,
                 const std::string& kind, double elapsed_s) {
-  const StatusMessage::Totals none;
-  StatusMessage::Totals totals = value_or(after.measurements, kind, none);
-  Source source{.neighbor = after.neighbor,
+  const client::Status::Totals none;
+  client::Status::Totals totals = value_or(after.measurements, kind, none);
+  Source source{.neighbor = RobotId{after.peer},
                 .name = after.name,
                 .kind = kind,
                 .rate_hz = rate_of(sum_of(value_or(before.measurements, kind, none)),
@@ -54,12 +54,12 @@ Source measured(const StatusMessage::Neighbor& before, const StatusMessage::Neig
   return source;
 }
 
-Source reported(const StatusMessage::Neighbor& before, const StatusMessage::Neighbor& after,
+Source reported(const client::Status::Neighbor& before, const client::Status::Neighbor& after,
                 double elapsed_s) {
-  const StatusMessage::Reports old = before.reports.value_or(StatusMessage::Reports());
-  const StatusMessage::Reports now = after.reports.value_or(
-      StatusMessage::Reports{.received = 0, .lost = 0, .restarts = 0, .age_s = kUnknownAge});
-  Source source{.neighbor = after.neighbor,
+  const client::Status::Reports old = before.reports.value_or(client::Status::Reports());
+  const client::Status::Reports now = after.reports.value_or(
+      client::Status::Reports{.received = 0, .lost = 0, .restarts = 0, .age_s = kUnknownAge});
+  Source source{.neighbor = RobotId{after.peer},
                 .name = after.name,
                 .kind = "reports",
                 .rate_hz = rate_of(old.received, now.received, elapsed_s),
@@ -105,20 +105,20 @@ std::string json_of(const std::vector<Source>& sources, double elapsed_s) {
 
 }  // namespace
 
-std::vector<Source> sources_of(const StatusMessage& before, const StatusMessage& after,
+std::vector<Source> sources_of(const client::Status& before, const client::Status& after,
                                double elapsed_s) {
   std::vector<Source> sources;
-  for (const StatusMessage::Neighbor& neighbor : after.neighbors) {
+  for (const client::Status::Neighbor& neighbor : after.neighbors) {
     const auto found =
-        std::ranges::find(before.neighbors, neighbor.neighbor, &StatusMessage::Neighbor::neighbor);
-    const StatusMessage::Neighbor old =
-        found == before.neighbors.end() ? StatusMessage::Neighbor{} : *found;
+        std::ranges::find(before.neighbors, neighbor.peer, &client::Status::Neighbor::peer);
+    const client::Status::Neighbor old =
+        found == before.neighbors.end() ? client::Status::Neighbor{} : *found;
     for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind) {
       sources.push_back(measured(
           old, neighbor, std::string(name_of(static_cast<MeasurementKind>(kind))), elapsed_s));
     }
     sources.push_back(reported(old, neighbor, elapsed_s));
-    sources.push_back({.neighbor = neighbor.neighbor,
+    sources.push_back({.neighbor = RobotId{neighbor.peer},
                        .name = neighbor.name,
                        .kind = "imu",
                        .rate_hz = 0.0,

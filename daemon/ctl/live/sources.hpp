@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "net/client/daemon_client.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 
 namespace crepes {
 
@@ -20,14 +20,14 @@ struct Source {
   std::string name;  ///< the neighbor's
   std::string kind;  ///< bearing, peer_bearing, range, ..., reports, imu
   double rate_hz = 0.0;
-  double age_s = 0.0;             ///< age of the newest; NaN if there was none
-  std::uint64_t used = 0;         ///< since the daemon started
-  StatusMessage::Totals refused;  ///< by reason
+  double age_s = 0.0;              ///< age of the newest; NaN if there was none
+  std::uint64_t used = 0;          ///< since the daemon started
+  client::Status::Totals refused;  ///< by reason
 };
 
 /// The rates between two statuses of a daemon, `elapsed_s` apart.
-[[nodiscard]] std::vector<Source> sources_of(const StatusMessage& before,
-                                             const StatusMessage& after, double elapsed_s);
+[[nodiscard]] std::vector<Source> sources_of(const client::Status& before,
+                                             const client::Status& after, double elapsed_s);
 
 [[nodiscard]] Result<std::string> sources(const SourcesOptions& options);
 

@@ -14,21 +14,20 @@ namespace {
 using Rows = std::vector<std::vector<std::string>>;
 
 /// For example "gated 3, late 1"; empty without totals.
-std::string text_of(const StatusMessage::Totals& totals) {
+std::string text_of(const client::Status::Totals& totals) {
   std::string text;
   for (const auto& [name, total] : totals)
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, total);
   return text;
 }
 
-std::string head_of(const StatusMessage& status) {
+std::string head_of(const client::Status& status) {
   const double share = status.uptime_s > 0 ? 100.0 * status.cpu_s / status.uptime_s : 0.0;
-  return fmt::format("robot {} {}, up {} s, {} % of a core, {} MB\n", status.self.value,
-                     status.name, fixed(status.uptime_s, 0), fixed(share, 1),
-                     fixed(status.rss_mb, 0));
+  return fmt::format("robot {} {}, up {} s, {} % of a core, {} MB\n", status.self, status.name,
+                     fixed(status.uptime_s, 0), fixed(share, 1), fixed(status.rss_mb, 0));
 }
 
-std::string sensors_of(const StatusMessage& status) {
+std::string sensors_of(const client::Status& status) {
   Rows rows{{"sensor", "rate Hz", "state", "faults", "counts"}};
   for (const auto& sensor : status.sensors) {
     const std::string what = sensor.message.empty() ? "fault" : sensor.message;
@@ -38,20 +37,19 @@ std::string sensors_of(const StatusMessage& status) {
   return text_table(rows);
 }
 
-std::string neighbors_of(const StatusMessage& status) {
+std::string neighbors_of(const client::Status& status) {
   Rows rows{{"neighbor", "state", "heard ms ago", "lost %", "lost now %", "clock s", "+- ms", "ppm",
              "why not"}};
   for (const auto& neighbor : status.neighbors) {
     std::vector<std::string> row{
-        neighbor.name.empty() ? std::to_string(neighbor.neighbor.value) : neighbor.name,
-        neighbor.state};
+        neighbor.name.empty() ? std::to_string(neighbor.peer) : neighbor.name, neighbor.state};
     const auto& reports = neighbor.reports;
     const double sent = reports ? static_cast<double>(reports->received + reports->lost) : 0.0;
     row.push_back(reports ? fixed(1e3 * reports->age_s, 0) : "-");
     row.push_back(sent > 0 ? fixed(100.0 * static_cast<double>(reports->lost) / sent, 1) : "-");
     row.push_back(reports ? fixed(100.0 * reports->loss, 1) : "-");
     const auto clock =
-        std::ranges::find(status.clocks, neighbor.neighbor, &StatusMessage::Clock::peer);
+        std::ranges::find(status.clocks, neighbor.peer, &client::Status::Clock::peer);
     const bool known = clock != status.clocks.end();
     row.push_back(known ? fixed(clock->offset_s, 6) : "-");
     row.push_back(known ? fixed(1e3 * clock->sigma_s, 3) : "-");
@@ -63,7 +61,7 @@ std::string neighbors_of(const StatusMessage& status) {
 }
 
 /// What the team finds wrong with a robot; on a healthy team this is empty.
-std::string faults_of(const StatusMessage& status) {
+std::string faults_of(const client::Status& status) {
   std::string text;
   for (const std::string& fault : status.faults) text += fmt::format("this robot: {}\n", fault);
   for (const auto& neighbor : status.neighbors) {
@@ -73,9 +71,9 @@ std::string faults_of(const StatusMessage& status) {
   return text;
 }
 
-std::string mesh_of(const StatusMessage& status) {
+std::string mesh_of(const client::Status& status) {
   if (!status.mesh) return "";
-  const StatusMessage::Mesh& mesh = *status.mesh;
+  const client::Status::Mesh& mesh = *status.mesh;
   const std::string keys = mesh.sealed ? (mesh.signs ? "sealed and signed" : "sealed, not signed")
                                        : (mesh.signs ? "signed, not sealed" : "open");
   std::string text =
@@ -86,7 +84,7 @@ std::string mesh_of(const StatusMessage& status) {
 }
 
 /// What had no room in this robot's share of the air.
-std::string thinned_of(const StatusMessage& status) {
+std::string thinned_of(const client::Status& status) {
   const auto total = [&](const char* name) {
     const auto found = status.network.find(name);
     return found == status.network.end() ? std::uint64_t{0} : found->second;
@@ -102,7 +100,7 @@ std::string thinned_of(const StatusMessage& status) {
 }
 
 /// Everything refused, lost or dropped; on a healthy robot this is short.
-std::string totals_of(const StatusMessage& status) {
+std::string totals_of(const client::Status& status) {
   std::string text;
   if (!status.network.empty()) text += fmt::format("network: {}\n", text_of(status.network));
   if (!status.queues.empty())
@@ -112,7 +110,7 @@ std::string totals_of(const StatusMessage& status) {
 
 }  // namespace
 
-std::string status_text(const StatusMessage& status) {
+std::string status_text(const client::Status& status) {
   return fmt::format("{}\n{}\n{}\n{}{}{}{}", head_of(status), sensors_of(status),
                      neighbors_of(status), faults_of(status), mesh_of(status), thinned_of(status),
                      totals_of(status));

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "net/client/daemon_client.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 
 namespace crepes {
 
@@ -15,6 +15,6 @@ struct StatusOptions {
 [[nodiscard]] Result<std::string> status(const StatusOptions& options);
 
 /// Sensors, neighbors and why there is no pose, clocks, mesh, load.
-[[nodiscard]] std::string status_text(const StatusMessage& status);
+[[nodiscard]] std::string status_text(const client::Status& status);
 
 }  // namespace crepes

@@ -23,13 +23,13 @@ class Wait {
   [[nodiscard]] const std::string& why() const { return why_; }
 
   /// The answer, once the pose is sufficient.
-  [[nodiscard]] std::optional<std::string> handle(const DaemonAnswer& answer) {
-    if (const auto* status = std::get_if<StatusMessage>(&answer.message)) handle_status(*status);
-    if (const auto* refusal = std::get_if<ErrorMessage>(&answer.message))
+  [[nodiscard]] std::optional<std::string> handle(const client::Answer& answer) {
+    if (const auto* status = std::get_if<client::Status>(&answer.message)) handle_status(*status);
+    if (const auto* refusal = std::get_if<client::Error>(&answer.message))
       why_ = "daemon: " + refusal->message;
-    const auto* heard = std::get_if<PoseMessage>(&answer.message);
-    if (heard == nullptr || heard->pose.neighbor != options_.peer) return std::nullopt;
-    const double sigma_m = sigma_of(heard->pose.T_B_N.covariance).position_m;
+    const auto* heard = std::get_if<client::Pose>(&answer.message);
+    if (heard == nullptr || heard->peer != options_.peer.value) return std::nullopt;
+    const double sigma_m = sigma_of(neighbor_pose_of(*heard).T_B_N.covariance).position_m;
     if (options_.max_sigma_m && !(sigma_m <= *options_.max_sigma_m)) {
       why_ = fmt::format("its position is known to {} m only", fixed(sigma_m, 3));
       return std::nullopt;
@@ -38,18 +38,18 @@ class Wait {
   }
 
  private:
-  void handle_status(const StatusMessage& status) {
+  void handle_status(const client::Status& status) {
     const auto neighbor =
-        std::ranges::find(status.neighbors, options_.peer, &StatusMessage::Neighbor::neighbor);
+        std::ranges::find(status.neighbors, options_.peer.value, &client::Status::Neighbor::peer);
     const bool known = neighbor != status.neighbors.end();
     if (known && neighbor->state == "none") why_ = neighbor->reason;
     if (!known && !status.neighbors.empty()) why_ = "it is no other robot of this swarm";
   }
 
-  static std::string line_of(const PoseMessage& heard, double sigma_m) {
-    const Eigen::Vector3d& p = heard.pose.T_B_N.pose.p;
-    return fmt::format("{} {} at {} {} {} m, sigma {} m", heard.name, name_of(heard.pose.mode),
-                       fixed(p.x(), 3), fixed(p.y(), 3), fixed(p.z(), 3), fixed(sigma_m, 3));
+  static std::string line_of(const client::Pose& heard, double sigma_m) {
+    const client::Vector& p = heard.position;
+    return fmt::format("{} {} at {} {} {} m, sigma {} m", heard.name, name_of(heard.mode),
+                       fixed(p.x, 3), fixed(p.y, 3), fixed(p.z, 3), fixed(sigma_m, 3));
   }
 
   const WaitposeOptions& options_;
@@ -59,24 +59,16 @@ class Wait {
 }  // namespace
 
 Result<std::string> wait_for_pose(const WaitposeOptions& options) {
-  Result<DaemonClient> client = DaemonClient::open(options.daemon);
-  if (!client) return tl::unexpected(client.error());
+  auto daemon =
+      connect(options.daemon, {.polls = {{.peer = options.peer.value, .period_s = 0.25}}});
+  if (!daemon) return tl::unexpected(daemon.error());
   const MonotonicClock clock;
   const Timestamp end = clock.now() + from_seconds(options.timeout_s);
-  Timestamp renewal = clock.now();
   Wait wait(options);
   while (clock.now() < end) {
-    if (clock.now() >= renewal) {
-      (void)client->watch();  // the daemon may not run yet
-      (void)client->poll(options.peer);
-      renewal = clock.now() + 250ms;
-    }
-    const auto answer = client->receive(50ms);
-    if (!answer || !*answer) continue;
-    if (auto found = wait.handle(**answer)) {
-      (void)client->unwatch();
-      return *found + "\n";
-    }
+    const auto answer = daemon->receive(50ms);
+    if (!answer) continue;
+    if (const auto found = wait.handle(*answer)) return *found + "\n";
   }
   return fail(ErrorCode::kNotFound,
               fmt::format("no pose of robot {} within {} s: {}", options.peer.value,

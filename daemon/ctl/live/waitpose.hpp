@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "net/client/daemon_client.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 
 namespace crepes {
 

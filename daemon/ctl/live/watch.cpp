@@ -11,44 +11,39 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Duration kRenewal = 1s;     ///< of WATCH and POLL
 constexpr Duration kMaxSilence = 3s;  ///< a daemon silent for longer does not run
 
-Result<void> ask(DaemonClient& client, const WatchScreen& screen) {
-  return client.watch().and_then([&] { return client.poll(); }).and_then([&]() -> Result<void> {
-    if (const auto neighbor = screen.detailed_neighbor()) return client.poll(*neighbor);
-    return {};
-  });
+client::Requests requests_for(const std::optional<RobotId>& detailed) {
+  client::Requests requests{.polls = {{}}};
+  if (detailed) requests.polls.push_back({.peer = detailed->value});
+  return requests;
 }
 
 /// Exchanges messages with the daemon. Calls `show` after every message or pause; `show` returns
 /// whether to continue.
 template <class Show>
 Result<void> converse(const WatchOptions& options, WatchScreen& screen, const Show& show) {
-  Result<DaemonClient> client = DaemonClient::open(options.daemon);
-  if (!client) return tl::unexpected(client.error());
+  Result<client::Connection> daemon = connect(options.daemon, requests_for({}));
+  if (!daemon) return tl::unexpected(daemon.error());
   const MonotonicClock clock;
   const Timestamp start = clock.now();
-  Timestamp renewal = start;
   std::optional<RobotId> asked;
   StopSignals stop;
   for (;;) {
     const Timestamp now = clock.now();
     if (stop.requested() || (options.for_s && now - start >= from_seconds(*options.for_s))) break;
-    if (now >= renewal || screen.detailed_neighbor() != asked) {
-      if (auto sent = ask(*client, screen); !sent) return sent;
-      renewal = now + kRenewal;
+    if (screen.detailed_neighbor() != asked) {
       asked = screen.detailed_neighbor();
+      daemon->ask(requests_for(asked));
     }
-    const auto answer = client->receive(50ms);
-    if (!answer) return tl::unexpected(answer.error());
-    if (*answer) screen.handle_message((*answer)->message, clock.now());
-    if (!screen.last_message_time() && now - start > kMaxSilence)
-      return tl::unexpected(no_answer_from(options.daemon));
-    if (!show(*answer, clock.now())) break;
+    const auto answer = daemon->receive(50ms);
+    if (answer) screen.handle_message(answer->message, clock.now());
+    if (!screen.last_message_time() && now - start > kMaxSilence) break;
+    if (!show(answer, clock.now())) break;
   }
-  if (!screen.last_message_time()) return tl::unexpected(no_answer_from(options.daemon));
-  return client->unwatch();
+  if (!screen.last_message_time())
+    return tl::unexpected(no_answer_from(options.daemon, daemon->send_fault()));
+  return {};
 }
 
 /// Whether the screen is complete: poses arrive within a period or two after STATUS, which names
@@ -68,7 +63,7 @@ class Completeness {
 Result<void> stream_json(const WatchOptions& options) {
   WatchScreen screen;
   Completeness complete;
-  return converse(options, screen, [&](const std::optional<DaemonAnswer>& answer, Timestamp now) {
+  return converse(options, screen, [&](const std::optional<client::Answer>& answer, Timestamp now) {
     if (answer && !print(answer->text + "\n")) return false;
     return !(options.once && complete.reached(screen, now));
   });

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "net/client/daemon_client.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 
 namespace crepes {
 

@@ -113,7 +113,7 @@ double rank_of(const NeighborView& view, WatchScreen::Order order, Timestamp now
 }
 
 /// The age and the totals of each kind of measurement.
-std::string details_of(const StatusMessage::Neighbor& neighbor, const ScreenFormat& format) {
+std::string details_of(const client::Status::Neighbor& neighbor, const ScreenFormat& format) {
   const std::vector<ScreenColumn> columns{{"source", 14}, {"age ms", 8}};
   std::string text =
       screen_titles(columns, format) + toned("  totals", Tone::kTitle, format) + "\n";
@@ -161,22 +161,23 @@ std::string help_text(const ScreenFormat& format) {
 
 }  // namespace
 
-void WatchScreen::handle_message(const DaemonMessage& message, Timestamp now) {
+void WatchScreen::handle_message(const client::Message& message, Timestamp now) {
   last_message_time_ = last_ = now;
-  if (const auto* pose = std::get_if<PoseMessage>(&message)) {
-    names_[pose->pose.neighbor] = pose->name;
-    neighbors_[pose->pose.neighbor].update(pose->pose, now);
-  } else if (const auto* status = std::get_if<StatusMessage>(&message)) {
+  if (const auto* pose = std::get_if<client::Pose>(&message)) {
+    names_[RobotId{pose->peer}] = pose->name;
+    neighbors_[RobotId{pose->peer}].update(neighbor_pose_of(*pose), now);
+  } else if (const auto* status = std::get_if<client::Status>(&message)) {
     handle_status(*status, now);
-  } else if (const auto* refusal = std::get_if<ErrorMessage>(&message)) {
+  } else if (const auto* refusal = std::get_if<client::Error>(&message)) {
     error_ = refusal->message;
   }
 }
 
-void WatchScreen::handle_status(const StatusMessage& status, Timestamp /*now*/) {
-  for (const StatusMessage::Neighbor& neighbor : status.neighbors) {
-    if (!neighbor.name.empty()) names_[neighbor.neighbor] = neighbor.name;
-    neighbors_[neighbor.neighbor].set_reason(neighbor.reason);
+void WatchScreen::handle_status(const client::Status& status, Timestamp /*now*/) {
+  for (const client::Status::Neighbor& neighbor : status.neighbors) {
+    const RobotId id{neighbor.peer};
+    if (!neighbor.name.empty()) names_[id] = neighbor.name;
+    neighbors_[id].set_reason(neighbor.reason);
   }
   if (status.sensors.empty()) {  // the answer about one neighbor
     if (!status.neighbors.empty()) details_ = status.neighbors.front();
@@ -265,11 +266,11 @@ std::string WatchScreen::head(Timestamp now, const ScreenFormat& format) const {
   };
   if (status_) {
     head.clear();
-    add(fmt::format("robot {} {}, up {} s, {} % of a core, {} MB", status_->self.value,
-                    status_->name, fixed(status_->uptime_s, 0), fixed(100.0 * cpu_share_, 1),
+    add(fmt::format("robot {} {}, up {} s, {} % of a core, {} MB", status_->self, status_->name,
+                    fixed(status_->uptime_s, 0), fixed(100.0 * cpu_share_, 1),
                     fixed(status_->rss_mb, 0)),
         Tone::kTitle);
-    for (const StatusMessage::Sensor& sensor : status_->sensors) {
+    for (const client::Status::Sensor& sensor : status_->sensors) {
       if (sensor.ok) continue;
       const std::string what = sensor.message.empty() ? "fault" : sensor.message;
       add(fmt::format("{}: {}", sensor.name, what), Tone::kBad);
@@ -304,7 +305,7 @@ std::string WatchScreen::text(Timestamp now, const ScreenFormat& format) const {
   if (shows_help_) return help_text(format);
   std::string text = head(now, format) + "\n" + table(now, format);
   if (!format.is_interactive) return text;
-  if (shows_details_ && picked_ && details_ && details_->neighbor == *picked_) {
+  if (shows_details_ && picked_ && details_ && details_->peer == picked_->value) {
     text += "\n" + toned(name_of_robot(*picked_), Tone::kTitle, format) + "\n" +
             details_of(*details_, format);
   }

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/neighbor_view.hpp"
 #include "daemon/ctl/live/screen_text.hpp"
-#include "net/client/daemon_client.hpp"
 
 namespace crepes {
 
@@ -18,7 +18,7 @@ class WatchScreen {
   enum class Order : std::uint8_t { kId, kName, kDistance, kSigma, kAge };
 
   /// `now` is the client's time.
-  void handle_message(const DaemonMessage& message, Timestamp now);
+  void handle_message(const client::Message& message, Timestamp now);
   /// q quits; ? shows the help, which any other key closes; s sorts by the next column; j and k (or
   /// the arrows, as ESC [ B and ESC [ A) pick a neighbor; Enter shows or hides its details. Other
   /// keys do nothing.
@@ -35,7 +35,7 @@ class WatchScreen {
   [[nodiscard]] std::string text(Timestamp now, const ScreenFormat& format) const;
 
  private:
-  void handle_status(const StatusMessage& status, Timestamp now);
+  void handle_status(const client::Status& status, Timestamp now);
   void handle_command(char key);
   [[nodiscard]] std::string head(Timestamp now, const ScreenFormat& format) const;
   [[nodiscard]] std::string table(Timestamp now, const ScreenFormat& format) const;
@@ -46,8 +46,8 @@ class WatchScreen {
 
   std::map<RobotId, NeighborView> neighbors_;
   std::map<RobotId, std::string> names_;
-  std::optional<StatusMessage> status_;
-  std::optional<StatusMessage::Neighbor> details_;
+  std::optional<client::Status> status_;
+  std::optional<client::Status::Neighbor> details_;
   std::optional<Timestamp> last_message_time_;
   double cpu_share_ = 0.0;
   std::string error_;

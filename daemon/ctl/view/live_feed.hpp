@@ -2,9 +2,10 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/view/live_messages.hpp"
-#include "net/client/daemon_client.hpp"
 
 namespace crepes {
 
@@ -24,15 +25,14 @@ class LiveFeed {
   [[nodiscard]] std::string drain(Timestamp now) { return messages_.drain(now); }
 
  private:
-  LiveFeed(DaemonClient client, LiveMessages messages)
-      : client_(std::move(client)), messages_(std::move(messages)) {}
-  void ask(Timestamp now, Interest interest);
+  LiveFeed(client::Connection daemon, LiveMessages messages)
+      : daemon_(std::move(daemon)), messages_(std::move(messages)) {}
+  void ask(Interest interest);
 
-  DaemonClient client_;
+  client::Connection daemon_;
   LiveMessages messages_;
-  Timestamp next_request_{};
-  int requests_ = 0;
-  bool is_subscribed_ = false;
+  Interest asked_ = Interest::kNone;
+  std::vector<RobotId> asked_about_;  ///< the neighbors
 };
 
 }  // namespace crepes

@@ -45,27 +45,27 @@ std::string kind_of(const Json& status) {
 
 }  // namespace
 
-void LiveMessages::add(const DaemonAnswer& answer, Timestamp now) {
+void LiveMessages::add(const client::Answer& answer, Timestamp now) {
   last_message_ = now;
-  if (const auto* heard = std::get_if<PoseMessage>(&answer.message)) {
-    new_poses_[heard->pose.neighbor] = heard->pose;
-  } else if (const auto* status = std::get_if<StatusMessage>(&answer.message)) {
+  if (const auto* heard = std::get_if<client::Pose>(&answer.message)) {
+    new_poses_[RobotId{heard->peer}] = neighbor_pose_of(*heard);
+  } else if (const auto* status = std::get_if<client::Status>(&answer.message)) {
     add_status(*status, answer.text);
   }
 }
 
 /// Written anew, because a datagram may contain line ends, which would end the event.
-void LiveMessages::add_status(const StatusMessage& status, const std::string& text) {
+void LiveMessages::add_status(const client::Status& status, const std::string& text) {
   const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object()) return;
   const std::string kind = kind_of(json);
   const std::string event = stream_event("status", dump(json));
   statuses_[kind] = event;
   new_statuses_ += event;
-  robot_ = ViewedRobot{status.self, status.name};
+  robot_ = ViewedRobot{RobotId{status.self}, status.name};
   if (kind != "all") return;
   neighbors_.clear();
-  for (const auto& neighbor : status.neighbors) neighbors_.push_back(neighbor.neighbor);
+  for (const auto& neighbor : status.neighbors) neighbors_.push_back(RobotId{neighbor.peer});
 }
 
 bool LiveMessages::is_silent(Timestamp now) const {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "net/client/daemon_client.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 
 namespace crepes {
 
@@ -24,7 +24,7 @@ class LiveMessages {
  public:
   explicit LiveMessages(DaemonAddress daemon) : daemon_(std::move(daemon)) {}
 
-  void add(const DaemonAnswer& answer, Timestamp now);
+  void add(const client::Answer& answer, Timestamp now);
 
   /// The events since the last call: `frame` with the poses that are new, `status` for each STATUS,
   /// `link` when the daemon falls silent or answers again.
@@ -38,7 +38,7 @@ class LiveMessages {
   [[nodiscard]] const std::vector<RobotId>& neighbors() const { return neighbors_; }
 
  private:
-  void add_status(const StatusMessage& status, const std::string& text);
+  void add_status(const client::Status& status, const std::string& text);
   [[nodiscard]] bool is_silent(Timestamp now) const;
   [[nodiscard]] std::string link_event(bool is_silent) const;
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "net/client/daemon_client.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 
 namespace crepes {
 

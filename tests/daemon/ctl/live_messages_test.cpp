@@ -27,15 +27,15 @@ NeighborPose pose_of(std::uint16_t id, Timestamp stamp) {
   return pose;
 }
 
-DaemonAnswer answer_of(const std::string& text) {
-  return {.text = text, .message = parse_message(text).value()};
+client::Answer answer_of(const std::string& text) {
+  return {.message = client::parse(text).value(), .text = text};
 }
 
-DaemonAnswer pose_answer(std::uint16_t id, Timestamp stamp) {
+client::Answer pose_answer(std::uint16_t id, Timestamp stamp) {
   return answer_of(pose_json(1, RobotId{1}, "r", pose_of(id, stamp)));
 }
 
-DaemonAnswer status_answer() {
+client::Answer status_answer() {
   SystemStatus status;
   status.self = RobotId{1};
   status.name = "r1";
@@ -98,7 +98,7 @@ TEST(LiveMessages, GreetALatePageWithTheNewestStatus) {
 }
 
 TEST(LiveMessages, PutAStatusWithLineEndsIntoOneLine) {
-  DaemonAnswer answer = status_answer();
+  client::Answer answer = status_answer();
   answer.text.insert(1, "\n\nevent: frame\n");
   LiveMessages messages({});
 

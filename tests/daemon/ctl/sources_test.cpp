@@ -8,14 +8,14 @@
 namespace crepes {
 namespace {
 
-StatusMessage status_with(std::uint64_t fused, std::uint64_t gated, std::uint64_t reports) {
-  StatusMessage::Neighbor neighbor;
-  neighbor.neighbor = RobotId{2};
+client::Status status_with(std::uint64_t fused, std::uint64_t gated, std::uint64_t reports) {
+  client::Status::Neighbor neighbor;
+  neighbor.peer = 2;
   neighbor.name = "r2";
   neighbor.measurements["bearing"] = {{"fused", fused}, {"gated", gated}};
   neighbor.ages_s = {{"bearing", 0.11}, {"imu", 0.02}};
   neighbor.reports = {.received = reports, .lost = 7, .restarts = 0, .age_s = 0.015};
-  StatusMessage status;
+  client::Status status;
   status.neighbors = {neighbor};
   return status;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <numbers>
 #include <sstream>
 
@@ -16,19 +17,21 @@ constexpr Timestamp kStart{seconds{1000}};
 constexpr ScreenFormat kFile{};
 constexpr ScreenFormat kTerminal{.columns = 80, .is_interactive = true};
 
-PoseMessage pose_of(std::uint16_t id, double x, double sigma_m) {
-  PoseMessage message;
-  message.self = RobotId{1};
+client::Pose pose_of(std::uint16_t id, double x, double sigma_m) {
+  client::Pose message;
+  message.self = 1;
   message.name = "r" + std::to_string(id);
-  message.pose.neighbor = RobotId{id};
-  message.pose.T_B_N.pose.p = {x, 0.0, 0.0};
-  message.pose.T_B_N.covariance = sigma_m * sigma_m * Matrix6d::Identity();
+  message.peer = id;
+  message.position = {x, 0.0, 0.0};
+  message.covariance.emplace();
+  for (const std::size_t diagonal : {0, 6, 11, 15, 18, 20})
+    message.covariance->at(diagonal) = sigma_m * sigma_m;
   return message;
 }
 
-StatusMessage status_of(double uptime_s, double cpu_s) {
-  StatusMessage status;
-  status.self = RobotId{1};
+client::Status status_of(double uptime_s, double cpu_s) {
+  client::Status status;
+  status.self = 1;
   status.name = "r1";
   status.uptime_s = uptime_s;
   status.cpu_s = cpu_s;
@@ -38,8 +41,8 @@ StatusMessage status_of(double uptime_s, double cpu_s) {
                      .message = "unplugged",
                      .faults = {},
                      .counts = {}}};
-  StatusMessage::Neighbor hidden;
-  hidden.neighbor = RobotId{4};
+  client::Status::Neighbor hidden;
+  hidden.peer = 4;
   hidden.name = "r4";
   hidden.state = "none";
   hidden.reason = "not seen";
@@ -120,9 +123,9 @@ TEST(WatchScreen, WantsTheDetailsOfWhomEnterPicks) {
   type(screen, "jj\n");
   EXPECT_EQ(screen.detailed_neighbor(), RobotId{3});
 
-  StatusMessage answer;
-  StatusMessage::Neighbor told;
-  told.neighbor = RobotId{3};
+  client::Status answer;
+  client::Status::Neighbor told;
+  told.peer = 3;
   told.state = "direct";
   told.measurements["bearing"] = {{"fused", 77}, {"gated", 5}};
   told.ages_s["bearing"] = 0.125;
@@ -152,14 +155,14 @@ std::size_t widest_line(const std::string& text) {
 }
 
 /// As wide as numbers get: far away, turned by nearly 180 degrees, badly known.
-PoseMessage widest_pose(std::uint16_t id) {
-  PoseMessage message = pose_of(id, -123.456, 0.999);
+client::Pose widest_pose(std::uint16_t id) {
+  client::Pose message = pose_of(id, -123.456, 0.999);
   message.name = "reconnaissance-12";
-  message.pose.mode = PoseMode::kPredicted;
-  message.pose.T_B_N.pose.p = {-123.456, -98.765, -43.21};
-  message.pose.T_B_N.pose.q =
-      Eigen::AngleAxisd(-179.9 / 180.0 * std::numbers::pi, Eigen::Vector3d::UnitZ());
-  message.pose.age_s = 0.0199;
+  message.mode = client::Mode::kPredicted;
+  message.position = {-123.456, -98.765, -43.21};
+  const double half = -179.9 / 180.0 * std::numbers::pi / 2.0;
+  message.orientation = {std::cos(half), 0.0, 0.0, std::sin(half)};
+  message.age_s = 0.0199;
   return message;
 }
 
@@ -167,7 +170,7 @@ TEST(WatchScreen, FitsEightyColumnsWithTheWholeReason) {
   const std::string reason =
       "a reason that is much longer than any that the daemon has at the moment, because the next "
       "one may be longer";
-  StatusMessage status = status_of(123456.0, 1.0);
+  client::Status status = status_of(123456.0, 1.0);
   status.sensors.front().message = reason;
   status.neighbors.front().reason = reason;
   WatchScreen screen;

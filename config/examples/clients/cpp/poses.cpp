@@ -1,95 +1,51 @@
-// Poses of a crepesd in C++: POSIX sockets and nlohmann's json.hpp, one file.
-//   g++ -std=c++17 -o poses poses.cpp && ./poses [ADDRESS [PORT [COUNT]]]
-// prints one line a pose: t_ns peer mode x y z [m, in our body's axes].
-#include <netdb.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
+// Poses of a crepesd in C++: one line a pose, t_ns peer mode x y z [m, in our body's axes].
+//   ./poses [ADDRESS [PORT [COUNT]]]
 #include <chrono>
+#include <crepes/client.hpp>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <nlohmann/json.hpp>
+#include <iostream>
 #include <string>
-
-using Json = nlohmann::json;
 
 namespace {
 
-// A socket that speaks with this daemon and hears nobody else; -1 if there is none.
-int connect_to(const char* address, const char* port) {
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_DGRAM;
-  hints.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
-  addrinfo* found = nullptr;
-  if (getaddrinfo(address, port, &hints, &found) != 0) return -1;
-  const int line = socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  const bool connected = line >= 0 && connect(line, found->ai_addr, found->ai_addrlen) == 0;
-  freeaddrinfo(found);
-  if (!connected && line >= 0) close(line);
-  return connected ? line : -1;
-}
-
-void ask(int line, bool enable, const std::string& cookie) {
-  Json request{{"class", "WATCH"}, {"enable", enable}};
-  if (cookie.empty()) {
-    request["pad"] = std::string(64, ' ');  // a daemon elsewhere answers no shorter request
-  } else {
-    request["cookie"] = cookie;
-  }
-  const std::string text = request.dump();
-  (void)!send(line, text.data(), text.size(), 0);  // no daemon yet: asked again in a second
-}
-
-// The next object; null if none came for a while.
-Json receive(int line) {
-  pollfd ready{line, POLLIN, 0};
-  char bytes[2048];
-  if (poll(&ready, 1, 200) <= 0) return nullptr;
-  const ssize_t size = recv(line, bytes, sizeof bytes, 0);
-  return size < 0 ? Json() : Json::parse(bytes, bytes + size, nullptr, /*allow_exceptions=*/false);
-}
-
-void print(const Json& pose) {
-  const Json& p = pose.at("position");
-  std::printf("%s %d %s %.6f %.6f %.6f\n", pose.at("t_ns").get<std::string>().c_str(),
-              pose.at("peer").get<int>(), pose.at("mode").get<std::string>().c_str(),
-              p.at("x").get<double>(), p.at("y").get<double>(), p.at("z").get<double>());
+void print(const crepes::client::Pose& pose) {
+  const crepes::client::Vector& p = pose.position;
+  std::printf("%lld %u %s %.6f %.6f %.6f\n", static_cast<long long>(pose.t_ns), unsigned{pose.peer},
+              std::string(name_of(pose.mode)).c_str(), p.x, p.y, p.z);
   std::fflush(stdout);
+}
+
+// A number of the command line; `otherwise` without one.
+long number(int argc, char** argv, int index, long otherwise) {
+  return argc > index ? std::atol(argv[index]) : otherwise;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  using std::chrono::seconds;
-  using std::chrono::steady_clock;
-  const int line = connect_to(argc > 1 ? argv[1] : "127.0.0.1", argc > 2 ? argv[2] : "47475");
-  long left = argc > 3 ? std::atol(argv[3]) : -1;
-  if (line < 0) return std::fputs("not a numeric address and port\n", stderr), 2;
+  using namespace std::chrono_literals;
+  crepes::client::Address address;
+  if (argc > 1) address.address = argv[1];
+  address.port = static_cast<std::uint16_t>(number(argc, argv, 2, address.port));
+  long left = number(argc, argv, 3, -1);
 
-  std::string cookie;
-  steady_clock::time_point renewal{}, heard = steady_clock::now();
-  while (left != 0) {
-    const auto now = steady_clock::now();
-    if (now - heard > seconds(3)) return std::fputs("no answer\n", stderr), 1;
-    if (now >= renewal) {
-      renewal = now + seconds(1);  // the lease is ten seconds: a lost datagram does not matter
-      ask(line, true, cookie);
-    }
-    const Json message = receive(line);
-    if (!message.is_object()) continue;
-    heard = now;
-    const std::string name = message.value("class", "");
-    if (name == "COOKIE") {
-      cookie = message.value("cookie", "");
-      renewal = {};
-    } else if (name == "ERROR") {
-      return std::fprintf(stderr, "%s\n", message.value("message", "").c_str()), 1;
-    } else if (name == "POSE") {
-      print(message);
+  std::string fault;
+  auto daemon = crepes::client::Connection::open(address, {}, fault);
+  while (daemon && left != 0) {
+    const auto answer = daemon->receive(200ms);
+    if (!answer) {
+      // A robot would fly on and wait: the library asks again by itself.
+      if (daemon->silent_for() > 3s) fault = "no answer " + daemon->send_fault();
+    } else if (const auto* refusal = std::get_if<crepes::client::Error>(&answer->message)) {
+      fault = refusal->message;
+    } else if (const auto* pose = std::get_if<crepes::client::Pose>(&answer->message)) {
+      print(*pose);
       if (left > 0) --left;
     }
+    if (!fault.empty()) break;
   }
-  ask(line, false, cookie);
-  close(line);
+  if (!fault.empty()) std::cerr << fault << '\n';
+  return fault.empty() ? 0 : 1;
 }

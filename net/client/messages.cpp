@@ -1,0 +1,200 @@
+#include <charconv>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "net/client/client.hpp"
+
+namespace crepes::client {
+namespace {
+
+using nlohmann::json;
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw json::other_error::create(0, why, nullptr);
+}
+
+std::uint16_t id_from(const json& value) {
+  const auto id = value.get<std::int64_t>();
+  if (id < 0 || id > std::numeric_limits<std::uint16_t>::max()) refuse("no robot has this id");
+  return static_cast<std::uint16_t>(id);
+}
+
+/// Numbers of 64 bits are strings, because JSON has doubles.
+std::int64_t int64_from(const json& value) {
+  const std::string text = value.get<std::string>();
+  std::int64_t number = 0;
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (fault != std::errc() || end != text.data() + text.size()) refuse("not a number: " + text);
+  return number;
+}
+
+Mode mode_from(const std::string& name) {
+  for (const Mode mode : {Mode::kDirect, Mode::kGraph})
+    if (name == name_of(mode)) return mode;
+  return Mode::kPredicted;
+}
+
+Vector vector_from(const json& value) {
+  return {value.at("x").get<double>(), value.at("y").get<double>(), value.at("z").get<double>()};
+}
+
+std::optional<Vector> vector_in(const json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end()) return std::nullopt;
+  return vector_from(*found);
+}
+
+Quaternion quaternion_from(const json& value) {
+  const Vector xyz = vector_from(value);
+  return {value.at("w").get<double>(), xyz.x, xyz.y, xyz.z};
+}
+
+Pose pose_from(const json& object) {
+  Pose pose;
+  pose.t_ns = int64_from(object.at("t_ns"));
+  pose.self = id_from(object.at("self"));
+  pose.peer = id_from(object.at("peer"));
+  pose.name = object.value("name", "");
+  pose.mode = mode_from(object.value("mode", ""));
+  pose.position = vector_from(object.at("position"));
+  pose.orientation = quaternion_from(object.at("orientation"));
+  pose.velocity = vector_in(object, "velocity");
+  pose.up = vector_in(object, "up");
+  if (const auto found = object.find("covariance"); found != object.end()) {
+    if (found->size() != 21) refuse("a covariance has 21 numbers");
+    pose.covariance = found->get<std::array<double, 21>>();
+  }
+  pose.seq = object.value("seq", std::uint64_t{0});
+  if (object.contains("t_pub_ns")) pose.t_pub_ns = int64_from(object["t_pub_ns"]);
+  pose.age_s = object.value("age_s", 0.0);
+  pose.reset_counter = object.value("reset_counter", std::uint32_t{0});
+  pose.sources = object.value("sources", pose.sources);
+  return pose;
+}
+
+Status::Totals totals_from(const json& object, const char* key) {
+  return object.value(key, Status::Totals());
+}
+
+Status::Reports reports_from(const json& object) {
+  Status::Reports reports;
+  reports.received = object.value("received", reports.received);
+  reports.lost = object.value("lost", reports.lost);
+  reports.restarts = object.value("restarts", reports.restarts);
+  reports.age_s = object.value("age_s", reports.age_s);
+  reports.loss = object.value("loss", reports.loss);
+  return reports;
+}
+
+Status::Neighbor neighbor_from(const json& object) {
+  Status::Neighbor neighbor;
+  neighbor.peer = id_from(object.at("peer"));
+  neighbor.name = object.value("name", "");
+  neighbor.state = object.value("state", neighbor.state);
+  neighbor.reason = object.value("reason", "");
+  neighbor.faults = object.value("faults", neighbor.faults);
+  neighbor.measurements = object.value("measurements", neighbor.measurements);
+  neighbor.ages_s = object.value("ages_s", neighbor.ages_s);
+  if (const auto found = object.find("reports"); found != object.end())
+    neighbor.reports = reports_from(*found);
+  return neighbor;
+}
+
+Status::Sensor sensor_from(const json& object) {
+  return {object.at("name").get<std::string>(),
+          object.value("rate_hz", 0.0),
+          object.value("ok", false),
+          object.value("message", ""),
+          totals_from(object, "faults"),
+          totals_from(object, "counts")};
+}
+
+Status::Clock clock_from(const json& object) {
+  return {id_from(object.at("peer")), object.value("offset_s", 0.0), object.value("skew_ppm", 0.0),
+          object.value("sigma_s", 0.0)};
+}
+
+Status::Mesh mesh_from(const json& object) {
+  return {object.value("sealed", false), object.value("signed", false), object.value("warning", ""),
+          object.value("airtime", 0.0), object.value("airtime_of_all", 0.0)};
+}
+
+/// Calls `read` for each entry of a list; a missing list has none.
+template <class Read>
+void for_each_of(const json& object, const char* list, const Read& read) {
+  const auto found = object.find(list);
+  if (found == object.end()) return;
+  for (const json& entry : *found) read(entry);
+}
+
+Status status_from(const json& object) {
+  Status status;
+  status.self = id_from(object.at("self"));
+  status.name = object.value("name", "");
+  status.uptime_s = object.value("uptime_s", 0.0);
+  status.faults = object.value("faults", status.faults);
+  status.cpu_s = object.value("cpu_s", 0.0);
+  status.rss_mb = object.value("rss_mb", 0.0);
+  for_each_of(object, "neighbors",
+              [&](const json& entry) { status.neighbors.push_back(neighbor_from(entry)); });
+  for_each_of(object, "more", [&](const json& id) {
+    status.neighbors.emplace_back();
+    status.neighbors.back().peer = id_from(id);
+  });
+  for_each_of(object, "sensors",
+              [&](const json& entry) { status.sensors.push_back(sensor_from(entry)); });
+  for_each_of(object, "clocks",
+              [&](const json& entry) { status.clocks.push_back(clock_from(entry)); });
+  status.queues = totals_from(object, "queues");
+  status.network = totals_from(object, "network");
+  if (const auto mesh = object.find("mesh"); mesh != object.end()) status.mesh = mesh_from(*mesh);
+  status.is_truncated = object.value("truncated", false);
+  return status;
+}
+
+Version version_from(const json& object) {
+  return {object.value("release", ""), object.value("proto_major", 0),
+          object.value("proto_minor", 0), object.value("lease_s", 0.0)};
+}
+
+std::optional<Message> message_from(const json& object) {
+  const auto name = object.at("class").get<std::string>();
+  if (name == "POSE") return pose_from(object);
+  if (name == "STATUS") return status_from(object);
+  if (name == "VERSION") return version_from(object);
+  if (name == "ERROR") return Error{object.value("message", "")};
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string_view name_of(Mode mode) {
+  switch (mode) {
+    case Mode::kDirect:
+      return "direct";
+    case Mode::kGraph:
+      return "graph";
+    case Mode::kPredicted:
+      break;
+  }
+  return "predicted";
+}
+
+std::array<std::array<double, 6>, 6> matrix_of(const std::array<double, 21>& covariance) {
+  std::array<std::array<double, 6>, 6> P{};
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = i; j < 6; ++j) P[i][j] = P[j][i] = covariance[next++];
+  }
+  return P;
+}
+
+std::optional<Message> parse(std::string_view datagram) {
+  try {
+    return message_from(json::parse(datagram));
+  } catch (const json::exception&) {  // not of this protocol
+    return std::nullopt;
+  }
+}
+
+}  // namespace crepes::client
