@@ -36,8 +36,8 @@ Runtime::Runtime(Config config, const Clock& machine)
       uwb_settings_(uwb_sensor_settings(config_)),
       recorder_settings_(config_) {
   if (config_.sim.enabled) open_simulation();
-  for (std::size_t i = 0; i < config_.cameras.size(); ++i) {
-    cameras_.emplace_back(config_.vision);
+  for (const CameraConfig& camera : config_.cameras) {
+    cameras_.emplace_back(config_.vision, camera.device.light);
     picture_taps_.emplace_back();
   }
   active_config_ = config_;
@@ -125,7 +125,10 @@ void Runtime::update_settings() {
   net_settings_.update(net_settings(active_config_));
   imu_settings_.update(imu_sensor_settings(active_config_));
   uwb_settings_.update(uwb_sensor_settings(active_config_));
-  for (CameraQueues& camera : cameras_) camera.settings.update(active_config_.vision);
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    cameras_[i].settings.update(active_config_.vision);
+    cameras_[i].light.update(active_config_.cameras[i].device.light);
+  }
   recorder_settings_.update(active_config_);
 }
 
@@ -169,22 +172,24 @@ void Runtime::use_simulated_devices(Config& wanted) const {
 
 void Runtime::start_camera(std::size_t index, const EventSink& sense) {
   const std::string& name = config_.cameras[index].calibration.name;
+  const bool is_calibrated = config_.cameras[index].calibration.calibrated;
   CameraQueues& queues = cameras_[index];
   PictureTap& tap = picture_taps_[index];
-  start(name + " spots",
-        [name, &queues, &tap, sense](const StageContext& context, const std::stop_token& stop) {
-          const VisionStage stage{.camera_name = name,
-                                  .settings = queues.settings,
-                                  .frames = queues.frames,
-                                  .recycled = queues.recycled,
-                                  .tap = tap,
-                                  .sink = sense};
-          run_vision(stage, context, stop);
-        });
+  start(name + " spots", [name, is_calibrated, &queues, &tap, sense](const StageContext& context,
+                                                                     const std::stop_token& stop) {
+    const VisionStage stage{.camera_name = name,
+                            .is_calibrated = is_calibrated,
+                            .settings = queues.settings,
+                            .frames = queues.frames,
+                            .recycled = queues.recycled,
+                            .tap = tap,
+                            .sink = sense};
+    run_vision(stage, context, stop);
+  });
   const OpenCamera open = world_ ? sim_camera(*world_, config_, index, sim_clock_)
                                  : real_camera(config_, index, clock_);
-  start_sensor(name,
-               fixed_sensor(camera_sensor(name, open, clock_, queues.frames, queues.recycled)));
+  start_sensor(name, fixed_sensor(camera_sensor(name, open, queues.light, clock_, queues.frames,
+                                                queues.recycled)));
 }
 
 std::vector<QueueStatus> Runtime::queue_status() const {

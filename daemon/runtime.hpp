@@ -52,8 +52,10 @@ class Runtime {
 
  private:
   struct CameraQueues {
-    explicit CameraQueues(const VisionConfig& vision) : settings(vision) {}
+    CameraQueues(const VisionConfig& vision, const CameraLight& initial)
+        : settings(vision), light(initial) {}
     LiveSettings<VisionConfig> settings;
+    LiveLight light;
     FrameQueue frames{1, Overflow::kDropOldest};    // only the newest picture matters
     FrameQueue recycled{2, Overflow::kDropOldest};  // buffers on their way back to the camera
   };

@@ -28,7 +28,8 @@ std::string camera_text(const CameraCalibration& camera) {
   }
   text += line_of(kIndent, "resolution", camera.resolution);
   text += line_of(kIndent, "T_cam_imu", camera.T_cam_imu);
-  return text + line_of(kIndent, "timeshift_cam_imu", camera.timeshift_cam_imu);
+  text += line_of(kIndent, "timeshift_cam_imu", camera.timeshift_cam_imu);
+  return camera.calibrated ? text : text + line_of(kIndent, "calibrated", false);
 }
 
 std::string imu_text(const ImuNoise& imu) {

@@ -29,6 +29,7 @@ struct KalibrCamera {
     v.field("T_cam_imu", T_cam_imu, "");
     v.field("T_cn_cnm1", T_cam_before, "");
     v.field("timeshift_cam_imu", config.timeshift_cam_imu, "");
+    v.field("calibrated", config.calibrated, "");
   }
 };
 

@@ -103,13 +103,31 @@ ConfigNode shared_swarm(const ConfigNode& reference, const std::string& path,
   return faults.size() > faults_before ? ConfigNode{} : root.extract("swarm");
 }
 
+/// Members beside a members file change members of that file and add none.
+void check_overrides(const ConfigNode& here, const ConfigNode* shared, const std::string& file,
+                     ConfigFaults& faults) {
+  const auto id_of = [](const ConfigNode& member) {
+    const ConfigNode* const id = member.is_mapping() ? member.find("id") : nullptr;
+    return id == nullptr ? std::string() : id->text;
+  };
+  for (const ConfigNode& member : here.items) {
+    const bool is_known =
+        shared != nullptr && std::ranges::count(shared->items, id_of(member), id_of) > 0;
+    if (!is_known)
+      add_fault(member.place, "swarm.members",
+                fmt::format("{} has no member {}", file, id_of(member)), faults);
+  }
+}
+
 void add_members(ConfigNode& root, ConfigFaults& faults) {
   ConfigNode* const swarm = root.find("swarm");
   const auto reference = extract_text(swarm, "swarm", "members_file", faults);
   if (!reference) return;
-  if (const ConfigNode* const here = swarm->find("members"))
-    return add_fault(here->place, "swarm.members", "is given beside swarm.members_file", faults);
-  add_missing_keys(*swarm, shared_swarm(*reference, "swarm.members_file", faults));
+  ConfigNode shared = shared_swarm(*reference, "swarm.members_file", faults);
+  const ConfigNode* const here = swarm->find("members");
+  if (here != nullptr && shared.is_mapping())
+    check_overrides(*here, shared.find("members"), reference->text, faults);
+  add_missing_keys(*swarm, std::move(shared));
 }
 
 void move_to(const Place& place, ConfigNode& node) {

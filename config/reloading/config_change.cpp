@@ -2,8 +2,10 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <string_view>
+#include <utility>
 
 #include "config/writing/config_writer.hpp"
 
@@ -74,6 +76,23 @@ void walk_settings(Config& config, OnSetting on_setting) {
   config.visit(walk);
 }
 
+/// Takes over exposure and gain of every camera that both have, whatever else of it waits for a
+/// restart. Adds the keys that change.
+void change_lights(const std::vector<CameraConfig>& wanted, std::vector<CameraConfig>& cameras,
+                   std::vector<std::string>& live) {
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const auto same = std::ranges::find_if(wanted, [&](const CameraConfig& camera) {
+      return camera.calibration.name == cameras[i].calibration.name;
+    });
+    if (same == wanted.end()) continue;
+    CameraLight& light = cameras[i].device.light;
+    const CameraLight before = std::exchange(light, same->device.light);
+    if (before.exposure_us != light.exposure_us)
+      live.push_back(fmt::format("cameras[{}].exposure_us", i));
+    if (before.gain != light.gain) live.push_back(fmt::format("cameras[{}].gain", i));
+  }
+}
+
 }  // namespace
 
 ConfigChange plan_reload(const Config& running, const Config& wanted) {
@@ -90,6 +109,7 @@ ConfigChange plan_reload(const Config& running, const Config& wanted) {
 
   ConfigChange change;
   change.config = running;
+  change_lights(wanted.cameras, change.config.cameras, change.live);
   std::size_t next = 0;
   walk_settings(change.config, [&]<class T>(const std::string& key, T& value,
                                             const std::string& text, Change when) {

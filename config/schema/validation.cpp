@@ -178,14 +178,14 @@ void check_driver(const std::string& key, const CameraConfig& camera, RuleFaults
     faults.push_back({key + ".folder", "driver folder needs the directory of the pictures"});
   if (camera.device.driver == CameraDriver::kV4l2 && camera.device.id.empty())
     faults.push_back({key + ".device", "driver v4l2 needs one, as /dev/video0"});
-  if (camera.device.exposure_us &&
-      *camera.device.exposure_us >= kMicroseconds / camera.calibration.rate_hz)
+  if (camera.device.light.exposure_us &&
+      *camera.device.light.exposure_us >= kMicroseconds / camera.calibration.rate_hz)
     faults.push_back({key + ".exposure_us", "is longer than a frame at rate_hz"});
   if (camera.device.driver == CameraDriver::kV4l2 &&
       camera.device.trigger == CameraTrigger::kHardware)
     faults.push_back({key + ".trigger", "driver v4l2 has no hardware trigger"});
   if (camera.device.driver != CameraDriver::kMindVision) return;
-  if (camera.device.gain) faults.push_back({key + ".gain", "driver mindvision sets none"});
+  if (camera.device.light.gain) faults.push_back({key + ".gain", "driver mindvision sets none"});
   if (camera.device.offset != std::array{0, 0})
     faults.push_back({key + ".offset", "driver mindvision reads out the whole sensor"});
 }

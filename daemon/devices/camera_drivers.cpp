@@ -28,9 +28,11 @@ Result<std::unique_ptr<Camera>> open_device(const CameraConfig& camera, std::uin
 }  // namespace
 
 OpenCamera real_camera(const Config& config, std::size_t index, const Clock& clock) {
-  const CameraConfig camera = config.cameras[index];
   const auto number = static_cast<std::uint8_t>(index);
-  return [camera, number, &clock]() -> Result<std::unique_ptr<Camera>> {
+  return [configured = config.cameras[index], number,
+          &clock](const CameraLight& light) -> Result<std::unique_ptr<Camera>> {
+    CameraConfig camera = configured;
+    camera.device.light = light;
     if (camera.device.driver == CameraDriver::kFolder)
       return FolderCamera::open(camera.device.folder, number, clock);
     Result<std::unique_ptr<Camera>> opened = open_device(camera, number, clock);

@@ -10,11 +10,16 @@ using std::chrono::milliseconds;
 
 class CameraDevice final : public Device {
  public:
-  CameraDevice(std::unique_ptr<Camera> camera, const Clock& clock, FrameQueue& frames,
-               FrameQueue& recycled)
-      : camera_(std::move(camera)), clock_(clock), frames_(frames), recycled_(recycled) {}
+  CameraDevice(std::unique_ptr<Camera> camera, LiveLight& light, const Clock& clock,
+               FrameQueue& frames, FrameQueue& recycled)
+      : camera_(std::move(camera)),
+        light_(light),
+        clock_(clock),
+        frames_(frames),
+        recycled_(recycled) {}
 
   [[nodiscard]] Result<std::size_t> read_once(milliseconds timeout) override {
+    if (light_.has_update()) set_light();
     while (auto frame = recycled_.try_pop()) camera_->recycle(std::move(*frame));
     Result<std::optional<Frame>> frame = camera_->read_once(timeout);
     if (!frame) return tl::unexpected(frame.error());
@@ -26,28 +31,35 @@ class CameraDevice final : public Device {
 
   [[nodiscard]] SensorTotals counters() const override { return camera_->counters(); }
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
-    return camera_->diagnosis();
+    return refused_light_.empty() ? camera_->diagnosis() : refused_light_;
   }
 
  private:
+  void set_light() {
+    const Result<void> set = camera_->set_light(light_.receive());
+    refused_light_ = set ? "" : set.error().message;
+  }
+
   std::unique_ptr<Camera> camera_;
+  LiveLight& light_;
   const Clock& clock_;
   FrameQueue& frames_;
   FrameQueue& recycled_;
+  std::string refused_light_;  ///< why; empty if none was
 };
 
 }  // namespace
 
-Sensor camera_sensor(const std::string& name, const OpenCamera& open, const Clock& clock,
-                     FrameQueue& frames, FrameQueue& recycled) {
+Sensor camera_sensor(const std::string& name, const OpenCamera& open, LiveLight& light,
+                     const Clock& clock, FrameQueue& frames, FrameQueue& recycled) {
   Sensor sensor;
   sensor.name = name;
   sensor.silence_hint = "no frame: is the camera plugged in and running?";
-  sensor.open = [=, &clock, &frames, &recycled]() -> Result<std::unique_ptr<Device>> {
+  sensor.open = [=, &light, &clock, &frames, &recycled]() -> Result<std::unique_ptr<Device>> {
     while (recycled.try_pop()) continue;  // old frames would keep the previous camera open
-    Result<std::unique_ptr<Camera>> camera = open();
+    Result<std::unique_ptr<Camera>> camera = open(light.receive());
     if (!camera) return tl::unexpected(camera.error());
-    return std::make_unique<CameraDevice>(std::move(*camera), clock, frames, recycled);
+    return std::make_unique<CameraDevice>(std::move(*camera), light, clock, frames, recycled);
   };
   return sensor;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <cmath>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -50,6 +51,7 @@ SensorTotals totals_of(const ImuCounts& counts) {
 struct UwbPreprocessing {
   void apply(const std::vector<UwbRange>& /*bundle*/) {}
   [[nodiscard]] static Totals faults() { return {}; }
+  [[nodiscard]] static Totals counts() { return {}; }
   [[nodiscard]] static std::optional<std::string> diagnosis() { return std::nullopt; }
 };
 
@@ -64,18 +66,33 @@ class ImuPreprocessing {
   void apply(std::vector<ImuSample>& bundle) {
     spacing_.apply(bundle);
     std::erase_if(bundle, [this](const ImuSample& sample) { return !health_.accept(sample); });
-    for (ImuSample& sample : bundle) sample = correction_.apply(sample);
+    for (ImuSample& sample : bundle) {
+      sample = correction_.apply(sample);
+      force_mps2_ += kMemory * (sample.accel_mps2.norm() - force_mps2_);
+      turn_radps_ += kMemory * (sample.gyro_radps.norm() - turn_radps_);
+    }
   }
 
   [[nodiscard]] Totals faults() const {
     return {{"dropped", health_.counts().dropped}, {"stuck", health_.counts().stuck}};
   }
+  /// How strongly it is pulled and how fast it turns, after the correction: at rest 9.81 m/s^2 and
+  /// nothing.
+  [[nodiscard]] Totals counts() const {
+    constexpr double kMilli = 1e3;
+    return {{"force_mmps2", static_cast<std::uint64_t>(std::lround(kMilli * force_mps2_))},
+            {"turn_mradps", static_cast<std::uint64_t>(std::lround(kMilli * turn_radps_))}};
+  }
   [[nodiscard]] std::optional<std::string> diagnosis() const { return health_.diagnosis(); }
 
  private:
+  static constexpr double kMemory = 1.0 / 200.0;  // of a sample
+
   BundleSpacing spacing_;
   ImuHealth health_;
   ImuCorrection correction_;
+  double force_mps2_ = 0.0;
+  double turn_radps_ = 0.0;
 };
 
 template <class Parser, class Preprocessing>
@@ -100,6 +117,7 @@ class SerialDevice final : public Device {
   [[nodiscard]] SensorTotals counters() const override {
     SensorTotals totals = totals_of(reader_.parser().counts());
     for (auto& fault : preprocessing_.faults()) totals.faults.push_back(std::move(fault));
+    for (auto& count : preprocessing_.counts()) totals.counts.push_back(std::move(count));
     totals.faults.emplace_back("skipped_bytes", reader_.counts().skipped_bytes);
     totals.faults.emplace_back("checksum_failures", reader_.counts().checksum_failures);
     totals.counts.emplace_back("unchecked_frames", reader_.counts().unchecked);

@@ -40,11 +40,12 @@ OpenCamera sim_camera(const SimWorld& world, const Config& config, std::size_t i
                       const SimClock& clock) {
   const CameraCalibration camera = config.cameras[index].calibration;
   return [&world, &clock, camera, index, robot = config.robot.id,
-          swarm = config.swarm]() -> Result<std::unique_ptr<Camera>> {
+          swarm = config.swarm](const CameraLight& light) -> Result<std::unique_ptr<Camera>> {
     Result<RingRenderer> renderer =
         RingRenderer::make(world, robot, swarm, camera, static_cast<std::uint8_t>(index));
     if (!renderer) return tl::unexpected(renderer.error());
-    return std::make_unique<SimCamera>(std::move(*renderer), camera, clock);
+    auto opened = std::make_unique<SimCamera>(std::move(*renderer), camera, clock);
+    return opened->set_light(light).map([&] { return std::unique_ptr<Camera>(std::move(opened)); });
   };
 }
 

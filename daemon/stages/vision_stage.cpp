@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -33,12 +34,45 @@ Frame copy_of(const Frame& frame) {
   return copy;
 }
 
-std::string_view diagnosis_of(const Detection& found) {
+std::string_view diagnosis_of(const Detection& found, bool is_calibrated) {
   if (!found.failure.empty()) return found.failure;
-  return found.exposure == Exposure::kBright
-             ? "the picture is bright all over: shorten the exposure or mend the infrared filter"
-             : "";
+  if (found.exposure == Exposure::kBright)
+    return "the picture is bright all over: shorten the exposure or mend the infrared filter";
+  return is_calibrated ? ""
+                       : "not calibrated: no pose comes from this camera; record, then crepesctl "
+                         "calibrate camera";
 }
+
+/// The gray levels of the spots since the last call.
+class SpotLevels {
+ public:
+  void add(std::span<const Spot> spots) {
+    spots_ = std::max(spots_, spots.size());
+    for (const Spot& spot : spots) {
+      brightest_ = std::max(brightest_, spot.peak);
+      faintest_ = std::min(faintest_, spot.peak);
+    }
+  }
+
+  /// Adds the most `spots` in a frame, and if there were any, `brightest` and `faintest`.
+  void append_since_last_call(Totals& counts) {
+    constexpr double kWhite = 255.0;
+    const auto level = [](double peak) { return static_cast<std::uint64_t>(peak); };
+    counts.emplace_back("spots", spots_);
+    if (brightest_ > 0.0) {
+      counts.emplace_back("brightest", level(brightest_));
+      counts.emplace_back("faintest", level(faintest_));
+    }
+    spots_ = 0;
+    brightest_ = 0.0;
+    faintest_ = kWhite;
+  }
+
+ private:
+  std::size_t spots_ = 0;
+  double brightest_ = 0.0;
+  double faintest_ = 255.0;
+};
 
 /// Delays from a frame's arrival to its spots.
 class Delays {
@@ -62,17 +96,19 @@ class Delays {
 };
 
 SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::uint64_t failures,
-                       Delays& delays) {
+                       Delays& delays, SpotLevels& levels) {
   const auto [median_us, p99_us] = delays.percentiles_since_last_call();
-  return {.faults = {{"failures", failures}},
-          .counts = {{"delay_p50_us", median_us},
-                     {"delay_p99_us", p99_us},
-                     {"threshold", static_cast<std::uint64_t>(found.threshold)},
-                     {"hot_pixels", found.hot_pixels},
-                     {"hot", rejected.hot},
-                     {"huge", rejected.huge},
-                     {"faint", rejected.faint},
-                     {"surplus", rejected.surplus}}};
+  SensorTotals totals{.faults = {{"failures", failures}},
+                      .counts = {{"delay_p50_us", median_us},
+                                 {"delay_p99_us", p99_us},
+                                 {"threshold", static_cast<std::uint64_t>(found.threshold)},
+                                 {"background", static_cast<std::uint64_t>(found.background)},
+                                 {"hot", rejected.hot},
+                                 {"huge", rejected.huge},
+                                 {"faint", rejected.faint},
+                                 {"surplus", rejected.surplus}}};
+  levels.append_since_last_call(totals.counts);
+  return totals;
 }
 
 }  // namespace
@@ -83,6 +119,7 @@ void run_vision(const VisionStage& stage, const StageContext& context,
   HealthReport health(stage.camera_name + " spots", context);
   Rejected rejected;
   Delays delays;
+  SpotLevels levels;
   std::uint64_t failures = 0;
   while (!stop.stop_requested()) {
     context.iterations.add();
@@ -93,12 +130,13 @@ void run_vision(const VisionStage& stage, const StageContext& context,
         detector->detect({frame->data(), frame->width, frame->height, frame->stride()});
     stage.sink(SpotFrame{frame->stamp, frame->camera, {found.spots.begin(), found.spots.end()}});
     delays.add(context.clock.now() - frame->arrival);
+    levels.add(found.spots);
     health.count(1);
     rejected += found.rejected;
     failures += found.failure.empty() ? 0 : 1;
     if (health.is_due()) {
-      health.publish(std::string(diagnosis_of(found)),
-                     totals_of(found, rejected, failures, delays));
+      health.publish(std::string(diagnosis_of(found, stage.is_calibrated)),
+                     totals_of(found, rejected, failures, delays, levels));
     }
     if (stage.tap.requests.try_pop()) stage.tap.pictures.push(copy_of(*frame));
     stage.recycled.push(std::move(*frame));

@@ -22,6 +22,7 @@ struct PictureTap {
 /// All references must outlive the stage.
 struct VisionStage {
   std::string camera_name;
+  bool is_calibrated;
   LiveSettings<VisionConfig>& settings;
   FrameQueue& frames;
   FrameQueue& recycled;

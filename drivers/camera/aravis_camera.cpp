@@ -119,12 +119,9 @@ class AravisCamera final : public Camera {
         device_(std::move(device)),
         index_(index),
         clock_(clock),
-        latency_(from_seconds(config.device.latency_ms * 1e-3)) {
-    const double exposure_us = call_aravis("", [&](GError** e) {
-                                 return arv_camera_get_exposure_time(session_->camera(), e);
-                               }).value_or(0.0);
-    is_exposure_long_ = exposure_us * config.calibration.rate_hz > kMicroseconds;
-  }
+        latency_(from_seconds(config.device.latency_ms * 1e-3)),
+        rate_hz_(config.calibration.rate_hz),
+        is_exposure_long_(exposure_us() * rate_hz_ > kMicroseconds) {}
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override {
     ArvStream* stream = session_->stream();
@@ -146,6 +143,12 @@ class AravisCamera final : public Camera {
     if (session_->is_lost())
       return fail(ErrorCode::kIo, fmt::format("{}: the camera is gone", device_));
     return std::optional<Frame>{};
+  }
+
+  [[nodiscard]] Result<void> set_light(const CameraLight& light) override {
+    Result<void> set = set_aravis_light(session_->camera(), light);
+    is_exposure_long_ = exposure_us() * rate_hz_ > kMicroseconds;
+    return set;
   }
 
   [[nodiscard]] SensorTotals counters() const override {
@@ -175,6 +178,13 @@ class AravisCamera final : public Camera {
   }
 
  private:
+  /// The device's; 0 if it does not report one.
+  [[nodiscard]] double exposure_us() const {
+    return call_aravis(
+               "", [&](GError** e) { return arv_camera_get_exposure_time(session_->camera(), e); })
+        .value_or(0.0);
+  }
+
   [[nodiscard]] bool is_complete(ArvBuffer* buffer) {
     constexpr double kMemory = 0.02;
     const bool complete = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
@@ -220,7 +230,8 @@ class AravisCamera final : public Camera {
   std::uint8_t index_;
   const Clock& clock_;
   Duration latency_;
-  bool is_exposure_long_ = false;
+  double rate_hz_;
+  bool is_exposure_long_;
   DeviceClock device_clock_;
   FrameSequence sequence_;
   std::uint64_t frames_ = 0;

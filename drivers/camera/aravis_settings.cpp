@@ -72,23 +72,6 @@ Result<void> set_trigger(ArvCamera* camera, const CameraConfig& config) {
   });
 }
 
-Result<void> set_light(ArvCamera* camera, const CameraConfig& config) {
-  if (config.device.exposure_us) {
-    const auto set = [&](GError** e) {
-      if (has(arv_camera_is_exposure_auto_available, camera))
-        arv_camera_set_exposure_time_auto(camera, ARV_AUTO_OFF, e);
-      if (*e == nullptr) arv_camera_set_exposure_time(camera, *config.device.exposure_us, e);
-    };
-    if (Result<void> done = call_aravis("exposure_us", set); !done) return done;
-  }
-  if (!config.device.gain) return {};
-  return call_aravis("gain", [&](GError** e) {
-    if (has(arv_camera_is_gain_auto_available, camera))
-      arv_camera_set_gain_auto(camera, ARV_AUTO_OFF, e);
-    if (*e == nullptr) arv_camera_set_gain(camera, *config.device.gain, e);
-  });
-}
-
 /// Whether the camera is on loopback, where a packet socket receives nothing.
 bool is_loopback(ArvCamera* camera) {
   GSocketAddress* address =
@@ -109,6 +92,23 @@ Result<void> set_packets(ArvCamera* camera, int packet_size) {
 
 }  // namespace
 
+Result<void> set_aravis_light(ArvCamera* camera, const CameraLight& light) {
+  if (light.exposure_us) {
+    const auto set = [&](GError** e) {
+      if (has(arv_camera_is_exposure_auto_available, camera))
+        arv_camera_set_exposure_time_auto(camera, ARV_AUTO_OFF, e);
+      if (*e == nullptr) arv_camera_set_exposure_time(camera, *light.exposure_us, e);
+    };
+    if (Result<void> done = call_aravis("exposure_us", set); !done) return done;
+  }
+  if (!light.gain) return {};
+  return call_aravis("gain", [&](GError** e) {
+    if (has(arv_camera_is_gain_auto_available, camera))
+      arv_camera_set_gain_auto(camera, ARV_AUTO_OFF, e);
+    if (*e == nullptr) arv_camera_set_gain(camera, *light.gain, e);
+  });
+}
+
 Result<void> configure_aravis(ArvCamera* camera, const CameraConfig& config) {
   // A program that crashed may have left the stream running.
   static_cast<void>(call_aravis("", [&](GError** e) { arv_camera_stop_acquisition(camera, e); }));
@@ -120,7 +120,7 @@ Result<void> configure_aravis(ArvCamera* camera, const CameraConfig& config) {
         });
       })
       .and_then([&] { return set_trigger(camera, config); })
-      .and_then([&] { return set_light(camera, config); })
+      .and_then([&] { return set_aravis_light(camera, config.device.light); })
       .and_then([&] { return set_packets(camera, config.device.packet_size); });
 }
 

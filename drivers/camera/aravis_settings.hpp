@@ -12,4 +12,7 @@ namespace crepes {
 /// from `config`. The error names the setting, and what the camera offers instead if that is known.
 [[nodiscard]] Result<void> configure_aravis(ArvCamera* camera, const CameraConfig& config);
 
+/// Exposure and gain, at any time.
+[[nodiscard]] Result<void> set_aravis_light(ArvCamera* camera, const CameraLight& light);
+
 }  // namespace crepes

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "drivers/base/sensor_totals.hpp"
+#include "drivers/camera/camera_light.hpp"
 #include "estimator/core/result.hpp"
 #include "estimator/core/time.hpp"
 
@@ -58,6 +59,11 @@ class Camera {
   /// Optional.
   // NOLINTNEXTLINE(performance-unnecessary-value-param): overrides move from it.
   virtual void recycle(Frame /*frame*/) {}
+
+  /// Changes exposure and gain while frames arrive. An error leaves the stream as it was.
+  [[nodiscard]] virtual Result<void> set_light(const CameraLight& /*light*/) {
+    return fail(ErrorCode::kConfig, "this camera has no exposure to set");
+  }
 
   /// Frames missed, late or broken, and other counts.
   [[nodiscard]] virtual SensorTotals counters() const = 0;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "drivers/camera/camera_light.hpp"
 #include "estimator/core/camera_calibration.hpp"
 #include "estimator/core/settings_schema.hpp"
 
@@ -26,8 +27,7 @@ struct CameraDeviceConfig {
   CameraDriver driver = CameraDriver::kNone;
   std::string folder;
   std::string id;
-  std::optional<double> exposure_us;
-  std::optional<double> gain;
+  CameraLight light;
   std::array<int, 2> offset{};
   CameraTrigger trigger = CameraTrigger::kFree;
   std::string trigger_source = "Line1";
@@ -45,10 +45,11 @@ struct CameraDeviceConfig {
     v.field("device", id,
             "aravis: id from `crepesctl devices`, or address; v4l2: best a name under "
             "/dev/v4l/by-id; mindvision: serial number; if omitted: the only device");
-    v.field("exposure_us", exposure_us, Bounds{1, 100000},
-            "exposure time, shorter than a frame; if omitted: the device's setting");
-    v.field("gain", gain, Bounds{0, 1000},
-            "in the device's own unit (aravis: usually dB); if omitted: the device's setting");
+    v.field("exposure_us", light.exposure_us, Bounds{1, 100000},
+            "exposure time, shorter than a frame; if omitted: the device's setting (live)");
+    v.field("gain", light.gain, Bounds{0, 1000},
+            "in the device's own unit (aravis: usually dB); if omitted: the device's setting "
+            "(live)");
     v.field("offset", offset, Bounds{0, 16384},
             "[x, y] of the sensor region that is read out; its size is resolution");
     v.choice("trigger", trigger, kCameraTriggers,

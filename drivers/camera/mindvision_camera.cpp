@@ -78,6 +78,13 @@ class MindVisionSession {
   }
   void release_frame(std::uint8_t* pixels) const { library_.release_frame(handle_, pixels); }
 
+  [[nodiscard]] Result<void> set_light(const CameraLight& light) const {
+    if (!light.exposure_us) return {};
+    return check(library_.set_auto_exposure(handle_, 0), "exposure_us").and_then([&] {
+      return check(library_.set_exposure_us(handle_, *light.exposure_us), "exposure_us");
+    });
+  }
+
  private:
   [[nodiscard]] Result<void> set_up(const CameraConfig& config) const {
     const bool free = config.device.trigger == CameraTrigger::kFree;
@@ -88,13 +95,7 @@ class MindVisionSession {
           const auto rate_hz = static_cast<int>(std::lround(config.calibration.rate_hz));
           return check(library_.set_frame_rate(handle_, rate_hz), "rate_hz");
         })
-        .and_then([&]() -> Result<void> {
-          if (!config.device.exposure_us) return {};
-          return check(library_.set_auto_exposure(handle_, 0), "exposure_us").and_then([&] {
-            return check(library_.set_exposure_us(handle_, *config.device.exposure_us),
-                         "exposure_us");
-          });
-        })
+        .and_then([&] { return set_light(config.device.light); })
         .and_then([&] { return check(library_.play(handle_), "start"); });
   }
 
@@ -121,6 +122,10 @@ class MindVisionCamera final : public Camera {
       if (newest) ++superseded_;
       newest = std::move(*next);
     }
+  }
+
+  [[nodiscard]] Result<void> set_light(const CameraLight& light) override {
+    return session_->set_light(light);
   }
 
   [[nodiscard]] SensorTotals counters() const override {

@@ -21,6 +21,7 @@ namespace {
 constexpr std::uint32_t kCapture = V4L2_BUF_TYPE_VIDEO_CAPTURE;
 constexpr std::uint32_t kV4l2Buffers = 8;
 constexpr double kExposureUnit = 100.0;  // us, of V4L2_CID_EXPOSURE_ABSOLUTE
+constexpr double kMicroseconds = 1e6;
 
 struct GreyFormat {
   std::uint32_t code;
@@ -50,7 +51,7 @@ class V4l2Session {
         .and_then([&] { return set_region(config); })
         .and_then([&] { return set_format(config); })
         .and_then([&] { return set_rate(config.calibration.rate_hz); })
-        .and_then([&] { return set_light(config); })
+        .and_then([&] { return set_light(config.device.light); })
         .and_then([&] { return run(); });
   }
 
@@ -86,6 +87,19 @@ class V4l2Session {
   [[nodiscard]] double exposure_us() {
     v4l2_control control{.id = V4L2_CID_EXPOSURE_ABSOLUTE, .value = 0};
     return device_->ioctl(VIDIOC_G_CTRL, &control) == 0 ? kExposureUnit * control.value : 0.0;
+  }
+
+  Result<void> set_light(const CameraLight& light) {
+    if (light.exposure_us) {
+      static_cast<void>(set(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL));  // may have none
+      const auto units = std::max(1L, std::lround(*light.exposure_us / kExposureUnit));
+      if (const int error = set(V4L2_CID_EXPOSURE_ABSOLUTE, static_cast<int>(units)); error != 0)
+        return refusal(fmt::format("{}: exposure_us", name_), error);
+    }
+    if (!light.gain) return {};
+    static_cast<void>(set(V4L2_CID_AUTOGAIN, 0));  // may have none
+    const int error = set(V4L2_CID_GAIN, static_cast<int>(std::lround(*light.gain)));
+    return error == 0 ? Result<void>{} : refusal(fmt::format("{}: gain", name_), error);
   }
 
  private:
@@ -170,19 +184,6 @@ class V4l2Session {
     return refusal(fmt::format("{}: rate_hz", name_), error);
   }
 
-  Result<void> set_light(const CameraConfig& config) {
-    if (config.device.exposure_us) {
-      static_cast<void>(set(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL));  // may have none
-      const auto units = std::max(1L, std::lround(*config.device.exposure_us / kExposureUnit));
-      if (const int error = set(V4L2_CID_EXPOSURE_ABSOLUTE, static_cast<int>(units)); error != 0)
-        return refusal(fmt::format("{}: exposure_us", name_), error);
-    }
-    if (!config.device.gain) return {};
-    static_cast<void>(set(V4L2_CID_AUTOGAIN, 0));  // may have none
-    const int error = set(V4L2_CID_GAIN, static_cast<int>(std::lround(*config.device.gain)));
-    return error == 0 ? Result<void>{} : refusal(fmt::format("{}: gain", name_), error);
-  }
-
   int set(std::uint32_t id, int value) {
     v4l2_control control{.id = id, .value = value};
     return device_->ioctl(VIDIOC_S_CTRL, &control);
@@ -224,7 +225,8 @@ class V4l2Camera final : public Camera {
         index_(index),
         clock_(clock),
         latency_(from_seconds(config.device.latency_ms * 1e-3)),
-        is_exposure_long_(session_->exposure_us() * config.calibration.rate_hz > 1e6) {}
+        rate_hz_(config.calibration.rate_hz),
+        is_exposure_long_(session_->exposure_us() * rate_hz_ > kMicroseconds) {}
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override {
     if (!session_->wait(timeout)) return std::optional<Frame>{};
@@ -250,6 +252,12 @@ class V4l2Camera final : public Camera {
 
   void recycle(Frame frame) override {
     if (spare_.empty()) spare_ = std::move(frame.pixels);
+  }
+
+  [[nodiscard]] Result<void> set_light(const CameraLight& light) override {
+    Result<void> set = session_->set_light(light);
+    is_exposure_long_ = session_->exposure_us() * rate_hz_ > kMicroseconds;
+    return set;
   }
 
   [[nodiscard]] SensorTotals counters() const override {
@@ -306,6 +314,7 @@ class V4l2Camera final : public Camera {
   std::uint8_t index_;
   const Clock& clock_;
   Duration latency_;
+  double rate_hz_;
   bool is_exposure_long_;
   FrameSequence sequence_;
   std::vector<std::uint8_t> spare_;

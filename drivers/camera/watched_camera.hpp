@@ -36,6 +36,9 @@ class WatchedCamera final : public Camera {
     return frame;
   }
   void recycle(Frame frame) override { camera_->recycle(std::move(frame)); }
+  [[nodiscard]] Result<void> set_light(const CameraLight& light) override {
+    return camera_->set_light(light);
+  }
   [[nodiscard]] SensorTotals counters() const override { return camera_->counters(); }
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     std::optional<std::string> fault = camera_->diagnosis();

@@ -141,8 +141,8 @@ std::vector<RingRenderer::Blob> RingRenderer::blobs_of(const Board& board, doubl
     // The LEDs face forward; their intensity decreases towards the side.
     const double forward = -(T_C_N.q * Eigen::Vector3d::UnitX()).dot(p_C.normalized());
     if (forward <= 0.0) continue;
-    const double peak =
-        lit * kPeakAtOneMeter * (0.3 + 0.7 * forward) / std::max(p_C.squaredNorm(), 0.01);
+    const double peak = lit * brightness_ * kPeakAtOneMeter * (0.3 + 0.7 * forward) /
+                        std::max(p_C.squaredNorm(), 0.01);
     const auto uv = model_.project(p_C);
     if (uv && model_.contains(*uv) && peak > kFaintest) blobs.push_back({*uv, peak});
   }

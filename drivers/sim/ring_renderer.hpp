@@ -34,6 +34,9 @@ class RingRenderer {
   /// Accepts a frame of `render` for reuse; its pixels must be unchanged.
   void recycle(Frame frame);
 
+  /// LEDs appear this many times as bright as at first.
+  void set_brightness(double factor) { brightness_ = factor; }
+
   /// A lit board in view, as an ideal detector reports it.
   struct View {
     RobotId robot{};
@@ -87,6 +90,7 @@ class RingRenderer {
   std::vector<std::uint8_t> background_;
   std::vector<float> grain_;  ///< noise to draw from, in grey levels
   std::vector<float> light_;  ///< scratch of draw()
+  double brightness_ = 1.0;
   std::uint64_t frame_ = 0;
   std::vector<LoanedFrame> loaned_;               ///< frames that are away, oldest first
   std::vector<std::vector<std::uint8_t>> clean_;  ///< came back and show the background

@@ -29,6 +29,14 @@ Result<std::optional<Frame>> SimCamera::read_once(std::chrono::milliseconds time
   return std::optional(std::move(frame));
 }
 
+Result<void> SimCamera::set_light(const CameraLight& light) {
+  constexpr double kNominalExposure = 500.0;  // us
+  constexpr double kDecibels = 20.0;          // that are a factor of ten
+  renderer_.set_brightness(light.exposure_us.value_or(kNominalExposure) / kNominalExposure *
+                           std::pow(10.0, light.gain.value_or(0.0) / kDecibels));
+  return {};
+}
+
 SensorTotals SimCamera::counters() const {
   return {.faults = {}, .counts = {{"frames", frames_}, {"superseded", superseded_}}};
 }

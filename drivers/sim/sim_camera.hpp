@@ -18,6 +18,8 @@ class SimCamera final : public Camera {
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override;
   void recycle(Frame frame) override { renderer_.recycle(std::move(frame)); }
+  /// LEDs are as bright as the light: 500 us at 0 dB is what is simulated without settings.
+  [[nodiscard]] Result<void> set_light(const CameraLight& light) override;
   [[nodiscard]] SensorTotals counters() const override;
 
  private:

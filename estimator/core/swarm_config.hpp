@@ -21,6 +21,7 @@ struct MemberConfig {
   std::optional<int> uwb_id;
   Eigen::Vector3d p_body_led = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_body_uwb = Eigen::Vector3d::Zero();
+  double range_delay_m = 0.0;
   std::optional<std::string> public_key;
   bool excluded = false;
 
@@ -39,6 +40,10 @@ struct MemberConfig {
     v.field("p_body_led", p_body_led, Bounds{-5, 5},
             "center of the LED ring in the body frame [m]");
     v.field("p_body_uwb", p_body_uwb, Bounds{-5, 5}, "UWB antenna in the body frame [m]");
+    v.field(
+        "range_delay_m", range_delay_m, Bounds{-5, 5},
+        "antenna delay of the UWB module, as crepesctl calibrate range finds it: a pair's ranges "
+        "are too long by the sum of its two");
     v.field("public_key", public_key,
             "as crepesctl keygen prints it: only what this robot has signed is believed to be from "
             "it; if omitted: anybody with the swarm's key can speak for it");

@@ -73,6 +73,17 @@ std::vector<BlinkTracker> make_trackers(const EstimatorSettings& settings) {
   return trackers;
 }
 
+std::vector<bool> are_calibrated(const EstimatorSettings& settings) {
+  std::vector<bool> all;
+  for (const CameraCalibration& camera : settings.cameras) all.push_back(camera.calibrated);
+  return all;
+}
+
+/// What the antenna delays of both modules add to a range.
+double delay_between(const SwarmConfig& swarm, RobotId a, RobotId b) {
+  return member_of(swarm, a).range_delay_m + member_of(swarm, b).range_delay_m;
+}
+
 }  // namespace
 
 struct Estimator::State {
@@ -80,6 +91,7 @@ struct Estimator::State {
       : id(settings.self),
         tilt_filter(settings.imu),
         trackers(make_trackers(settings)),
+        is_calibrated(are_calibrated(settings)),
         composer(settings.self),
         graph_enabled(settings.solves_graph),
         uses_team_filter(settings.uses_team_filter),
@@ -115,6 +127,7 @@ struct Estimator::State {
   RobotState self;
   TiltFilter tilt_filter;
   std::vector<BlinkTracker> trackers;
+  std::vector<bool> is_calibrated;  ///< one for each tracker
   std::map<RobotId, Neighbor> neighbors;
   GraphProblemBuilder graph_builder;
   TeamIntake team_intake;
@@ -187,8 +200,10 @@ Outputs Estimator::State::handle(const UwbRange& range) {
     ++refused_samples;
     return {};
   }
-  neighbor->second.add_range(range);
-  composer.add(range);
+  UwbRange corrected = range;
+  corrected.range_m -= delay_between(swarm, id, range.neighbor);
+  neighbor->second.add_range(corrected);
+  composer.add(corrected);
   return {};
 }
 
@@ -199,6 +214,8 @@ Outputs Estimator::State::handle(const SpotFrame& frame) {
   }
   Outputs outputs;
   outputs.bearings = trackers[frame.camera].step(frame);
+  // IDs are read through any lens; a direction through a guessed one would be degrees off.
+  if (!is_calibrated[frame.camera]) return {};
   // A robot that sees its own code sees itself in a mirror.
   std::erase_if(outputs.bearings,
                 [&](const Bearing& bearing) { return !neighbors.contains(bearing.neighbor); });

@@ -1,6 +1,7 @@
 /// crepesctl as a user or a script runs it, with live daemons of a simulated pair.
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -105,9 +106,87 @@ TEST_F(Tools, WatchOnceAndAsAStream) {
   EXPECT_NE(stream.output.find(R"({"class":"POSE")"), std::string::npos);
 }
 
+TEST_F(Tools, CheckARobotFromSensorsToCalibration) {
+  expect_true_poses(first_);
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const std::string file = scratch.path() / "crepesd.yaml";
+  Config other = first_;
+  other.imu.noise.update_rate = 400.0;
+  std::ofstream(file) << write_config(other);
+
+  const Ending text = ask("check", {"--for", "1"});
+  const Json told = Json::parse(ask("check", {"--json", "--config", file}).output);
+
+  for (const char* part : {"cam0 spots", "r2: known to", "r2 sees our board", "not sealed",
+                           "crepesctl keygen", "gravity measures", "r2 is"})
+    EXPECT_NE(text.output.find(part), std::string::npos) << part << "\n" << text.output;
+  std::vector<std::string> sections;
+  bool is_rate_named = false;
+  for (const Json& finding : told["findings"]) {
+    if (sections.empty() || sections.back() != finding["about"])
+      sections.push_back(finding["about"]);
+    is_rate_named |= finding["about"] == "rates" && finding["verdict"] == "doubt" &&
+                     finding["text"].get<std::string>().find("of 400 Hz") != std::string::npos;
+  }
+  EXPECT_EQ(sections, (std::vector<std::string>{"sensors", "rates", "clocks", "exposure", "board",
+                                                "mesh", "calibration"}));
+  EXPECT_TRUE(is_rate_named) << told.dump(2);
+}
+
+class OneRobot : public LiveDaemon {};
+
+TEST_F(OneRobot, IsCheckedAndTheMissingOneIsAFault) {
+  Config config = pair_config(1, mesh_port_);
+  config.cameras[0].calibration.calibrated = false;
+  const Runtime runtime(config, machine_);
+  EXPECT_TRUE(Client(config).await_status(
+      [](const Json& status) { return tells(sensor_of(status, "cam0 spots"), "not calibrated"); }));
+
+  const Ending ending =
+      crepesctl({"check", "--port", std::to_string(config.subscription.port), "--for", "1"});
+
+  EXPECT_EQ(ending.how, "exit code 1");
+  EXPECT_NE(ending.output.find("fault  r2: never heard"), std::string::npos) << ending.output;
+  EXPECT_NE(ending.output.find("fault  cam0 spots: not calibrated"), std::string::npos)
+      << ending.output;
+}
+
+/// A daemon of its own process, whose camera's light is changed.
+TEST_F(OneRobot, IsSetToAnotherExposureWhileItRuns) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const Config config = pair_config(1, mesh_port_);
+  const std::string file = scratch.path() / "crepesd.yaml";
+  std::ofstream(file) << write_config(config);
+  auto daemon = ChildProcess::start(crepesd_path(), {"--config", file}, scratch.path() / "log");
+  ASSERT_TRUE(daemon);
+  const Runtime other(pair_config(2, mesh_port_), machine_);
+  const auto is_bright = [](const Json& status) {
+    const Json counts = sensor_of(status, "cam0 spots").value("counts", Json::object());
+    return counts.value("brightest", 0) > 200;
+  };
+  EXPECT_TRUE(Client(config).await(R"({"class":"POLL","about":"sensors"})", "STATUS", is_bright));
+  const auto set = [&](const std::string& exposure_us) {
+    return crepesctl({"exposure", "--config", file, "--port",
+                      std::to_string(config.subscription.port), "--pid",
+                      std::to_string(daemon->pid()), "--exposure-us", exposure_us, "--json"});
+  };
+
+  const Ending dim = set("2");
+  const Ending impossible = set("7000");
+
+  EXPECT_EQ(dim.how, "exit code 0") << dim.errors;
+  const Json camera = Json::parse(dim.output)["cameras"][0];
+  EXPECT_EQ(camera["exposure_us"], 2.0);
+  EXPECT_LT(camera["brightest"], 100);
+  EXPECT_EQ(impossible.how, "exit code 1");
+  EXPECT_NE(impossible.errors.find("longer than a frame"), std::string::npos) << impossible.errors;
+  // What was refused has left nothing behind.
+  EXPECT_EQ(load_config(file).value().cameras[0].device.light.exposure_us, 2.0);
+}
+
 TEST(ToolsAlone, SayThatNobodyAnswersAndEndWithOne) {
   const std::string port = std::to_string(free_port());
-  for (const char* command : {"status", "watch", "sources"}) {
+  for (const char* command : {"status", "watch", "sources", "check"}) {
     const Ending ending = crepesctl({command, "--port", port});
     EXPECT_EQ(ending.how, "exit code 1") << command;
     EXPECT_NE(ending.errors.find("no answer from 127.0.0.1"), std::string::npos) << ending.errors;

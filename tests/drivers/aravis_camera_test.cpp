@@ -32,8 +32,8 @@ class AravisCameraTest : public testing::Test {
     config_.device.id = GigeCamera::kAddress;
     config_.calibration.resolution = {640, 480};
     config_.calibration.rate_hz = 50;
-    config_.device.exposure_us = 700;
-    config_.device.gain = 3;
+    config_.device.light.exposure_us = 700;
+    config_.device.light.gain = 3;
     config_.device.packet_size = 9000;
   }
 
@@ -192,12 +192,26 @@ TEST_F(AravisCameraTest, RefusesARegionOutsideOfTheSensor) {
 
 TEST_F(AravisCameraTest, TellsAnExposureThatIsLongerThanAFrame) {
   const GigeCamera device(changing_picture());
-  config_.device.exposure_us = 30000;
+  config_.device.light.exposure_us = 30000;
 
   const auto camera = open();
 
   ASSERT_TRUE(camera) << camera.error().message;
   EXPECT_NE((*camera)->diagnosis().value_or("").find("exposure"), std::string::npos);
+}
+
+TEST_F(AravisCameraTest, ChangesTheExposureWhileItRuns) {
+  const GigeCamera device(changing_picture());
+  const auto camera = open();
+  ASSERT_TRUE(camera) << camera.error().message;
+  ASSERT_EQ((*camera)->diagnosis(), std::nullopt);
+
+  EXPECT_TRUE((*camera)->set_light({.exposure_us = 30000.0, .gain = 6.0}));
+  EXPECT_NE((*camera)->diagnosis().value_or("").find("exposure"), std::string::npos);
+  EXPECT_TRUE((*camera)->set_light({.exposure_us = 500.0, .gain = {}}));
+
+  EXPECT_EQ((*camera)->diagnosis(), std::nullopt);
+  EXPECT_FALSE(read_until(**camera, [](const auto& frames) { return !frames.empty(); }).empty());
 }
 
 TEST_F(AravisCameraTest, FindsTheOnlyCameraAndListsIt) {

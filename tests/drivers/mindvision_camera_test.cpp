@@ -28,7 +28,7 @@ class MindVisionCameraTest : public testing::Test {
     config_.device.library = CREPES_MINDVISION_STUB;
     config_.calibration.resolution = {64, 48};
     config_.calibration.rate_hz = 200;
-    config_.device.exposure_us = 400;
+    config_.device.light.exposure_us = 400;
     config_.device.latency_ms = 3.0;
     clock_.set(Timestamp{10s});
   }

@@ -290,26 +290,43 @@ TEST_F(V4l2CameraTest, RefusesADeviceThatOffersSomethingElse) {
 }
 
 TEST_F(V4l2CameraTest, RefusesSettingsThatTheDeviceDoesNotHave) {
-  config_.device.gain = 3;
+  config_.device.light.gain = 3;
   EXPECT_EQ(open_error(), "/dev/video7: gain: Invalid argument");
-  config_.device.gain.reset();
+  config_.device.light.gain.reset();
   config_.device.offset = {8, 0};
   EXPECT_NE(open_error().find("offset"), std::string::npos);
 }
 
 TEST_F(V4l2CameraTest, SetsTheExposureAndReportsOneLongerThanAFrame) {
-  config_.device.exposure_us = 700;
+  config_.device.light.exposure_us = 700;
   {
     const auto camera = open();
     ASSERT_TRUE(camera) << camera.error().message;
     EXPECT_EQ(kernel_.controls[V4L2_CID_EXPOSURE_ABSOLUTE], 7);
     EXPECT_EQ((*camera)->diagnosis(), std::nullopt);
   }
-  config_.device.exposure_us.reset();
+  config_.device.light.exposure_us.reset();
   kernel_.controls[V4L2_CID_EXPOSURE_ABSOLUTE] = 101;
   const auto camera = open();
   ASSERT_TRUE(camera) << camera.error().message;
   EXPECT_NE((*camera)->diagnosis().value_or("").find("exposure"), std::string::npos);
+}
+
+TEST_F(V4l2CameraTest, ChangesTheExposureWhileItRuns) {
+  config_.device.light.exposure_us = 700;
+  const auto camera = open();
+  ASSERT_TRUE(camera) << camera.error().message;
+
+  ASSERT_TRUE((*camera)->set_light({.exposure_us = 10100.0, .gain = {}}));
+  EXPECT_EQ(kernel_.controls[V4L2_CID_EXPOSURE_ABSOLUTE], 101);
+  EXPECT_NE((*camera)->diagnosis().value_or("").find("exposure"), std::string::npos);
+  ASSERT_TRUE((*camera)->set_light({.exposure_us = 300.0, .gain = {}}));
+  EXPECT_EQ(kernel_.controls[V4L2_CID_EXPOSURE_ABSOLUTE], 3);
+  EXPECT_EQ((*camera)->diagnosis(), std::nullopt);
+
+  const auto refused = (*camera)->set_light({.exposure_us = {}, .gain = 3.0});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, "/dev/video7: gain: Invalid argument");
 }
 
 TEST(V4l2Device, NamesAMissingFile) {

@@ -55,7 +55,7 @@ class LiveCamera : public LiveDaemon {
     CameraConfig& camera = real_.cameras.front();
     camera.device.driver = CameraDriver::kAravis;
     camera.device.id = GigeCamera::kAddress;
-    camera.device.exposure_us = 500;
+    camera.device.light.exposure_us = 500;
     camera.device.packet_size = 9000;
     camera.device.latency_ms = 1.0;
   }

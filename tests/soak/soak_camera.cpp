@@ -43,7 +43,7 @@ CameraConfig SoakCamera::config() const {
   camera.device.driver = is_gige_ ? CameraDriver::kAravis : CameraDriver::kFolder;
   camera.device.folder = folder_ / "data";
   camera.device.id = GigeCamera::kAddress;
-  camera.device.exposure_us = 500;
+  camera.device.light.exposure_us = 500;
   camera.device.packet_size = 9000;
   return camera;
 }

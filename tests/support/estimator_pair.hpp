@@ -43,8 +43,12 @@ class EstimatorPair {
     double nees = 0.0;
   };
 
-  explicit EstimatorPair(std::uint64_t seed)
-      : pair_(seed, noise()), settings_(settings_of(pair_)), estimator_(settings_) {
+  using Alter = std::function<void(EstimatorSettings&)>;
+
+  /// `alter` may change our estimator's settings before it starts.
+  explicit EstimatorPair(
+      std::uint64_t seed, const Alter& alter = [](EstimatorSettings&) {})
+      : pair_(seed, noise()), settings_(settings_of(pair_, alter)), estimator_(settings_) {
     RandomGeometry random(seed + 1'000'000);  // apart from the pair's
     for (const CameraCalibration& camera : settings_.cameras)
       cameras_.push_back({CameraModel::from(camera).value(), camera.T_cam_imu.inverse(),
@@ -112,7 +116,7 @@ class EstimatorPair {
   }
 
   /// A camera ahead and one 6 cm behind it, which see all around between them.
-  static EstimatorSettings settings_of(const SimulatedPair& pair) {
+  static EstimatorSettings settings_of(const SimulatedPair& pair, const Alter& alter) {
     EstimatorSettings settings;
     settings.self = kSelf;
     settings.swarm.members.resize(2);
@@ -150,6 +154,7 @@ class EstimatorPair {
     settings.vision.bearing_sigma_px = n.bearing * 316.9;
     settings.filters.camera_misalignment_deg = kDegPerRad * n.priors.misalignment_rad;
     settings.solves_graph = false;
+    alter(settings);
     return settings;
   }
 

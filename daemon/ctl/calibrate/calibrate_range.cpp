@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -19,6 +20,8 @@ namespace crepes {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr const char* kMembersSuffix = ".members.yaml";
 
 struct SwarmRange {
   double true_s = 0.0;
@@ -83,6 +86,43 @@ std::string file_text(const RangeCalibration& found) {
   return text;
 }
 
+/// What a pair's range is still off by, one sigma: the worst pair's estimate, and what the
+/// directions of arrival change.
+double remaining_bias(const RangeCalibration& found) {
+  double worst = 0.0;
+  for (const PairBias& pair : found.pairs) worst = std::max(worst, pair.sigma_m);
+  return std::hypot(worst, found.direction_sigma_m);
+}
+
+/// The delay of every module. Two robots that ranged with nobody else have half of their pair's
+/// bias each: only the sum matters. Empty where the pairs do not determine them.
+std::vector<ModuleBias> delays_of(const RangeCalibration& found) {
+  if (!found.modules.empty() || found.pairs.size() != 1) return found.modules;
+  const PairBias& pair = found.pairs.front();
+  return {{pair.pair.a, 0.5 * pair.bias_m, pair.sigma_m},
+          {pair.pair.b, 0.5 * pair.bias_m, pair.sigma_m}};
+}
+
+/// A fragment for `crepesd.d/` of every robot.
+std::string members_text(const RangeCalibration& found) {
+  constexpr double kLeastBias = 0.005;  // m; temperature moves an antenna delay by so much
+  std::string text =
+      "# Written by crepesctl calibrate range: copy it to crepesd.d/ on every robot.\n"
+      "swarm:\n  members:\n";
+  for (const ModuleBias& module : delays_of(found))
+    text += fmt::format("  - {{id: {}, range_delay_m: {}}}\n", module.id.value,
+                        fixed(module.bias_m, 4));
+  return text + fmt::format("uwb: {{bias_sigma_m: {}}}\n",
+                            fixed(std::max(remaining_bias(found), kLeastBias), 3));
+}
+
+/// FILE, and where the pairs determine the modules, the fragment beside it.
+Result<void> write_files(const RangeCalibration& found, const std::filesystem::path& out) {
+  if (auto written = write_text_file(out, file_text(found)); !written) return written;
+  if (delays_of(found).empty()) return {};
+  return write_text_file(beside(out, kMembersSuffix), members_text(found));
+}
+
 Json json_of(const RangeCalibration& found) {
   Json json = report_head(found.refusals, found.warnings);
   if (!found.refusals.empty()) return json;
@@ -121,7 +161,10 @@ std::string text_of(const RangeCalibration& found, const std::filesystem::path& 
   return text_table(segments) + "\n" + text_table(results) +
          fmt::format("\nuwb: {{noise_m: {}, bias_drift_m: {}{}}}\n", fixed(found.noise_m, 3),
                      fixed(found.direction_sigma_m, 3), late) +
-         warning_lines(found.warnings) + fmt::format("written: {}\n", out.string());
+         warning_lines(found.warnings) + fmt::format("written: {}\n", out.string()) +
+         (found.modules.empty() ? ""
+                                : fmt::format("written: {}, for crepesd.d/ of every robot\n",
+                                              beside(out, kMembersSuffix).string()));
 }
 
 }  // namespace
@@ -134,7 +177,7 @@ Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options) 
   const RangeCalibration found = calibrate_ranges(taped_ranges(ranges_of(*swarm), *tape),
                                                   swarm->robots.front().config.uwb.noise);
   if (found.refusals.empty())
-    if (const auto written = write_text_file(options.out, file_text(found)); !written)
+    if (const auto written = write_files(found, options.out); !written)
       return tl::unexpected(written.error());
   CalibrationReport report{.text = {}, .reasons = found.refusals, .faults = swarm->faults};
   if (options.json) {

@@ -8,13 +8,16 @@ namespace crepes {
 class CommandLine;
 
 void add_calibrate(CommandLine& line);
+void add_check(CommandLine& line);
 void add_codebook(CommandLine& line);
 void add_completion(CommandLine& line);
 void add_convert(CommandLine& line);
 void add_demo(CommandLine& line);
 void add_devices(CommandLine& line);
 void add_evaluate(CommandLine& line);
+void add_exposure(CommandLine& line);
 void add_import_calibration(CommandLine& line);
+void add_init(CommandLine& line);
 void add_keygen(CommandLine& line);
 void add_led(CommandLine& line);
 void add_plot(CommandLine& line);
@@ -29,11 +32,12 @@ void add_view(CommandLine& line);
 void add_watch(CommandLine& line);
 
 /// In the order of --help: running daemons, recordings, setup.
-inline constexpr std::array kCommands{&add_status,   &add_watch,     &add_view,
-                                      &add_sources,  &add_waitpose,  &add_record,
-                                      &add_replay,   &add_evaluate,  &add_plot,
-                                      &add_convert,  &add_spots,     &add_demo,
-                                      &add_devices,  &add_calibrate, &add_import_calibration,
+inline constexpr std::array kCommands{&add_status,   &add_check,     &add_watch,
+                                      &add_view,     &add_sources,   &add_waitpose,
+                                      &add_record,   &add_replay,    &add_evaluate,
+                                      &add_plot,     &add_convert,   &add_spots,
+                                      &add_demo,     &add_devices,   &add_init,
+                                      &add_exposure, &add_calibrate, &add_import_calibration,
                                       &add_codebook, &add_led,       &add_setup_witmotion,
                                       &add_keygen,   &add_completion};
 

@@ -31,6 +31,8 @@ class ChildProcess {
   /// How it ended, as "exit code 1" or "killed by signal 11"; empty while it runs.
   [[nodiscard]] const std::optional<std::string>& exit_reason();
 
+  [[nodiscard]] pid_t pid() const { return pid_; }
+
   /// Sends SIGTERM without waiting.
   void terminate() const;
   void send_signal(int signal) const;

@@ -25,13 +25,6 @@ using Json = nlohmann::ordered_json;
 /// Fastest first: at a wrong rate a line looks like noise.
 constexpr std::array kRates{921600, 460800, 115200};
 
-struct SerialDevice {
-  std::string port;
-  int baud = 0;
-  std::optional<SerialProtocol> speaks;
-  std::string fault;  ///< why it could not be read
-};
-
 SerialDevice listen_to(const std::string& path, std::chrono::milliseconds duration) {
   const MonotonicClock clock;
   for (const int baud : kRates) {
@@ -56,11 +49,6 @@ std::vector<SerialDevice> find_serial_devices(const DevicesOptions& options) {
   std::ranges::sort(found, {}, &SerialDevice::port);
   return found;
 }
-
-struct CameraDevice {
-  std::string driver;
-  FoundCamera found;
-};
 
 std::vector<CameraDevice> find_cameras(const DevicesOptions& options) {
   std::vector<CameraDevice> cameras;
@@ -100,9 +88,12 @@ Json json_of(const SerialDevice& device) {
 
 }  // namespace
 
+ConnectedDevices find_devices(const DevicesOptions& options) {
+  return {.cameras = find_cameras(options), .serial = find_serial_devices(options)};
+}
+
 Result<std::string> list_devices(const DevicesOptions& options) {
-  const std::vector<CameraDevice> cameras = find_cameras(options);
-  const std::vector<SerialDevice> serial = find_serial_devices(options);
+  const auto [cameras, serial] = find_devices(options);
   if (options.json) {
     Json json{{"cameras", Json::array()}, {"serial_ports", Json::array()}};
     for (const auto& camera : cameras) json["cameras"].push_back(json_of(camera));

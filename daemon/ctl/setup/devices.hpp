@@ -3,8 +3,12 @@
 
 #include <chrono>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "drivers/camera/camera.hpp"
+#include "drivers/detect_protocol.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
@@ -15,7 +19,27 @@ struct DevicesOptions {
   bool json = false;
 };
 
+struct SerialDevice {
+  std::string port;
+  int baud = 0;
+  std::optional<SerialProtocol> speaks;
+  std::string fault;  ///< why it could not be read
+};
+
+struct CameraDevice {
+  std::string driver;  ///< as in the configuration
+  FoundCamera found;
+};
+
+struct ConnectedDevices {
+  std::vector<CameraDevice> cameras;
+  std::vector<SerialDevice> serial;  ///< by port
+};
+
 /// Searches cameras on USB and network, and listens to every serial port with a persistent name.
+[[nodiscard]] ConnectedDevices find_devices(const DevicesOptions& options);
+
+/// The same as text, with the lines for the configuration, or as JSON.
 [[nodiscard]] Result<std::string> list_devices(const DevicesOptions& options);
 
 }  // namespace crepes

@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "config/reading/config_file.hpp"
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/setup/led_report.hpp"
+#include "daemon/ctl/setup/swarm_members.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/led_board/led_line.hpp"
@@ -19,17 +19,6 @@
 
 namespace crepes {
 namespace {
-
-/// The section `swarm`. A library contains nothing else; other sections of a configuration are
-/// ignored.
-Result<SwarmConfig> load_swarm(const std::filesystem::path& path) {
-  const CheckedConfig checked = check_config(path);
-  const auto ours = std::ranges::find_if(checked.faults, [](const ConfigFault& fault) {
-    return fault.key.empty() || fault.key.starts_with("swarm");
-  });
-  if (ours != checked.faults.end()) return fail(ErrorCode::kConfig, to_string(*ours));
-  return checked.config.swarm;
-}
 
 Result<std::uint16_t> ticks_of(const std::string& key, double ms) {
   const double ticks = std::round(ms * kTicksPerMs);
@@ -98,7 +87,7 @@ Result<led_settings> led_settings_of(const SwarmConfig& swarm, RobotId id,
 
 Result<std::string> led_set(const LedOptions& options) {
   const MonotonicClock clock;
-  const auto settings = load_swarm(options.library).and_then([&](const SwarmConfig& swarm) {
+  const auto settings = load_members(options.library).and_then([&](const SwarmConfig& swarm) {
     return led_settings_of(swarm, RobotId{static_cast<std::uint16_t>(options.id)},
                            options.brightness)
         .map_error(

@@ -419,7 +419,7 @@ TEST(ConfigFile, NamesEveryRequiredKeyOfAnEmptyMapping) {
   EXPECT_EQ(faults_of("{}"),
             "f:1: robot.id: is missing: this robot's id; must be one of swarm.members\n"
             "f:1: swarm.members: is missing: all robots of the swarm, this one included\n"
-            "f:1: cameras: is missing: this robot's cameras");
+            "f:1: cameras: is missing: this robot's cameras; exposure_us and gain are live");
 }
 
 TEST(ConfigFile, RefusesTextThatIsNoConfiguration) {

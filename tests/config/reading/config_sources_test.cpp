@@ -110,7 +110,7 @@ TEST_F(ConfigSources, MergesCamerasByNameAndMembersById) {
   const Config config = load();
 
   ASSERT_EQ(config.cameras.size(), 1U);
-  EXPECT_EQ(config.cameras[0].device.exposure_us, 400.0);
+  EXPECT_EQ(config.cameras[0].device.light.exposure_us, 400.0);
   EXPECT_EQ(config.cameras[0].calibration.resolution[0], 1280);
   ASSERT_EQ(config.swarm.members.size(), 3U);
   EXPECT_EQ(config.swarm.members[1].p_body_led, Eigen::Vector3d(1, 2, 3));
@@ -167,12 +167,27 @@ TEST_F(ConfigSources, TakesALibraryOfPatternsForAMembersFile) {
   EXPECT_EQ(load().swarm.members.size(), 64U);
 }
 
-TEST_F(ConfigSources, RefusesMembersInTwoPlaces) {
+TEST_F(ConfigSources, LaysMembersOverThoseThatAllRobotsShare) {
   write("swarm.yaml", kMembers);
-  write("crepesd.yaml", kBase);
-  write("crepesd.d/a.yaml", "swarm: {members_file: swarm.yaml}\n");
+  write("crepesd.yaml",
+        replaced(kBase, "swarm:", "cameras:", "swarm: {members_file: swarm.yaml}\n"));
+  write("crepesd.d/ranges.yaml", "swarm: {members: [{id: 2, range_delay_m: 0.12}]}\n");
 
-  EXPECT_EQ(faults(), "crepesd.yaml:3: swarm.members: is given beside swarm.members_file");
+  const Config config = load();
+
+  ASSERT_EQ(config.swarm.members.size(), 2U);
+  EXPECT_EQ(config.swarm.members[0].range_delay_m, 0.0);
+  EXPECT_EQ(config.swarm.members[1].range_delay_m, 0.12);
+  EXPECT_EQ(config.swarm.members[1].duty, 0.6);
+}
+
+TEST_F(ConfigSources, RefusesToAddMembersToThoseThatAllRobotsShare) {
+  write("swarm.yaml", kMembers);
+  write("crepesd.yaml",
+        replaced(kBase, "swarm:", "cameras:", "swarm: {members_file: swarm.yaml}\n"));
+  write("crepesd.d/a.yaml", "swarm:\n  members:\n    - {id: 3, name: r3, duty: 0.8}\n");
+
+  EXPECT_EQ(faults(), "crepesd.d/a.yaml:3: swarm.members: swarm.yaml has no member 3");
 }
 
 TEST_F(ConfigSources, TellsWhatIsWrongWithAMembersFileOnce) {

@@ -57,7 +57,7 @@ class NthSetting {
     const bool was_found = is_found();
     for (Item& item : items) item.visit(*this);
     if (is_next(key)) items.emplace_back();
-    if (!was_found && is_found()) key_ = prefix_ + key;
+    if (!was_found && is_found()) name_change_in(key);
   }
   template <class Item>
   void optional_list(const std::string& key, std::vector<Item>& items, const char* help) {
@@ -66,6 +66,13 @@ class NthSetting {
   void reference(const std::string& /*key*/, const char* /*help*/) {}
 
  private:
+  /// Of a camera, exposure and gain change while it runs.
+  void name_change_in(const std::string& key) {
+    const bool is_light = key_ == "exposure_us" || key_ == "gain";
+    key_ = is_light ? prefix_ + key + "[0]." + key_ : prefix_ + key;
+    if (is_light) when_ = Change::kLive;
+  }
+
   bool is_next(const std::string& key) {
     if (left_-- != 0) return false;
     key_ = prefix_ + key;
@@ -144,6 +151,33 @@ TEST(ConfigChange, GoesOnNamingWhatWaitsForARestart) {
 
   EXPECT_EQ(second.live, std::vector<std::string>{"uwb.noise_m"});
   EXPECT_EQ(second.restart, std::vector<std::string>{"cameras"});
+}
+
+TEST(ConfigChange, TakesTheLightOfACameraThatWaitsForARestart) {
+  const Config running = reference();
+  Config wanted = running;
+  wanted.cameras[0].device.light.exposure_us = 300;
+  wanted.cameras[0].calibration.rate_hz = 50;
+
+  const ConfigChange change = plan_reload(running, wanted);
+
+  EXPECT_EQ(change.live, std::vector<std::string>{"cameras[0].exposure_us"});
+  EXPECT_EQ(change.restart, std::vector<std::string>{"cameras"});
+  EXPECT_EQ(change.config.cameras[0].device.light.exposure_us, 300);
+  EXPECT_EQ(change.config.cameras[0].calibration.rate_hz, running.cameras[0].calibration.rate_hz);
+}
+
+TEST(ConfigChange, GivesNoLightToACameraOfAnotherName) {
+  const Config running = reference();
+  Config wanted = running;
+  wanted.cameras[0].calibration.name = "other";
+  wanted.cameras[0].device.light.gain = 3;
+
+  const ConfigChange change = plan_reload(running, wanted);
+
+  EXPECT_TRUE(change.live.empty());
+  EXPECT_EQ(change.restart, std::vector<std::string>{"cameras"});
+  EXPECT_FALSE(change.config.cameras[0].device.light.gain);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "estimator/core/constants.hpp"
@@ -298,6 +299,24 @@ TEST(EstimatorFaults, ABoardThatBlinksAnothersCodeForHalfASecondDoesLittleHarm) 
   EXPECT_LE(trials.after.dishonest_share(), 0.02);
   EXPECT_LT(trials.settled.worst_m, 0.25);
   EXPECT_LT(trials.settled.worst_rad, 0.03);
+}
+
+TEST(EstimatorFaults, ReadsIdsThroughALensThatIsNotCalibratedAndFusesNoDirection) {
+  const auto all = [](const EstimatorPair& pair, MeasurementKind kind) {
+    const auto& counts = pair.status().measurements.at(static_cast<std::size_t>(kind));
+    return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+  };
+  EstimatorPair pair(1, [](EstimatorSettings& settings) {
+    for (CameraCalibration& camera : settings.cameras) camera.calibrated = false;
+  });
+
+  pair.run_for(kWarmUp);
+
+  EXPECT_GT(pair.status().id_decodes, 0U);
+  EXPECT_EQ(all(pair, MeasurementKind::kBearing), 0U);
+  EXPECT_EQ(pair.last_bearing(), Duration{});
+  // The neighbor's camera is calibrated: what it sees is still of use.
+  EXPECT_GT(all(pair, MeasurementKind::kPeerBearing), 0U);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -102,6 +103,40 @@ TEST(Estimator, GivesTheSameOutputsToTheBitForTheSameEvents) {
 
   EXPECT_GT(a.size(), 50U);
   expect_same_to_the_bit(a, b);
+}
+
+TEST(Estimator, TakesTheAntennaDelaysOfBothModulesOffEveryRange) {
+  std::vector<Event> events = two_seconds();
+  Estimator plain(two_robots());
+  const auto expected = poses_of(plain, events);
+  EstimatorSettings delayed = two_robots();
+  delayed.swarm.members[0].range_delay_m = 0.1;
+  delayed.swarm.members[1].range_delay_m = 0.25;
+  for (Event& event : events)
+    if (auto* range = std::get_if<UwbRange>(&event)) range->range_m += 0.1 + 0.25;
+  Estimator estimator(delayed);
+
+  std::vector<NeighborPose> poses;
+  std::size_t reported = 0;
+  for (const Event& event : events) {
+    const Outputs outputs = estimator.step(event);
+    poses.insert(poses.end(), outputs.poses.begin(), outputs.poses.end());
+    if (!outputs.report) continue;
+    for (const UwbRange& range : outputs.report->ranges) {
+      // Others receive what is corrected: they need not know our delay.
+      const auto is_same_range = [&](const Event& other) {
+        const auto* raw = std::get_if<UwbRange>(&other);
+        return raw != nullptr && raw->stamp == range.stamp &&
+               std::abs(raw->range_m - 0.35 - range.range_m) < 1e-9;
+      };
+      EXPECT_EQ(std::ranges::count_if(events, is_same_range), 1);
+      ++reported;
+    }
+  }
+
+  EXPECT_GT(reported, 20U);
+  ASSERT_EQ(poses.size(), expected.size());
+  EXPECT_LT((poses.back().T_B_N.pose.p - expected.back().T_B_N.pose.p).norm(), 1e-6);
 }
 
 TEST(Estimator, PublishesTheDirectionOfUpWithEachPose) {

@@ -1,0 +1,29 @@
+#include "daemon/ctl/live/check.hpp"
+
+#include "daemon/ctl/commands/command_line.hpp"
+#include "daemon/ctl/commands/commands.hpp"
+
+namespace crepes {
+
+void add_check(CommandLine& line) {
+  auto& options = line.make<CheckOptions>();
+  CLI::App* sub = line.add(
+      "check",
+      "Watch a running robot for a few seconds and say what is right, what is wrong and what to "
+      "do: sensors, rates, clocks, exposure, board, mesh, calibration");
+  add_daemon_options(sub, options.daemon);
+  sub->add_option("--config", options.config,
+                  "the daemon's configuration: also compare the rates with what it says");
+  sub->add_option("--for", options.duration_s, "seconds to watch")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 60.0));
+  add_json_flag(sub, options.json);
+  line.run(sub, [&options]() -> Result<void> {
+    const Result<CheckReport> report = check(options);
+    if (!report) return tl::unexpected(report.error());
+    if (auto printed = print_result(report->text); !printed) return printed;
+    return report->is_good ? Result<void>() : fail(ErrorCode::kIo, "check: faults were found");
+  });
+}
+
+}  // namespace crepes

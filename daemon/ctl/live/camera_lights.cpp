@@ -1,0 +1,76 @@
+#include "daemon/ctl/live/camera_lights.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include "config/reading/config_file.hpp"
+#include "config/writing/config_writer.hpp"
+#include "drivers/base/text_file.hpp"
+#include "drivers/dataset/robot_folder.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path lights_file(const fs::path& config) {
+  return config.parent_path() / (config.stem().string() + ".d") / "90-exposure.yaml";
+}
+
+std::string lights_text(const std::vector<NamedLight>& lights) {
+  std::string text = "# Written by crepesctl exposure.\ncameras:\n";
+  for (const auto& [camera, light] : lights) {
+    text += fmt::format("  - name: {}\n", camera);
+    if (light.exposure_us)
+      text += fmt::format("    exposure_us: {}\n", to_yaml(*light.exposure_us));
+    if (light.gain) text += fmt::format("    gain: {}\n", to_yaml(*light.gain));
+  }
+  return text;
+}
+
+/// As it was before: with its text, or not there.
+Result<void> restore(const fs::path& file, const Result<std::string>& before) {
+  if (before) return write_text_file(file, *before);
+  std::error_code error;
+  fs::remove(file, error);
+  return {};
+}
+
+}  // namespace
+
+Result<CameraLights> CameraLights::load(const fs::path& config, const std::string& camera) {
+  const Result<Config> loaded = load_config(config);
+  if (!loaded) return tl::unexpected(loaded.error());
+  std::vector<NamedLight> lights;
+  std::string names;
+  for (const CameraConfig& one : loaded->cameras) {
+    names += (names.empty() ? "" : ", ") + one.calibration.name;
+    lights.push_back({one.calibration.name, one.device.light});
+  }
+  const auto chosen =
+      camera.empty() ? lights.begin() : std::ranges::find(lights, camera, &NamedLight::camera);
+  if (chosen == lights.end())
+    return fail(ErrorCode::kUsage, fmt::format("no camera \"{}\"; there is {}", camera, names));
+  const auto index = static_cast<std::size_t>(chosen - lights.begin());
+  return CameraLights(config, std::move(lights), index);
+}
+
+Result<void> CameraLights::change(const CameraLight& light) {
+  std::vector<NamedLight> wanted = lights_;
+  if (light.exposure_us) wanted[chosen_].light.exposure_us = light.exposure_us;
+  if (light.gain) wanted[chosen_].light.gain = light.gain;
+  const fs::path file = lights_file(config_);
+  const Result<std::string> before = read_text_file(file, kMaxConfigBytes);
+  if (auto written = write_text_file(file, lights_text(wanted)); !written) return written;
+  if (const Result<Config> result = load_config(config_); !result) {
+    if (auto restored = restore(file, before); !restored) return restored;
+    return tl::unexpected(result.error());
+  }
+  lights_ = std::move(wanted);
+  return {};
+}
+
+}  // namespace crepes

@@ -1,0 +1,42 @@
+/// The cameras' exposure and gain in the files of a configuration.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "drivers/camera/camera_light.hpp"
+#include "estimator/core/result.hpp"
+
+namespace crepes {
+
+struct NamedLight {
+  std::string camera;
+  CameraLight light;
+};
+
+class CameraLights {
+ public:
+  /// Those in force in `config`, with its fragments. `camera` names the one to change; empty: the
+  /// first.
+  [[nodiscard]] static Result<CameraLights> load(const std::filesystem::path& config,
+                                                 const std::string& camera);
+
+  [[nodiscard]] const std::vector<NamedLight>& all() const { return lights_; }
+  /// Of the camera to change.
+  [[nodiscard]] const CameraLight& light() const { return lights_[chosen_].light; }
+
+  /// Changes what `light` has, and writes the fragment 90-exposure.yaml. With a fault in the
+  /// result, the fragment is as before and the fault is returned.
+  [[nodiscard]] Result<void> change(const CameraLight& light);
+
+ private:
+  CameraLights(std::filesystem::path config, std::vector<NamedLight> lights, std::size_t chosen)
+      : config_(std::move(config)), lights_(std::move(lights)), chosen_(chosen) {}
+
+  std::filesystem::path config_;
+  std::vector<NamedLight> lights_;
+  std::size_t chosen_;
+};
+
+}  // namespace crepes

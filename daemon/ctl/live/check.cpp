@@ -1,0 +1,99 @@
+#include "daemon/ctl/live/check.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <variant>
+
+#include "config/reading/config_file.hpp"
+#include "daemon/ctl/json_line.hpp"
+#include "daemon/ctl/live/full_status.hpp"
+#include "daemon/ctl/live/robot_check.hpp"
+#include "drivers/base/monotonic_clock.hpp"
+
+namespace crepes {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// The newest pose of each neighbor within some seconds.
+Result<std::map<RobotId, client::Pose>> watch_poses(const DaemonAddress& daemon,
+                                                    double duration_s) {
+  constexpr std::chrono::milliseconds kPatience{50};
+  const MonotonicClock clock;
+  Result<client::Connection> connection = connect(daemon, {});
+  if (!connection) return tl::unexpected(connection.error());
+  std::map<RobotId, client::Pose> poses;
+  for (const Timestamp end = clock.now() + from_seconds(duration_s); clock.now() < end;) {
+    const auto answer = connection->receive(kPatience);
+    if (!answer) continue;
+    if (const auto* heard = std::get_if<client::Pose>(&answer->message))
+      poses[RobotId{heard->peer}] = *heard;
+  }
+  return poses;
+}
+
+Result<RobotObservation> observe(const CheckOptions& options) {
+  RobotObservation seen;
+  if (!options.config.empty()) {
+    Result<Config> config = load_config(options.config);
+    if (!config) return tl::unexpected(config.error());
+    seen.config = std::move(*config);
+  }
+  const MonotonicClock clock;
+  Result<FullStatus> before = request_full_status(options.daemon);
+  if (!before) return tl::unexpected(before.error());
+  const Timestamp start = clock.now();
+  auto poses = watch_poses(options.daemon, options.duration_s);
+  if (!poses) return tl::unexpected(poses.error());
+  Result<FullStatus> after = request_full_status(options.daemon);
+  if (!after) return tl::unexpected(after.error());
+  seen.before = std::move(before->message);
+  seen.after = std::move(after->message);
+  seen.duration_s = to_seconds(clock.now() - start);
+  seen.poses = std::move(*poses);
+  return seen;
+}
+
+std::string text_of(const std::vector<CheckFinding>& findings, const RobotObservation& seen) {
+  std::string text;
+  std::string about;
+  for (const CheckFinding& finding : findings) {
+    if (finding.about != about) text += finding.about + "\n";
+    about = finding.about;
+    text += fmt::format("  {:<5}  {}\n", name_of(finding.verdict), finding.text);
+    if (!finding.advice.empty()) text += fmt::format("         -> {}\n", finding.advice);
+  }
+  const std::string places = places_text(seen.poses);
+  if (places.empty()) return text;
+  return text + "\nCompare, and walk one robot around the other:\n" + places;
+}
+
+Json json_of(const std::vector<CheckFinding>& findings, const client::Status& status,
+             bool is_good) {
+  Json json{{"ok", is_good}, {"self", status.self}, {"findings", Json::array()}};
+  for (const CheckFinding& finding : findings) {
+    Json one{{"about", finding.about},
+             {"verdict", std::string(name_of(finding.verdict))},
+             {"text", finding.text}};
+    if (!finding.advice.empty()) one["advice"] = finding.advice;
+    json["findings"].push_back(std::move(one));
+  }
+  return json;
+}
+
+}  // namespace
+
+Result<CheckReport> check(const CheckOptions& options) {
+  const Result<RobotObservation> seen = observe(options);
+  if (!seen) return tl::unexpected(seen.error());
+  const std::vector<CheckFinding> findings = check_robot(*seen);
+  CheckReport report;
+  report.is_good = std::ranges::count(findings, CheckVerdict::kFault, &CheckFinding::verdict) == 0;
+  report.text = options.json ? json_line(json_of(findings, seen->after, report.is_good))
+                             : text_of(findings, *seen);
+  return report;
+}
+
+}  // namespace crepes

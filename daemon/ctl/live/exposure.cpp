@@ -1,0 +1,195 @@
+#include "daemon/ctl/live/exposure.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "daemon/ctl/demo/child_process.hpp"
+#include "daemon/ctl/json_line.hpp"
+#include "daemon/ctl/live/camera_lights.hpp"
+#include "daemon/ctl/live/full_status.hpp"
+#include "daemon/ctl/live/live_screen.hpp"
+#include "daemon/ctl/live/robot_check.hpp"
+#include "daemon/ctl/text_table.hpp"
+#include "drivers/base/monotonic_clock.hpp"
+#include "drivers/base/sleep.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using Json = nlohmann::ordered_json;
+
+/// The daemon reads its files again.
+Result<void> request_reload(const ExposureOptions& options) {
+  if (options.pid) {
+    if (::kill(*options.pid, SIGHUP) == 0) return {};
+    return fail(ErrorCode::kIo, fmt::format("process {}: {}", *options.pid,
+                                            std::generic_category().message(errno)));
+  }
+  constexpr Duration kReloadTime = 10s;
+  auto systemctl = ChildProcess::start("/usr/bin/systemctl", {"reload", "crepesd"}, "/dev/null");
+  if (!systemctl) return tl::unexpected(systemctl.error());
+  const MonotonicClock clock;
+  for (const Timestamp end = clock.now() + kReloadTime; clock.now() < end;) {
+    if (const auto& ended = systemctl->exit_reason()) {
+      if (*ended == "exit code 0") return {};
+      return fail(ErrorCode::kIo, "systemctl reload crepesd: " + *ended +
+                                      "; of a daemon that is no service, say its --pid");
+    }
+    sleep_for(20ms);
+  }
+  return fail(ErrorCode::kIo, "systemctl reload crepesd does not end");
+}
+
+/// What STATUS says of the configuration in force.
+Result<Json> config_status(const DaemonAddress& daemon) {
+  return request_full_status(daemon).map([](const FullStatus& full) {
+    return Json::parse(full.json, nullptr, /*allow_exceptions=*/false)
+        .value("config", Json::object());
+  });
+}
+
+/// Waits until a reload after `generation` is in force, or was refused.
+Result<void> await_reload(const DaemonAddress& daemon, int generation) {
+  constexpr Duration kReloadTime = 10s;
+  const MonotonicClock clock;
+  for (const Timestamp end = clock.now() + kReloadTime; clock.now() < end; sleep_for(50ms)) {
+    const Result<Json> status = config_status(daemon);
+    if (!status) return tl::unexpected(status.error());
+    if (status->value("generation", 0) > generation) return {};
+    if (const std::string fault = status->value("fault", ""); !fault.empty())
+      return fail(ErrorCode::kConfig, "the daemon refused the reload: " + fault);
+  }
+  return fail(ErrorCode::kIo, "the daemon did not reload; was --config its file?");
+}
+
+Result<void> apply(const ExposureOptions& options, CameraLights& lights, const CameraLight& light) {
+  const Result<Json> before = config_status(options.daemon);
+  if (!before) return tl::unexpected(before.error());
+  return lights.change(light).and_then([&] { return request_reload(options); }).and_then([&] {
+    return await_reload(options.daemon, before->value("generation", 0));
+  });
+}
+
+std::string setting(const std::optional<double>& value) {
+  return value ? fmt::format("{}", *value) : "-";
+}
+
+std::uint64_t level(const client::Status::Sensor& sensor, const char* name) {
+  const auto found = sensor.counts.find(name);
+  return found == sensor.counts.end() ? 0 : found->second;
+}
+
+const client::Status::Sensor* spots_of(const client::Status& status, const std::string& camera) {
+  const auto found =
+      std::ranges::find(status.sensors, camera + " spots", &client::Status::Sensor::name);
+  return found == status.sensors.end() ? nullptr : &*found;
+}
+
+std::string lights_table(const client::Status& status, const CameraLights& lights) {
+  std::vector<std::vector<std::string>> rows{{"camera", "exposure us", "gain", "background",
+                                              "threshold", "faintest", "brightest", "lights"}};
+  for (const auto& [camera, light] : lights.all()) {
+    std::vector<std::string> row{camera, setting(light.exposure_us), setting(light.gain)};
+    const client::Status::Sensor* const spots = spots_of(status, camera);
+    for (const char* name : {"background", "threshold", "faintest", "brightest", "spots"})
+      row.push_back(spots == nullptr ? "-" : std::to_string(level(*spots, name)));
+    rows.push_back(std::move(row));
+  }
+  std::string text = text_table(rows);
+  for (const CheckFinding& finding : check_exposure(status))
+    if (!finding.advice.empty()) text += finding.advice + "\n";
+  return text;
+}
+
+Json lights_json(const client::Status& status, const CameraLights& lights) {
+  Json json{{"cameras", Json::array()}};
+  for (const auto& [camera, light] : lights.all()) {
+    Json one{{"name", camera}};
+    if (light.exposure_us) one["exposure_us"] = *light.exposure_us;
+    if (light.gain) one["gain"] = *light.gain;
+    if (const client::Status::Sensor* const spots = spots_of(status, camera)) {
+      for (const char* name : {"background", "threshold", "faintest", "brightest", "spots"})
+        one[name] = level(*spots, name);
+    }
+    json["cameras"].push_back(std::move(one));
+  }
+  return json;
+}
+
+/// What a key asks for; empty for a key without a meaning.
+std::optional<CameraLight> wanted_by(char key, const CameraLight& light) {
+  constexpr double kStep = 1.25;
+  constexpr double kNominalExposure = 500.0;  // us
+  const double exposure_us = light.exposure_us.value_or(kNominalExposure);
+  const double gain = light.gain.value_or(0.0);
+  switch (key) {
+    case '+':
+      return CameraLight{.exposure_us = exposure_us * kStep, .gain = {}};
+    case '-':
+      return CameraLight{.exposure_us = exposure_us / kStep, .gain = {}};
+    case 'G':
+      return CameraLight{.exposure_us = {}, .gain = gain + 1.0};
+    case 'g':
+      return CameraLight{.exposure_us = {}, .gain = std::max(0.0, gain - 1.0)};
+    default:
+      return std::nullopt;
+  }
+}
+
+/// Until q.
+Result<void> show_live(const ExposureOptions& options, CameraLights& lights) {
+  const LiveScreen screen;
+  const KeyReader keys;
+  StopSignals stop;
+  std::string refused;
+  while (!stop.requested()) {
+    while (const auto key = keys.next()) {
+      if (*key == 'q') return {};
+      const auto wanted = wanted_by(*key, lights.light());
+      if (!wanted) continue;
+      const Result<void> applied = apply(options, lights, *wanted);
+      refused = applied ? "" : applied.error().message;
+    }
+    const Result<FullStatus> status = request_full_status(options.daemon);
+    if (!status) return tl::unexpected(status.error());
+    screen.show(lights_table(status->message, lights) +
+                "\n+ - exposure   G g gain   q end; as short as far boards allow\n" + refused);
+    sleep_for(100ms);
+  }
+  return {};
+}
+
+Result<void> show_once(const ExposureOptions& options, const CameraLights& lights) {
+  const Result<FullStatus> status = request_full_status(options.daemon);
+  if (!status) return tl::unexpected(status.error());
+  print(options.json ? json_line(lights_json(status->message, lights))
+                     : lights_table(status->message, lights));
+  return {};
+}
+
+}  // namespace
+
+Result<void> exposure(const ExposureOptions& options) {
+  constexpr Duration kLevels = 2200ms;  // until STATUS has a whole second of the new light
+  Result<CameraLights> lights = CameraLights::load(options.config, options.camera);
+  if (!lights) return tl::unexpected(lights.error());
+  const bool changes = options.exposure_us || options.gain;
+  if (changes) {
+    const CameraLight wanted{.exposure_us = options.exposure_us, .gain = options.gain};
+    if (auto applied = apply(options, *lights, wanted); !applied) return applied;
+  }
+  const bool is_live =
+      !options.json && !changes && ::isatty(STDIN_FILENO) == 1 && ::isatty(STDOUT_FILENO) == 1;
+  if (is_live) return show_live(options, *lights);
+  if (changes) sleep_for(kLevels);
+  return show_once(options, *lights);
+}
+
+}  // namespace crepes
