@@ -19,7 +19,11 @@ constexpr double kMinLitProbability = 0.3;  // below it, an absence was to be ex
 constexpr double kLitProbability = 0.8;     // of a track whose code is unknown
 constexpr double kNewSources = 0.1;         // a frame and steradian
 constexpr double kNewness = 2.0;            // a track of a few frames may have been a flicker
-constexpr double kLeastBenefit = 1e-3;      // what lies within the gate is not left alone
+constexpr Duration kLongestAbsence = std::chrono::milliseconds{600};  // the gyro carries a track
+constexpr double kSteadyGain = 0.1;
+constexpr double kExpectedPx = 5.0;  // so near its prediction a light is after a short absence
+constexpr Duration kShortAbsence = std::chrono::milliseconds{100};
+constexpr double kLeastBenefit = 1e-3;  // what lies within the gate is not left alone
 
 /// Squared chord, which is the squared angle for directions that are near.
 double distance2(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -37,6 +41,7 @@ BlinkTracker::BlinkTracker(const CameraCalibration& camera, CameraModel model,
       T_C_B_(camera.T_cam_imu),
       timeshift_(from_seconds(camera.timeshift_cam_imu)),
       decoder_(library, config, camera.rate_hz, own) {
+  period_ = from_seconds(1.0 / camera.rate_hz);
   timeout_ = std::max(from_seconds(config.track_timeout_ms * 1e-3), decoder_.longest_dark());
   for (const auto& [id, code] : library.entries()) counts_.decodes[id] = 0;
 }
@@ -51,6 +56,8 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
     ++counts_.refused_frames;
     return {};
   }
+  // A frame that was lost shows nothing, not even darkness.
+  const Duration looked = now_ ? std::min(stamp - *now_, 3 * period_ / 2) : Duration{};
   predict(stamp);
   unproject(frame);
   const Pairing& sighting_of = assign(stamp);
@@ -67,6 +74,9 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
       ++counts_.merged_spots;
       unclear_.push_back(*sighting_of[t]);
       track.last_seen = stamp;
+      track.seen_B = track.u_B;
+      track.unseen = {};
+      track.is_ambiguous = true;
       continue;
     }
     observe(track, sighting, stamp);
@@ -78,8 +88,15 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
                           .sigma_rad = config_.bearing_sigma_px * sighting.px_rad});
     }
   }
-  for (std::size_t t = 0; t < tracks_.size(); ++t)
-    if (!sighting_of[t] && !is_hidden(tracks_[t])) observe_absence(tracks_[t], stamp);
+  for (std::size_t t = 0; t < tracks_.size(); ++t) {
+    if (sighting_of[t]) continue;
+    tracks_[t].unseen += looked;
+    if (is_hidden(tracks_[t])) {
+      tracks_[t].is_ambiguous = true;
+    } else {
+      observe_absence(tracks_[t], stamp);
+    }
+  }
   retire(stamp);
   for (std::size_t s = 0; s < sightings_.size(); ++s)
     if (!is_taken_[s]) begin(sightings_[s], stamp);
@@ -121,6 +138,11 @@ void BlinkTracker::predict(Timestamp stamp) {
   for (Track& track : tracks_) {
     track.u_B = (R_now_before * (track.u_B + track.rate_B * dt)).normalized();
     track.rate_B = R_now_before * track.rate_B;
+    track.seen_B = R_now_before * track.seen_B;
+    track.steady_B = R_now_before * track.steady_B;
+    const Duration absence = stamp - track.last_seen;
+    if (absence > decoder_.longest_dark())  // a rate of a few frames would carry it astray
+      track.u_B = (track.seen_B + to_seconds(absence) * track.steady_B).normalized();
     track.variance += dt * (2.0 * track.covariance + dt * track.rate_variance) +
                       q * dt * dt * dt / 3.0 + std::pow(kGyroSigma * dt, 2);
     track.covariance += dt * track.rate_variance + q * dt * dt / 2.0;
@@ -163,8 +185,8 @@ const BlinkTracker::Pairing& BlinkTracker::assign(Timestamp stamp) {
   return assignment_.solve(tracks_.size(), sightings_.size(), pairs_);
 }
 
-bool BlinkTracker::is_established(const Track& track, Timestamp stamp) const {
-  return track.hits >= kEstablishedHits && stamp - track.last_seen <= decoder_.longest_dark();
+bool BlinkTracker::is_established(const Track& track) const {
+  return track.hits >= kEstablishedHits && track.unseen <= decoder_.longest_dark();
 }
 
 /// Whether another board that may well be lit has no spot of its own but could be in this one.
@@ -173,7 +195,7 @@ bool BlinkTracker::hides_another(std::size_t track, const Pairing& sighting_of,
   const Sighting& sighting = sightings_[*sighting_of[track]];
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     const Track& other = tracks_[t];
-    if (t == track || sighting_of[t] || !is_established(other, stamp)) continue;
+    if (t == track || sighting_of[t] || !is_established(other)) continue;
     const double lit = decoder_.lit_probability(other.evidence, stamp).value_or(1.0);
     const double reach = other.seen.radius_rad + sighting.radius_rad + kMergePx * sighting.px_rad;
     if (lit > kMinLitProbability && distance2(other.u_B, sighting.u_B) < reach * reach) return true;
@@ -189,7 +211,19 @@ bool BlinkTracker::is_hidden(const Track& track) const {
   });
 }
 
+/// Whether what is seen after an absence is not what was: it could be either of two, or it is not
+/// where the gyro and its own motion have carried it.
+bool BlinkTracker::is_another(const Track& track, const Sighting& sighting, Timestamp stamp) const {
+  const auto& last_lit = track.evidence.last_lit;
+  if (!last_lit || stamp - *last_lit <= decoder_.longest_dark()) return false;
+  const double absence = to_seconds(stamp - *last_lit) / to_seconds(kShortAbsence);
+  const double reach = kExpectedPx * std::max(1.0, absence) * sighting.px_rad;
+  return track.is_ambiguous || distance2(track.u_B, sighting.u_B) > reach * reach;
+}
+
 void BlinkTracker::observe(Track& track, const Sighting& sighting, Timestamp stamp) {
+  const bool was_assigned = track.evidence.assigned.has_value();
+  if (was_assigned && is_another(track, sighting, stamp)) track.evidence.forget();
   const double noise = std::pow(config_.bearing_sigma_px * sighting.px_rad, 2);
   const double S = track.variance + noise;
   const double gain = track.variance / S;
@@ -201,11 +235,14 @@ void BlinkTracker::observe(Track& track, const Sighting& sighting, Timestamp sta
   track.rate_variance -= rate_gain * track.covariance;
   track.covariance *= 1.0 - gain;
   track.variance *= 1.0 - gain;
+  track.steady_B += std::max(kSteadyGain, 1.0 / (track.hits + 1)) * (track.rate_B - track.steady_B);
+  track.seen_B = track.u_B;
   track.seen = sighting;
   track.last_seen = stamp;
+  track.unseen = {};
+  track.is_ambiguous = false;
   ++track.hits;
 
-  const bool was_assigned = track.evidence.assigned.has_value();
   decoder_.observe_lit(track.evidence, stamp, phases_);
   decoder_.learn(track.evidence, stamp, phases_);
   if (!was_assigned && track.evidence.assigned)
@@ -220,9 +257,12 @@ void BlinkTracker::observe_absence(Track& track, Timestamp stamp) const {
 
 void BlinkTracker::retire(Timestamp stamp) {
   std::erase_if(tracks_, [&](Track& track) {
-    const Duration patience =
+    const Duration usual =
         track.hits < kEstablishedHits ? std::min(decoder_.longest_dark(), timeout_) : timeout_;
-    if (stamp - track.last_seen <= patience) return false;
+    const bool is_carried = track.evidence.assigned && !track.is_ambiguous;
+    const Duration patience = is_carried ? std::max(usual, kLongestAbsence) : usual;
+    if (track.unseen <= patience && stamp - track.last_seen <= std::max(usual, kLongestAbsence))
+      return false;
     track.evidence.forget();
     retired_.push_back(std::move(track.evidence));
     return true;
@@ -240,6 +280,7 @@ void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp) {
     retired_.pop_back();
   }
   track.u_B = sighting.u_B;
+  track.seen_B = sighting.u_B;
   track.variance = std::pow(config_.bearing_sigma_px * sighting.px_rad, 2);
   track.rate_variance = kRateSigma * kRateSigma;
   track.seen = sighting;

@@ -54,12 +54,16 @@ class BlinkTracker {
   };
   struct Track {
     Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
-    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();  ///< du/dt that own rotation leaves [1/s]
-    double variance = 0.0;                             ///< of the direction, per axis [rad^2]
+    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();    ///< du/dt that own rotation leaves [1/s]
+    Eigen::Vector3d seen_B = Eigen::Vector3d::UnitX();   ///< where it was last, turned since
+    Eigen::Vector3d steady_B = Eigen::Vector3d::Zero();  ///< rate_B over some 50 ms, less noisy
+    double variance = 0.0;                               ///< of the direction, per axis [rad^2]
     double covariance = 0.0;
     double rate_variance = 0.0;
     Sighting seen;  ///< the latest
     Timestamp last_seen{};
+    Duration unseen{};          ///< in frames since; those that were lost do not count
+    bool is_ambiguous = false;  ///< since then it may have been in a spot with another
     int hits = 0;
     BlinkEvidence evidence;
   };
@@ -70,11 +74,13 @@ class BlinkTracker {
   void predict(Timestamp stamp);
   [[nodiscard]] double gate_of(const Track& track) const;
   [[nodiscard]] const Pairing& assign(Timestamp stamp);
-  [[nodiscard]] bool is_established(const Track& track, Timestamp stamp) const;
+  [[nodiscard]] bool is_established(const Track& track) const;
   [[nodiscard]] bool hides_another(std::size_t track, const Pairing& sighting_of,
                                    Timestamp stamp) const;
   [[nodiscard]] bool is_hidden(const Track& track) const;
   void observe(Track& track, const Sighting& sighting, Timestamp stamp);
+  [[nodiscard]] bool is_another(const Track& track, const Sighting& sighting,
+                                Timestamp stamp) const;
   void observe_absence(Track& track, Timestamp stamp) const;
   void retire(Timestamp stamp);
   void begin(const Sighting& sighting, Timestamp stamp);
@@ -85,6 +91,7 @@ class BlinkTracker {
   Pose T_C_B_;
   Duration timeshift_{};
   Duration timeout_{};
+  Duration period_{};  ///< of frames
   IdDecoder decoder_;
   ImuHistory imu_;
   PhaseMemory phases_;

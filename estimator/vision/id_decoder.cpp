@@ -40,6 +40,16 @@ constexpr double kNegligible = 40.0;  // nats
 constexpr double kOtherDiffers = 0.2;
 const double kDoubted = std::log(60.0);
 const double kLost = std::log(20'000.0);
+constexpr double kObstructedCost = 2.0;  // nats; most sources are seen whenever they are lit
+constexpr double kShown = 0.9;           // of the frames of one that is not
+constexpr double kMissedFrames = 2.0;    // at the edges of a dark run
+
+// After an absence, the doubt that what is lit is what was: none in frames that follow each other,
+// and so much after a while that fifteen frames in a row have to agree.
+constexpr Duration kShortAbsence = 100ms;
+constexpr Duration kLongestAbsence = 600ms;
+constexpr double kShortDoubt = 0.7;    // of kDoubted, after kShortAbsence
+constexpr double kAbsenceDoubt = 3.3;  // nats beyond kDoubted
 
 // Lamps on the mains flash twice a cycle. A camera can hardly distinguish finer steps of duty.
 constexpr std::array kLampRatesHz{100.0, 120.0};
@@ -106,6 +116,7 @@ void BlinkEvidence::forget() {
   assigned.reset();
   confidence = 0.0;
   doubt = 0.0;
+  obstructed_doubt = 0.0;
 }
 
 void PhaseMemory::learn(const CodeMatch& match, Timestamp now) {
@@ -127,6 +138,7 @@ IdDecoder::IdDecoder(const IdLibrary& library, const VisionConfig& config, doubl
     window_ = std::max({window_, kMinWindow, kWindowPeriods * blink.period()});
     longest_dark_ = std::max(longest_dark_, longest_dark_of(blink));
   }
+  darkness_ = longest_dark_ + from_seconds(kMissedFrames / rate_hz);
   longest_dark_ += from_seconds(kDarkFrames / rate_hz);
   constexpr double kShare =
       kLampOdds / static_cast<double>(kLampRatesHz.size() * kLampDuties.size());
@@ -231,11 +243,7 @@ void IdDecoder::observe_dark(BlinkEvidence& evidence, Timestamp stamp) const {
 
 void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp,
                             const PhaseMemory& known) const {
-  if (!evidence.last_lit || stamp - *evidence.last_lit > longest_dark_) {
-    // It was out of sight for too long: what appears in its place may be another source.
-    evidence.pending_dark.clear();
-    if (evidence.assigned) evidence.forget();
-  }
+  end_absence(evidence, stamp);
   evidence.last_lit = stamp;
   for (const Timestamp dark : evidence.pending_dark) add(evidence, {dark, false});
   evidence.pending_dark.clear();
@@ -243,13 +251,32 @@ void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp,
   if (evidence.score.empty()) return;
   if (!evidence.assigned) {
     decide(evidence, stamp, known);
-  } else if (evidence.doubt > kLost) {
+  } else if (doubt_of(evidence) > kLost) {
     evidence.forget();
     evidence.last_lit = stamp;
   } else {
     const Code& code = codes_[evidence.assigned->code];
     evidence.assigned->phase = best_phase(scores_of(evidence, code));  // its clock drifts
   }
+}
+
+/// Darkness says something where a code is as dark; otherwise the source was hidden. What appears
+/// in its place may be another one.
+void IdDecoder::end_absence(BlinkEvidence& evidence, Timestamp stamp) const {
+  auto& dark = evidence.pending_dark;
+  if (!dark.empty() && dark.back() - dark.front() > darkness_) dark.clear();
+  if (!evidence.last_lit) return;
+  const Duration absence = stamp - *evidence.last_lit;
+  if (absence <= longest_dark_) return;
+  dark.clear();
+  if (!evidence.assigned) return;
+  if (absence > kLongestAbsence) return evidence.forget();
+  const Duration brief = kShortAbsence + longest_dark_;
+  const double doubt = absence > brief
+                           ? kDoubted + kAbsenceDoubt
+                           : kShortDoubt * kDoubted * to_seconds(absence) / to_seconds(brief);
+  evidence.doubt = std::max(evidence.doubt, doubt);
+  evidence.obstructed_doubt = std::max(evidence.obstructed_doubt, doubt - kObstructedCost);
 }
 
 void IdDecoder::learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const {
@@ -308,23 +335,34 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
   evidence.assigned_since = now;
   evidence.confidence = 1.0 / (1.0 + others + clutter);
   evidence.doubt = 0.0;
+  evidence.obstructed_doubt = 0.0;
 }
 
 /// Page's test (CUSUM) for a change of the source: the log odds g that another board has been
 /// blinking here since some past frame,
-///   g <- max(0, g + ln(((1 - d) p + d (1 - p)) / p)),
-/// where p is the likelihood of the frame under the assigned code, and d the share of frames in
-/// which another board differs.
+///   g <- max(0, g + ln(((1 - d) p + d q) / p)),
+/// where p is the likelihood of the frame under the assigned code, q that under its opposite, and d
+/// the share of frames in which another board differs. It runs twice: for a source in the clear,
+/// and for one that is hidden in half of the frames, whose darkness says little.
 void IdDecoder::confirm(BlinkEvidence& evidence, BlinkObservation observation) const {
   const double lit =
       p_lit(codes_[evidence.assigned->code], evidence.assigned->phase, observation.stamp);
-  const double p = observation.lit ? lit : 1.0 - lit;
-  evidence.doubt = std::max(
-      0.0, evidence.doubt + std::log(((1.0 - kOtherDiffers) * p + kOtherDiffers * (1.0 - p)) / p));
+  const auto after = [&](double doubt, double shown) {
+    const double p = observation.lit ? shown * lit : 1.0 - shown * lit;
+    const double q = observation.lit ? shown * (1.0 - lit) : 1.0 - shown * (1.0 - lit);
+    return std::clamp(doubt + std::log(((1.0 - kOtherDiffers) * p + kOtherDiffers * q) / p), 0.0,
+                      kLost + 1.0);
+  };
+  evidence.doubt = after(evidence.doubt, 1.0);
+  evidence.obstructed_doubt = after(evidence.obstructed_doubt, kShown);
+}
+
+double IdDecoder::doubt_of(const BlinkEvidence& evidence) {
+  return std::min(evidence.doubt, evidence.obstructed_doubt + kObstructedCost);
 }
 
 bool IdDecoder::is_identified(const BlinkEvidence& evidence) {
-  return evidence.assigned && evidence.doubt <= kDoubted;
+  return evidence.assigned && doubt_of(evidence) <= kDoubted;
 }
 
 std::optional<RobotId> IdDecoder::id_of(const BlinkEvidence& evidence) const {

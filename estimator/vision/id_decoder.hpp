@@ -33,6 +33,8 @@ struct BlinkEvidence {
   Timestamp assigned_since{};
   double confidence = 0.0;  ///< posterior probability of `assigned` when it was decided
   double doubt = 0.0;       ///< log odds that another board has blinked here since; at least zero
+  /// The same if something hides the light in half of the frames, as a propeller does.
+  double obstructed_doubt = 0.0;
 
   /// Returns to the initial state. Allocated memory is kept.
   void forget();
@@ -76,7 +78,8 @@ class IdDecoder {
   /// The track was lit in the frame at `stamp`, which is later than all before.
   void observe_lit(BlinkEvidence& evidence, Timestamp stamp, const PhaseMemory& known = {}) const;
   /// Nothing was seen where the track is predicted. The frame counts as dark if the track is lit
-  /// again within longest_dark().
+  /// again within longest_dark(), and no longer in a row than a code is dark: it was hidden then,
+  /// which says nothing.
   void observe_dark(BlinkEvidence& evidence, Timestamp stamp) const;
   /// Stores the phase in `known` if the board has been identified for two periods.
   void learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const;
@@ -119,6 +122,8 @@ class IdDecoder {
   void forget_old(BlinkEvidence& evidence, Timestamp now) const;
   void decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory& known) const;
   void confirm(BlinkEvidence& evidence, BlinkObservation observation) const;
+  void end_absence(BlinkEvidence& evidence, Timestamp stamp) const;
+  [[nodiscard]] static double doubt_of(const BlinkEvidence& evidence);
 
   std::vector<Code> codes_;  ///< those of the library, then those of lamps
   std::size_t boards_ = 0;   ///< number of codes of the library
@@ -129,6 +134,7 @@ class IdDecoder {
   std::size_t score_count_ = 0;
   Duration window_{};
   Duration longest_dark_{};
+  Duration darkness_{};  ///< the same with a margin of two frames
 };
 
 }  // namespace crepes

@@ -37,8 +37,9 @@ constexpr int kNewFaint = 8;
 constexpr int kFaintGain = 4;
 constexpr int kKnownFaint = 14;
 constexpr int kMostFaint = 32;
-constexpr double kFaintAgain = 4.3;  // sigmas, of a light where one was
-constexpr double kFaintKnown = 3.5;  // sigmas, where one was often
+constexpr double kFaintAtOnce = 7.5;  // sigmas, of a light that counts in its first picture
+constexpr double kFaintAgain = 4.3;   // sigmas, of a light where one was
+constexpr double kFaintKnown = 3.5;   // sigmas, where one was often
 constexpr std::size_t kMaxFaintPeaks = 256;
 constexpr std::size_t kMaxFaintLights = 64;  // more are texture
 
@@ -177,7 +178,14 @@ bool SpotDetector::search(const GrayImage& image, const Background& level, doubl
   close();
   join_fragments();
   measure_open(image, threshold);
-  for (const FaintLight& light : faint_) candidates_.push_back({light.spot, box_of(light.spot)});
+  for (const FaintLight& light : faint_) {
+    const bool was_there =
+        std::any_of(faint_places_.begin(), faint_places_.end(), [&](const FaintPlace& place) {
+          return distance(light.spot.u_px - place.u, light.spot.v_px - place.v) <= kFaintReach;
+        });
+    if (was_there || light.significance >= kFaintAtOnce)
+      candidates_.push_back({light.spot, box_of(light.spot)});
+  }
   return true;
 }
 

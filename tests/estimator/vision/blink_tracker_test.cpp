@@ -41,7 +41,8 @@ class BlinkTrackerTest : public testing::Test {
     return config;
   }
 
-  std::vector<Bearing> step() {
+  /// What the tracker makes of the next frame; nothing if the frame is lost.
+  std::vector<Bearing> step(bool is_lost = false) {
     now_ += 5ms;
     const Timestamp body = now_ + 2ms;
     const double t = to_seconds(body.time_since_epoch()) - 100.0;
@@ -75,7 +76,7 @@ class BlinkTrackerTest : public testing::Test {
         }
     std::shuffle(frame.spots.begin(), frame.spots.end(), random_);
     frame_ = frame;
-    return tracker_.step(frame);
+    return is_lost ? std::vector<Bearing>{} : tracker_.step(frame);
   }
 
   /// Angle between a bearing and the board it names [rad].
@@ -147,6 +148,36 @@ TEST_F(BlinkTrackerTest, TellsCrossingBoardsApart) {
 
   EXPECT_GT(right, 1000);
   EXPECT_GT(tracker_.status().merged_spots, 0U);
+}
+
+TEST_F(BlinkTrackerTest, KeepsIdsWhileFramesAreLost) {
+  yaw_rate_radps_ = 0.5;
+  boards_ = {{0, [](double t) { return Eigen::Vector3d(5.0, 0.5 * t, 0.3); }},
+             {1, [](double t) { return Eigen::Vector3d(5.0, 2.0 + 0.5 * t, 0.3); }}};
+  for (int i = 0; i < 100; ++i) (void)step();
+  std::size_t named = 0;
+  std::size_t lit = 0;
+  for (int i = 0; i < 300; ++i) {
+    const bool is_lost = i % 60 < 18;  // 90 ms
+    const auto bearings = step(is_lost);
+    if (is_lost) continue;
+    named += bearings.size();
+    lit += frame_.spots.size();
+    for (const Bearing& bearing : bearings)
+      EXPECT_LT(error_of(bearing, bearing.neighbor.value - 1U), 0.005);
+  }
+
+  EXPECT_GE(static_cast<double>(named), 0.9 * static_cast<double>(lit));
+  EXPECT_EQ(tracker_.status().lost_ids, 0U);
+}
+
+TEST_F(BlinkTrackerTest, DoesNotTakeALightBesideTheExpectedPlaceForTheBoardThatWasHidden) {
+  // Board 2 appears 10 px beside the place where board 1 was 90 ms before.
+  boards_ = {{0, [](double t) { return Eigen::Vector3d(t < 1.0 ? 5.0 : -5.0, 0.0, 0.0); }},
+             {1, [](double t) { return Eigen::Vector3d(t < 1.09 ? -5.0 : 5.0, 0.16, 0.0); }}};
+  for (int i = 0; i < 400; ++i)
+    for (const Bearing& bearing : step())
+      ASSERT_LT(error_of(bearing, bearing.neighbor.value - 1U), 0.005) << "frame " << i;
 }
 
 TEST_F(BlinkTrackerTest, DeliversAMirrorImageBesideTheBoardItself) {

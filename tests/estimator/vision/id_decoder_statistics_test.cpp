@@ -117,6 +117,28 @@ TEST_F(IdDecoderStatistics, TakesTheIdBackWithinOnePatternWhenTheTrackChangesHan
   EXPECT_LE(at(periods, 1.0), 1.0);
 }
 
+TEST_F(IdDecoderStatistics, HardlyTakesAStrangerForTheBoardThatWasHidden) {
+  const IdDecoder decoder(library(), VisionConfig{}, 200.0);
+  int wrong_frames = 0;
+  int strangers = 0;
+  for (int i = 0; i < 400; ++i) {
+    Watcher watcher(decoder, {.rate_hz = 200.0}, random_());
+    const auto& first = any_board();
+    const auto& second = any_board();
+    if (first.id == second.id) continue;
+    ++strangers;
+    const Light before = light_of(first.code);
+    const Light after = light_of(second.code);
+    BlinkEvidence evidence;
+    for (double t = 0.0; t < 1.0; t += 0.005) (void)watcher.look(before, from_seconds(t), evidence);
+    for (double t = 1.3; t < 2.0; t += 0.005)
+      wrong_frames += watcher.look(after, from_seconds(t), evidence) == first.id ? 1 : 0;
+  }
+  RecordProperty("wrong_frames", wrong_frames);
+  RecordProperty("strangers", strangers);
+  EXPECT_LT(wrong_frames, strangers / 20);  // a tenth of the strangers, half a frame each
+}
+
 TEST_F(IdDecoderStatistics, NeverNamesTheObserverItself) {
   const RobotId own = library().entries()[5].id;
   const IdDecoder decoder(library(), VisionConfig{}, 200.0, own);

@@ -206,5 +206,63 @@ TEST(IdDecoder, KeepsTheIdThroughAShortAbsence) {
   EXPECT_EQ(seen.last, RobotId{2});
 }
 
+/// Frames with the ID, in 20 lit ones from `back` on, of a board that was hidden before.
+int named_after(const IdDecoder& decoder, const Light& light, Duration from, Duration back,
+                std::optional<RobotId> id) {
+  BlinkEvidence evidence;
+  (void)watch(
+      decoder, [&](Duration t) { return t < from && light(t); }, back, {}, 10s, &evidence);
+  int named = 0;
+  int lit = 0;
+  for (Duration t = back; lit < 20; t += 5ms) {
+    const Outcome frame = watch(
+        decoder, [&](Duration) { return light(t); }, 5ms, {}, 10s + t, &evidence);
+    lit += frame.lit_frames;
+    named += frame.lit_frames > 0 && frame.last == id ? 1 : 0;
+  }
+  return named;
+}
+
+TEST(IdDecoder, KeepsTheIdOfABoardThatWasHiddenForAMoment) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, VisionConfig{}, 200.0);
+  for (const auto& [id, code] : library.entries()) {
+    const Light light = board(code, 3ms, 20.0);
+    for (const Duration hidden : {45ms, 60ms, 80ms, 95ms})
+      EXPECT_GE(named_after(decoder, light, 2s, 2s + hidden, id), 18)
+          << id.value << " after " << hidden.count();
+  }
+}
+
+TEST(IdDecoder, WantsFramesThatAgreeAfterALongAbsence) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, VisionConfig{}, 200.0);
+  for (const auto& [id, code] : library.entries()) {
+    const int named = named_after(decoder, board(code, 3ms, 20.0), 2s, 2400ms, id);
+
+    EXPECT_GE(named, 3) << id.value;
+    EXPECT_LE(named, 12) << id.value;
+  }
+}
+
+TEST(IdDecoder, KeepsTheIdOfABoardOfWhichAFrameInTenIsMissed) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, VisionConfig{}, 200.0);
+  int named = 0;
+  int lit = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    std::mt19937 random(seed);
+    const Light light = board(library.entries()[1 + seed % 3].code, 3ms, 20.0);
+    BlinkEvidence evidence;
+    (void)watch(decoder, light, 1s, {}, 10s, &evidence);
+    const Outcome later = watch(
+        decoder, [&](Duration t) { return light(1s + t) && random() % 10U > 0; }, 2s, {}, 11s,
+        &evidence);
+    named += later.identified_frames;
+    lit += later.lit_frames;
+  }
+  EXPECT_GT(named, 0.9 * lit);
+}
+
 }  // namespace
 }  // namespace crepes
