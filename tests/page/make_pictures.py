@@ -29,6 +29,7 @@ def picture_live(browser, out):
         try:
             page = browser.page(demo_page(log.name), width=1440, height=900)
             page.wait("globalThis.crepes && crepes.scene.robots.length === 3", "three neighbors")
+            page.key("m")  # with the measurements
             time.sleep(20)  # trails and charts fill
             page.picture(out / "view-live.png")
             page.close()

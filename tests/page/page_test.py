@@ -216,6 +216,17 @@ class Replay(PageTest):
         page.key("m")
         page.wait("crepes.scene.time === 12 && crepes.scene.robots[0].measured?.bearing && crepes.scene.robots[0].measured.range", "rays and circles")
 
+    def test_the_cameras_of_the_observer_can_be_shown(self):
+        page = self.open(self.viewer)
+        page.value("crepes.seek(12)")
+        self.assertFalse(page.value("document.getElementById('cameras-label').hidden"))
+        drawn = "(() => { let count = 0; const { scene } = crepes; const line = scene.line; scene.line = (...all) => { ++count; line.apply(scene, all); }; scene.draw(12); scene.line = line; return count; })()"
+        before = page.value(drawn)
+        page.key("c")
+        page.wait("crepes.scene.settings.cameras")
+        # A border of 40 directions and a ray to every fifth.
+        self.assertEqual(page.value(drawn) - before, 40 + 8)
+
     def test_the_outline_of_an_ellipsoid_is_that_of_its_points(self):
         page = self.open(self.viewer)
         # The farthest point of the ellipsoid's surface in any direction of the picture lies on the outline.

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "daemon/ctl/convert/foxglove.hpp"
@@ -25,10 +24,10 @@ struct MessageStream {
 
 /// Of `rows`; `time_s(row)` and `json(time_ns, row)`.
 template <class Row, class Time, class Json>
-MessageStream stream_of(std::string topic, MessageKind kind, const std::vector<Row>& rows,
-                        const Time& time_s, const Json& json) {
-  return {.topic = std::move(topic),
-          .kind = std::move(kind),
+MessageStream stream_of(const std::string& topic, const MessageKind& kind,
+                        const std::vector<Row>& rows, const Time& time_s, const Json& json) {
+  return {.topic = topic,
+          .kind = kind,
           .size = rows.size(),
           .time_s = [&rows, time_s](std::size_t i) { return time_s(rows[i]); },
           .json = [&rows, json](std::size_t i, std::int64_t time_ns) -> Result<std::string> {

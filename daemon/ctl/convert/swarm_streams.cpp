@@ -8,7 +8,7 @@
 namespace crepes {
 namespace {
 
-constexpr double kTruthRate_hz = 50.0;
+constexpr double kTruthRate = 50.0;  // Hz
 
 std::string name_in(const SwarmDataset& dataset, RobotId id) {
   const auto& robots = dataset.manifest.robots;
@@ -82,8 +82,8 @@ std::vector<MessageStream> swarm_streams(const SwarmDataset& dataset) {
 
 std::vector<MessageStream> truth_streams(const SwarmManifest& manifest, const SwarmTruth& truth) {
   std::vector<MessageStream> streams;
-  const auto size = static_cast<std::size_t>(std::floor(manifest.duration_s * kTruthRate_hz)) + 1;
-  const auto time_s = [](std::size_t i) { return static_cast<double>(i) / kTruthRate_hz; };
+  const auto size = static_cast<std::size_t>(std::floor(manifest.duration_s * kTruthRate)) + 1;
+  const auto time_s = [](std::size_t i) { return static_cast<double>(i) / kTruthRate; };
   for (const SwarmRobot& robot : manifest.robots) {
     streams.push_back({.topic = "/tf",
                        .kind = transform_kind(),

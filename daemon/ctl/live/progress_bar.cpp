@@ -18,12 +18,12 @@ std::string rough_time(double seconds) {
 
 std::string ProgressBar::text(double share, Timestamp now) const {
   constexpr std::size_t kCells = 40;
-  constexpr double kFirstGuess_s = 1.0;
+  constexpr double kFirstGuess = 1.0;  // s
   share = std::clamp(share, 0.0, 1.0);
   const auto full = static_cast<std::size_t>(share * static_cast<double>(kCells));
   const std::string bar = std::string(full, '#') + std::string(kCells - full, '.');
   const double elapsed_s = to_seconds(now - start_);
-  const bool is_guessed = elapsed_s >= kFirstGuess_s && share > 0.0;
+  const bool is_guessed = elapsed_s >= kFirstGuess && share > 0.0;
   return fmt::format(
       "[{}] {:3.0f} %{}", bar, std::floor(100.0 * share),
       is_guessed ? ", " + rough_time(elapsed_s * (1.0 - share) / share) + " left" : "");

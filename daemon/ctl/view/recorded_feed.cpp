@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "config/reading/config_file.hpp"
+#include "daemon/ctl/view/field_of_view.hpp"
 #include "daemon/ctl/view/view_json.hpp"
 #include "net/subscription/json_parts.hpp"
 
@@ -90,6 +92,21 @@ std::string truth_rows(double duration_s, const Row& row) {
   return joined(rows);
 }
 
+/// What the cameras of each robot see.
+Result<std::map<std::string, std::string>> cameras_of(const fs::path& swarm,
+                                                      const SwarmManifest& manifest) {
+  std::map<std::string, std::string> cameras;
+  for (const SwarmRobot& robot : manifest.robots) {
+    const auto config = load_config(swarm / robot.dir / "crepesd.yaml");
+    if (!config) return tl::unexpected(config.error());
+    std::vector<std::string> fields;
+    for (const CameraConfig& camera : config->cameras)
+      fields.push_back(field_of_view_json(camera.calibration));
+    cameras[robot.name] = joined(fields);
+  }
+  return cameras;
+}
+
 }  // namespace
 
 Result<RecordedFeed> RecordedFeed::open(const fs::path& results, const fs::path& swarm) {
@@ -115,7 +132,9 @@ Result<RecordedFeed> RecordedFeed::open(const fs::path& results, const fs::path&
   if (!manifest) return tl::unexpected(manifest.error());
   auto truth = SwarmTruth::load(swarm, *manifest);
   if (!truth) return tl::unexpected(truth.error());
-  feed.recording_ = Recording{std::move(*manifest), std::move(*truth)};
+  auto cameras = cameras_of(swarm, *manifest);
+  if (!cameras) return tl::unexpected(cameras.error());
+  feed.recording_ = Recording{std::move(*manifest), std::move(*truth), std::move(*cameras)};
   for (const PairName& pair : feed.pairs_) {
     for (const std::string& name : {pair.observer, pair.neighbor}) {
       if (feed.robot_named(name) != nullptr) continue;
@@ -174,8 +193,9 @@ Result<std::string> RecordedFeed::json_of(const std::string& observer) const {
         R"({{"name":{},"rows":{},"truth":{},"innovations":{},"calibrations":{}}})",
         dump(OrderedJson(name)), rows_of(files.poses, seconds), truth, innovations, calibrations));
   }
-  return fmt::format(R"({{"has_truth":{},"up":{},"neighbors":{}}})", recording_.has_value(), up,
-                     joined(parts));
+  return fmt::format(R"({{"has_truth":{},"up":{},"cameras":{},"neighbors":{}}})",
+                     recording_.has_value(), up,
+                     B != nullptr ? recording_->cameras.at(B->name) : "[]", joined(parts));
 }
 
 }  // namespace crepes

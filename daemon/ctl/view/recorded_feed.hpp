@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,7 +24,8 @@ class RecordedFeed {
   [[nodiscard]] const std::vector<std::string>& observers() const { return observers_; }
 
   /// All that this observer saw, as one JSON object: `has_truth`, `up` (rows of t, x, y, z of the
-  /// vector against gravity in its body; from the truth, empty without it), and `neighbors` with
+  /// vector against gravity in its body; from the truth, empty without it), `cameras` (see
+  /// `field_of_view_json`; from the data set's configuration), and `neighbors` with
   /// `name`, `rows` (see `pose_row`), `truth` (see `truth_row`), and after `replay
   /// --debug-innovations` `innovations` (t, kind, verdict, NIS by degree of freedom) and
   /// `calibrations` (t, then the values of CalibrationRecord). Times are true time if there is
@@ -34,6 +36,7 @@ class RecordedFeed {
   struct Recording {
     SwarmManifest manifest;
     SwarmTruth truth;
+    std::map<std::string, std::string> cameras;  ///< of each robot, as a list of JSON
   };
 
   [[nodiscard]] const SwarmRobot* robot_named(const std::string& name) const;

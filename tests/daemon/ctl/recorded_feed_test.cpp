@@ -52,6 +52,8 @@ TEST_F(RecordedFeedTest, HasThinnedPosesOnTheTruthsTimeAndTheTruth) {
   EXPECT_NEAR(r2["rows"][0][0].get<double>(), 0.0, 1e-3);
   EXPECT_EQ(r2["truth"][0][1], 2.0);
   EXPECT_EQ(json["up"][0], Json({0.0, 0.0, 0.0, 1.0}));
+  ASSERT_EQ(json["cameras"].size(), 1U);
+  EXPECT_EQ(json["cameras"][0]["border"].size(), 40U);
 }
 
 TEST_F(RecordedFeedTest, ShowsPosesWithoutTruth) {

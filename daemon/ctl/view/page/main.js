@@ -79,6 +79,7 @@ async function show(index) {
   setSource(source);
   byId("truth-label").hidden = byId("ghost-legend").hidden = true;
   byId("measurements-label").hidden = false;
+  byId("cameras-label").hidden = true;
   for (const node of document.querySelectorAll("[data-live]")) node.hidden = !source.live;
   byId("speed-label").hidden = source.live;
   redraw();
@@ -92,6 +93,7 @@ async function show(index) {
   const replay = await load(`/replay?robot=${robot}`);
   store.addReplay(replay);
   charts.build();
+  byId("cameras-label").hidden = store.cameras.length === 0;
   byId("measurements-label").hidden = ![...store.neighbors.values()].some(({ innovations }) => innovations?.length);
   byId("truth-label").hidden = byId("ghost-legend").hidden = !store.hasTruth;
   showLink();
@@ -279,6 +281,7 @@ const KEYS = {
   f: () => setView("follow"),
   t: () => setView("top"),
   m: () => byId("measurements").click(),
+  c: () => byId("cameras").click(),
   d: flipTheme,
   "?": () => byId("help-dialog").showModal(),
   " ": () => play(!isPlaying),
@@ -307,6 +310,7 @@ function listenToPage() {
     scene.settings.measurements = checked;
     for (const node of document.querySelectorAll("[data-measured]")) node.hidden = !checked;
   });
+  on("cameras", "change", ({ checked }) => { scene.settings.cameras = checked; });
   on("truth", "change", ({ checked }) => { scene.settings.truth = checked; });
   on("focus", "change", ({ value }) => charts.setFocus(value));
   on("zoom-in", "click", () => charts.zoom(0.6));

@@ -12,13 +12,14 @@ const DASHES = { direct: [], graph: [9, 5], predicted: [2, 4] };
 const MAX_PITCH = 1.57;
 const RAY = 0.42; // of the distance: the rays from both sides do not touch
 const CIRCLE_STEPS = 72;
+const CONE = 1.5; // m; how far fields of view are drawn
 
 export class Scene {
   constructor(canvas, store) {
     this.canvas = canvas;
     this.store = store;
     this.camera = new Camera();
-    this.settings = { sigma: 3, trail: 10, truth: true, measurements: false };
+    this.settings = { sigma: 3, trail: 10, truth: true, measurements: false, cameras: false };
     this.view = "follow";
     this.isFitted = false;
     this.time = NaN; // of the picture
@@ -75,6 +76,7 @@ export class Scene {
     this.drawGrid();
     for (const robot of this.robots) this.drawTrail(robot, t);
     for (const robot of this.robots) this.drawLine(robot);
+    if (this.settings.cameras) for (const camera of this.store.cameras) this.drawFieldOfView(camera);
     if (this.settings.measurements) for (const robot of this.robots) this.drawMeasurements(robot, t);
     for (const ghost of this.ghosts) this.drawGhost(ghost);
     for (const robot of this.robots) this.drawEllipsoid(robot);
@@ -208,6 +210,15 @@ export class Scene {
     const ground = [position[0], position[1], 0];
     this.line(position, ground, this.colors.soft, 1, [1, 3], 0.8);
     if (mode !== "none") this.line([0, 0, 0], position, this.colors[mode], 2, DASHES[mode], 0.9);
+  }
+
+  /** The border of the picture at a distance, and some rays to it from the lens. */
+  drawFieldOfView({ p, border }) {
+    const at = (u, distance) => times(this.level, add(p, scale(distance, u)));
+    border.forEach((u, i) => {
+      this.line(at(u, CONE), at(border[(i + 1) % border.length], CONE), this.colors.soft, 1.5);
+      if (i % 5 === 0) this.line(at(u, 0), at(u, CONE), this.colors.soft, 1, [], 0.5);
+    });
   }
 
   /**

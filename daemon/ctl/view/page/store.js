@@ -41,6 +41,7 @@ export class Store {
   constructor(isLive) {
     this.isLive = isLive;
     this.neighbors = new Map(); // by id (live) or name (replay)
+    this.cameras = []; // of the observer: name, p, border in its body
     this.ups = []; // rows of t, x, y, z
     this.status = {};
     this.events = [];
@@ -70,8 +71,9 @@ export class Store {
     return found;
   }
 
-  addReplay({ has_truth: hasTruth, up, neighbors }) {
+  addReplay({ has_truth: hasTruth, up, cameras, neighbors }) {
     this.hasTruth = hasTruth;
+    this.cameras = cameras.filter(Boolean);
     this.ups = up;
     for (const { name, ...rows } of neighbors) Object.assign(this.neighbor(name, name), rows);
     this.link = { ok: true };
