@@ -31,13 +31,27 @@ void add_view(CommandLine& line);
 void add_watch(CommandLine& line);
 
 /// In the order of --help: running daemons, recordings, setup.
-inline constexpr std::array kCommands{
-    &add_status,    &add_check,    &add_watch,           &add_view,
-    &add_sources,   &add_waitpose, &add_record,          &add_replay,
-    &add_evaluate,  &add_plot,     &add_spots,           &add_demo,
-    &add_devices,   &add_init,     &add_exposure,
-                                      &add_calibrate,       &add_import_calibration,
-    &add_codebook,  &add_led,      &add_setup_witmotion, &add_keygen,
-    &add_completion};
+inline constexpr std::array kCommands{&add_status,
+                                      &add_check,
+                                      &add_watch,
+                                      &add_view,
+                                      &add_sources,
+                                      &add_waitpose,
+                                      &add_record,
+                                      &add_replay,
+                                      &add_evaluate,
+                                      &add_plot,
+                                      &add_spots,
+                                      &add_demo,
+                                      &add_devices,
+                                      &add_init,
+                                      &add_exposure,
+                                      &add_calibrate,
+                                      &add_import_calibration,
+                                      &add_codebook,
+                                      &add_led,
+                                      &add_setup_witmotion,
+                                      &add_keygen,
+                                      &add_completion};
 
 }  // namespace crepes
