@@ -113,9 +113,10 @@ void check_overrides(const ConfigNode& here, const ConfigNode* shared, const std
   for (const ConfigNode& member : here.items) {
     const bool is_known =
         shared != nullptr && std::ranges::count(shared->items, id_of(member), id_of) > 0;
-    if (!is_known)
+    if (!is_known) {
       add_fault(member.place, "swarm.members",
                 fmt::format("{} has no member {}", file, id_of(member)), faults);
+    }
   }
 }
 

@@ -174,6 +174,7 @@ struct HandHeld {
   int boards = 2;
   bool is_chair = false;  ///< turned about the vertical alone
   double noise_px = 0.16;
+  double dark_share = 0.25;    ///< of the sightings
   double moved_m = 0.0;        ///< how far the first board is moved at half time
   bool hides_quarter = false;  ///< nothing falls on the lower left quarter
 };
@@ -268,7 +269,7 @@ inline CameraRecording hand_held(std::uint64_t seed, const HandHeld& hand, const
       if (b == 0 && t > 0.5 * hand.duration_s) board.z() += hand.moved_m;
       const Eigen::Vector3d p_B = q_B_W * (board - path.p_W(t));
       const Eigen::Vector3d p_C = truth.q_C_B * (p_B - truth.p_B_C);
-      const bool is_dark = dice.uniform(0.0, 1.0) < 0.25;
+      const bool is_dark = dice.uniform(0.0, 1.0) < hand.dark_share;
       const Eigen::Vector2d error(dice.normal(hand.noise_px), dice.normal(hand.noise_px));
       if (is_dark || std::acos(p_C.normalized().z()) > kHalfFov) continue;
       const auto m = sphere.project(p_C, nullptr);

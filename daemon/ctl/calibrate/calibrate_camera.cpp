@@ -84,15 +84,18 @@ Result<CalibrationReport> calibrate_camera(const CalibrateCameraOptions& options
                         .noise = recording->config.imu.noise,
                         .on_progress = progress});
   report.reasons = result.refusals;
+  std::optional<KannalaBrandtFit> kb;
+  if (options.kannala_brandt && result.covariance.size() > 0)
+    kb = to_kannala_brandt(result.constants.lens, camera.resolution[0], camera.resolution[1]);
   if (result.refusals.empty()) {
     const auto written =
-        write_text_file(options.out, camchain_text(result.constants, camera.resolution));
+        write_text_file(options.out, camchain_text(result.constants, camera.resolution, kb));
     if (!written) return tl::unexpected(written.error());
   }
   if (options.json) {
-    report.text = camera_json(result, found->boards.size());
+    report.text = camera_json(result, found->boards.size(), kb);
   } else if (result.refusals.empty()) {
-    report.text = camera_text(result, found->boards.size(), options.out);
+    report.text = camera_text(result, found->boards.size(), kb, options.out);
   }
   return report;
 }

@@ -109,9 +109,10 @@ std::string members_text(const RangeCalibration& found) {
   std::string text =
       "# Written by crepesctl calibrate range: copy it to crepesd.d/ on every robot.\n"
       "swarm:\n  members:\n";
-  for (const ModuleBias& module : delays_of(found))
+  for (const ModuleBias& module : delays_of(found)) {
     text += fmt::format("  - {{id: {}, range_delay_m: {}}}\n", module.id.value,
                         fixed(module.bias_m, 4));
+  }
   return text + fmt::format("uwb: {{bias_sigma_m: {}}}\n",
                             fixed(std::max(remaining_bias(found), kLeastBias), 3));
 }

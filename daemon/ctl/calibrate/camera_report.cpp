@@ -42,6 +42,26 @@ std::vector<std::vector<std::string>> lens_rows(const CameraBatchResult& found) 
   return rows;
 }
 
+std::string lens_text(const CameraConstants& constants, const std::optional<KannalaBrandtFit>& kb) {
+  if (!kb) {
+    return fmt::format(
+        "  camera_model: ds\n  intrinsics: {}\n  distortion_model: none\n  distortion_coeffs: []\n",
+        to_yaml(numbers_of(constants.lens)));
+  }
+  return fmt::format(
+      "  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: equidistant\n"
+      "  distortion_coeffs: {}\n",
+      to_yaml(numbers_of(kb->pinhole)), to_yaml(std::vector<double>(kb->k.begin(), kb->k.end())));
+}
+
+std::string conversion_line(const std::optional<KannalaBrandtFit>& kb) {
+  if (!kb) return "";
+  return fmt::format(
+      "converted to Kannala-Brandt: {} px RMS from the Double Sphere over the picture, at most "
+      "{}\n",
+      fixed(kb->rms_px, 3), fixed(kb->max_px, 3));
+}
+
 }  // namespace
 
 std::string map_text(const ResidualMap& map) {
@@ -56,12 +76,11 @@ std::string map_text(const ResidualMap& map) {
   return text;
 }
 
-std::string camchain_text(const CameraConstants& constants, const std::array<int, 2>& resolution) {
+std::string camchain_text(const CameraConstants& constants, const std::array<int, 2>& resolution,
+                          const std::optional<KannalaBrandtFit>& kb) {
   const Pose T_C_B = constants.T_C_B();
   const Eigen::Matrix3d R = T_C_B.R();
-  std::string text = "# Written by crepesctl calibrate camera\ncam0:\n  camera_model: ds\n";
-  text += fmt::format("  intrinsics: {}\n", to_yaml(numbers_of(constants.lens)));
-  text += "  distortion_model: none\n  distortion_coeffs: []\n";
+  std::string text = "# Written by crepesctl calibrate camera\ncam0:\n" + lens_text(constants, kb);
   text += fmt::format("  resolution: {}\n  T_cam_imu:\n", to_yaml(resolution));
   for (int i = 0; i < 3; ++i)
     text += fmt::format("  - {}\n",
@@ -71,6 +90,7 @@ std::string camchain_text(const CameraConstants& constants, const std::array<int
 }
 
 std::string camera_text(const CameraBatchResult& found, std::size_t boards,
+                        const std::optional<KannalaBrandtFit>& kb,
                         const std::filesystem::path& out) {
   const Eigen::Vector3d turn = found.rotation_sigma_rad * kDegPerRad;
   return text_table(lens_rows(found)) +
@@ -80,11 +100,12 @@ std::string camera_text(const CameraBatchResult& found, std::size_t boards,
              fixed(turn.norm(), 4), fixed(found.lens_sigma_px, 3), boards,
              fixed(found.spot_sigma_px, 3), fixed(found.held_out_px, 3),
              fixed(100.0 * found.outliers, 1)) +
-         map_text(found.map) + warning_lines(found.warnings) +
+         conversion_line(kb) + map_text(found.map) + warning_lines(found.warnings) +
          fmt::format("written: {}\n", out.string());
 }
 
-std::string camera_json(const CameraBatchResult& found, std::size_t boards) {
+std::string camera_json(const CameraBatchResult& found, std::size_t boards,
+                        const std::optional<KannalaBrandtFit>& kb) {
   Json json = report_head(found.refusals, found.warnings);
   json["boards"] = boards;
   json["rate_rms_radps"] = numbers_of(found.rate_rms_radps);
@@ -115,6 +136,12 @@ std::string camera_json(const CameraBatchResult& found, std::size_t boards) {
       json["map_rms_px"].push_back(cell.rms_px());
     }
     json["map_columns"] = ResidualMap::kColumns;
+    if (kb) {
+      json["kannala_brandt"] = {{"intrinsics", numbers_of(kb->pinhole)},
+                                {"distortion_coeffs", kb->k},
+                                {"rms_px", kb->rms_px},
+                                {"max_px", kb->max_px}};
+    }
   }
   return json_line(json);
 }

@@ -57,7 +57,11 @@ void add_range(CommandLine& line, CLI::App* calibrate) {
                   "segments: [{from_s, to_s, pairs: [{ids: [1, 2], distance_m: 5.00}]}]; seconds "
                   "after the first row, distances from antenna to antenna")
       ->required();
-  sub->add_option("--out", options.out, "biases of pairs and modules, YAML")->required();
+  sub->add_option("--out", options.out,
+                  "biases of pairs and modules, YAML; a fragment of crepesd.yaml with "
+                  "range_delay_m of every "
+                  "module is written beside it as NAME.members.yaml")
+      ->required();
   add_json_flag(sub, options.json);
   line.run(sub, [&options] { return finish(calibrate_range(options)); });
 }
@@ -74,6 +78,12 @@ void add_camera(CommandLine& line, CLI::App* calibrate) {
                   "the lens's rough field of view [deg]; default: start from the lens in "
                   "crepesd.yaml")
       ->check(CLI::Range(60.0, 220.0));
+  sub->add_option_function<std::string>(
+         "--model",
+         [&options](const std::string& model) { options.kannala_brandt = model == "kb"; },
+         "ds: Double Sphere (default); kb: Kannala-Brandt, Kalibr's pinhole with equidistant "
+         "distortion, converted from it")
+      ->check(CLI::IsMember({"ds", "kb"}));
   add_json_flag(sub, options.json);
   line.run(sub, [&options] { return finish(calibrate_camera_with_progress(options)); });
 }

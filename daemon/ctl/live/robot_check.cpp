@@ -148,9 +148,10 @@ void check_rates(const RobotObservation& seen, Section section) {
     } else if (sensor.name == "imu") {
       check_rate("imu", sensor.rate_hz, seen.config->imu.noise.update_rate, section);
     } else {
-      for (const CameraConfig& camera : seen.config->cameras)
+      for (const CameraConfig& camera : seen.config->cameras) {
         if (camera.calibration.name == sensor.name)
           check_rate(sensor.name, sensor.rate_hz, camera.calibration.rate_hz, section);
+      }
     }
   }
   const std::string dropped = growth_text(seen.before.queues, seen.after.queues);
@@ -319,9 +320,10 @@ void check_mesh(const RobotObservation& seen, Section section) {
     if (more > 0 && name.starts_with("refused"))
       refused += fmt::format("{}{} {}", refused.empty() ? "" : ", ", name, more);
   }
-  if (!refused.empty())
+  if (!refused.empty()) {
     section.doubt(fmt::format("in {} s, {}", fixed(seen.duration_s, 0), refused),
                   "another key, or another version, is on the mesh: see troubleshooting.md");
+  }
 }
 
 /// What an accelerometer at rest measures.
@@ -382,9 +384,10 @@ void check_calibration(const RobotObservation& seen, Section section) {
   for (const std::string& fault : seen.after.faults)
     section.fault("the team says of this robot: " + fault, advice);
   for (const auto& neighbor : seen.after.neighbors) {
-    for (const std::string& fault : neighbor.faults)
+    for (const std::string& fault : neighbor.faults) {
       section.doubt(fmt::format("the team says of {}: {}", name_of_neighbor(neighbor), fault),
                     "there: " + advice);
+    }
   }
 }
 

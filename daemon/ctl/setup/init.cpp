@@ -222,7 +222,7 @@ class Interview {
     for (std::size_t i = 0; i < found_.cameras.size(); ++i)
       question += fmt::format(", {} {}", i + 1, found_.cameras[i].found.description);
     if (found_.cameras.empty()) return;
-    const double most = static_cast<double>(found_.cameras.size());
+    const auto most = static_cast<double>(found_.cameras.size());
     const double chosen = found_.cameras.size() == 1 ? 1.0 : ask_number(question, 1, 0, most);
     if (chosen < 1) return;
     const CameraDevice& device = found_.cameras[static_cast<std::size_t>(chosen) - 1];

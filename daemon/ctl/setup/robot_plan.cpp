@@ -133,9 +133,10 @@ std::string lens_file(const RobotPlan& plan) {
       "  T_cam_imu:\n",
       to_yaml(camera.fov_deg), to_yaml(std::vector<double>(lens.begin(), lens.end())),
       to_yaml(camera.resolution));
-  for (int row = 0; row < 3; ++row)
+  for (int row = 0; row < 3; ++row) {
     text += fmt::format(
         "  - {}\n", to_yaml(std::vector<double>{R(row, 0), R(row, 1), R(row, 2), p[row] + 0.0}));
+  }
   return text + "  - [0.0, 0.0, 0.0, 1.0]\n  timeshift_cam_imu: 0.0\n";
 }
 

@@ -1,0 +1,275 @@
+/// crepesctl calibrate, from the files of a recording to the files of a configuration.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "config/reading/config_file.hpp"
+#include "daemon/ctl/calibrate/calibrate_camera.hpp"
+#include "daemon/ctl/calibrate/calibrate_imu.hpp"
+#include "daemon/ctl/calibrate/calibrate_range.hpp"
+#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "daemon/ctl/setup/init.hpp"
+#include "drivers/dataset/dataset_rows.hpp"
+#include "drivers/dataset/robot_folder.hpp"
+#include "estimator/core/constants.hpp"
+#include "estimator/vision/camera_model.hpp"
+#include "tests/support/calibration_recording.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A configuration as crepesctl init writes it, and a recording made with it.
+class Calibrate : public testing::Test {
+ protected:
+  Calibrate() {
+    InitOptions options;
+    options.dir = etc();
+    options.id = 1;
+    options.robots = 3;
+    options.p_body_led = {0.06, 0.0, 0.01};
+    options.search_devices = false;
+    options.interface = "lo";
+    std::ostringstream nobody;
+    Questions questions(nullptr, nobody);
+    EXPECT_TRUE(init(options, questions));
+  }
+
+  [[nodiscard]] fs::path etc() const { return scratch_.path() / "etc"; }
+  [[nodiscard]] fs::path robot_dir(int id) const {
+    return scratch_.path() / ("r" + std::to_string(id));
+  }
+  [[nodiscard]] Config config() const { return load_config(etc() / "crepesd.yaml").value(); }
+
+  void write_robot(int id, const std::vector<ImuSample>& imu) const {
+    RobotFolder folder(robot_dir(id));
+    Config own = config();
+    own.robot.id = RobotId{static_cast<std::uint16_t>(id)};
+    ASSERT_TRUE(folder.write_config(write_config(own)));
+    std::string rows;
+    for (const ImuSample& sample : imu) append_rows(rows, sample);
+    ASSERT_TRUE(folder.append("imu0", rows));
+  }
+
+  /// Boards 2 and 3 blink their patterns from a phase of their own.
+  void write_spots(const simulated::CameraRecording& recording) const {
+    constexpr double kSlot = 10e-3;
+    const std::vector<MemberConfig> members = config().swarm.members;
+    std::map<Timestamp, SpotFrame> frames;
+    for (const BoardSighting& sighting : recording.sightings) {
+      SpotFrame& frame = frames[sighting.stamp];
+      frame.stamp = sighting.stamp;
+      const std::string& pattern = *members.at(sighting.board + 1).pattern;
+      const double t_s = to_seconds(sighting.stamp.time_since_epoch()) +
+                         0.0037 * static_cast<double>(1 + sighting.board);
+      const auto slot = static_cast<std::size_t>(t_s / kSlot) % pattern.size();
+      if (pattern[slot] == '1')
+        frame.spots.push_back({sighting.uv.x(), sighting.uv.y(), 12.0, 200.0, 1.0});
+    }
+    std::string rows;
+    for (const auto& [stamp, frame] : frames) append_rows(rows, frame);
+    RobotFolder folder(robot_dir(1));
+    ASSERT_TRUE(folder.append("cam0", rows));
+  }
+
+  ScratchDirectory scratch_ = ScratchDirectory::create({}).value();
+};
+
+/// RMS over the field of view of what a direction of the body is seen wrong by.
+double error_px(const CameraCalibration& found, const CameraConstants& truth) {
+  const CameraModel model = CameraModel::from(found).value();
+  CameraCalibration exact = found;
+  exact.camera_model = CameraModelKind::kDoubleSphere;
+  exact.distortion_model = DistortionModel::kNone;
+  exact.distortion_coeffs.clear();
+  exact.intrinsics.assign(truth.lens.begin(), truth.lens.end());
+  const CameraModel true_model = CameraModel::from(exact).value();
+  double sum = 0.0;
+  double count = 0.0;
+  for (double u = 200.0; u < 1100.0; u += 100.0) {
+    for (double v = 100.0; v < 1000.0; v += 100.0) {
+      const auto u_C = true_model.unproject({u, v});
+      if (!u_C) continue;
+      const Eigen::Vector3d u_B = truth.q_C_B.conjugate() * *u_C;
+      const auto seen = model.project(found.T_cam_imu.q * u_B);
+      if (!seen) return 1e3;
+      sum += (*seen - Eigen::Vector2d(u, v)).squaredNorm();
+      count += 1.0;
+    }
+  }
+  return std::sqrt(sum / count);
+}
+
+TEST_F(Calibrate, MakesOfAGuessedCameraACalibratedOneOfKannalaAndBrandt) {
+  const ImuNoise noise;
+  const auto recording = simulated::hand_held(3, {.dark_share = 0.0}, noise);
+  write_robot(1, recording.imu);
+  write_spots(recording);
+  const CameraCalibration guess = config().cameras[0].calibration;
+  ASSERT_FALSE(guess.calibrated);
+  ASSERT_GT(error_px(guess, recording.truth), 20.0);
+
+  const auto report = calibrate_camera({.robot_dir = robot_dir(1),
+                                        .out = etc() / "camchain-imucam.yaml",
+                                        .fov_deg = {},
+                                        .kannala_brandt = true,
+                                        .json = false,
+                                        .on_progress = {}});
+
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_TRUE(report->reasons.empty()) << report->reasons.front();
+  const CameraCalibration found = config().cameras[0].calibration;
+  EXPECT_TRUE(found.calibrated);
+  EXPECT_EQ(found.camera_model, CameraModelKind::kPinhole);
+  EXPECT_LT(error_px(found, recording.truth), 0.5);
+  EXPECT_LT(kDegPerRad * found.T_cam_imu.q.angularDistance(recording.truth.q_C_B), 0.05);
+  EXPECT_NEAR(found.timeshift_cam_imu, recording.truth.shift_s, 1e-4);
+}
+
+TEST_F(Calibrate, WritesNoCameraFromATurnOnASwivelChair) {
+  const ImuNoise noise;
+  const auto recording = simulated::hand_held(3, {.is_chair = true, .dark_share = 0.0}, noise);
+  write_robot(1, recording.imu);
+  write_spots(recording);
+  const fs::path out = scratch_.path() / "camera.yaml";
+
+  const auto report = calibrate_camera({.robot_dir = robot_dir(1),
+                                        .out = out,
+                                        .fov_deg = {},
+                                        .kannala_brandt = false,
+                                        .json = true,
+                                        .on_progress = {}});
+
+  ASSERT_TRUE(report) << report.error().message;
+  ASSERT_FALSE(report->reasons.empty());
+  EXPECT_NE(report->reasons.front().find("hardly turned about x"), std::string::npos);
+  EXPECT_FALSE(fs::exists(out));
+  const auto json = nlohmann::json::parse(report->text);
+  EXPECT_FALSE(json["ok"]);
+  EXPECT_EQ(json["reasons"].size(), report->reasons.size());
+}
+
+TEST_F(Calibrate, WritesWhatTheImuIsOffByAsAFragment) {
+  const ImuNoise noise;
+  const auto recording = simulated::imu_protocol(1, {}, noise);
+  write_robot(1, recording.samples);
+  const fs::path out = scratch_.path() / "imu.yaml";
+
+  const auto report = calibrate_imu({.robot_dir = robot_dir(1), .out = out});
+
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_TRUE(report->reasons.empty()) << report->reasons.front();
+  fs::copy_file(out, etc() / "crepesd.d" / "20-imu.yaml");
+  const ImuDeviceConfig imu = config().imu.device;
+  const Eigen::Matrix3d T_K = imu.accelerometer.misalignment * imu.accelerometer.scale.asDiagonal();
+  EXPECT_LT((imu.accelerometer.bias - recording.errors.accel_bias).norm(), 3e-3);  // m/s^2
+  EXPECT_TRUE((T_K * recording.errors.S_accel).isIdentity(1e-3));
+  EXPECT_TRUE(fs::exists(scratch_.path() / "imu.kalibr.yaml"));
+}
+
+TEST_F(Calibrate, RefusesTooFewAttitudes) {
+  const auto recording = simulated::imu_protocol(1, {.attitudes = 4}, ImuNoise{});
+  write_robot(1, recording.samples);
+  const fs::path out = scratch_.path() / "imu.yaml";
+
+  const auto report = calibrate_imu({.robot_dir = robot_dir(1), .out = out});
+
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_FALSE(report->reasons.empty());
+  EXPECT_FALSE(fs::exists(out));
+}
+
+/// Robots at rest in a triangle of 3, 4 and 5 m, whose modules have antenna delays.
+class CalibrateRange : public Calibrate {
+ protected:
+  void write_swarm(int robots) const {
+    std::ostringstream swarm;
+    swarm << "scenario: rest\nseed: 1\nduration_s: 21\n"
+             "network: {latency_ms: 3.0, jitter_ms: 2.0, loss: 0.0, seed: 7}\nrobots:\n";
+    for (int id = 1; id <= robots; ++id) {
+      swarm << "- {id: " << id << ", name: r" << id << ", dir: r" << id
+            << ", clock: {offset_s: 0.0, skew_ppm: 0.0}}\n";
+      const ImuSample rest{.stamp = Timestamp{},
+                           .gyro_radps = Eigen::Vector3d::Zero(),
+                           .accel_mps2 = {0.0, 0.0, 9.81}};
+      write_robot(id, {rest});
+      RobotFolder folder(robot_dir(id));
+      ASSERT_TRUE(folder.append("uwb0", ranges_of(id, robots)));
+      std::string no_spots;
+      append_rows(no_spots, SpotFrame{.stamp = Timestamp{}, .camera = 0, .spots = {}});
+      ASSERT_TRUE(folder.append("cam0", no_spots));
+    }
+    std::ofstream(scratch_.path() / "swarm.yaml") << swarm.str();
+    std::ofstream tape(scratch_.path() / "tape.yaml");
+    tape << "segments:\n- {from_s: 0, to_s: 20, pairs: [{ids: [1, 2], distance_m: 3.0}";
+    if (robots == 3) tape << ", {ids: [2, 3], distance_m: 4.0}, {ids: [1, 3], distance_m: 5.0}";
+    tape << "]}\n";
+  }
+
+  [[nodiscard]] Result<CalibrationReport> run() const {
+    return calibrate_range({.swarm_dir = scratch_.path(),
+                            .tape = scratch_.path() / "tape.yaml",
+                            .out = etc() / "ranges.yaml"});
+  }
+  /// What the command is for: the fragment where the daemon reads it.
+  [[nodiscard]] Config config_with_fragment() const {
+    fs::copy_file(etc() / "ranges.members.yaml", etc() / "crepesd.d" / "30-ranges.yaml");
+    return config();
+  }
+
+  static constexpr std::array<double, 4> kDelays{0.0, 0.10, 0.25, -0.05};  // by id
+
+ private:
+  [[nodiscard]] static std::string ranges_of(int id, int robots) {
+    simulated::Dice dice(static_cast<std::uint64_t>(id));
+    std::string rows;
+    for (int i = 0; i < 400; ++i) {
+      for (int other = 1; other <= robots; ++other) {
+        if (other == id) continue;
+        const double distance = id + other == 3 ? 3.0 : id + other == 5 ? 4.0 : 5.0;
+        append_rows(rows, UwbRange{.stamp = Timestamp{std::chrono::milliseconds{50 * i}},
+                                   .neighbor = RobotId{static_cast<std::uint16_t>(other)},
+                                   .range_m = distance + kDelays.at(static_cast<std::size_t>(id)) +
+                                              kDelays.at(static_cast<std::size_t>(other)) +
+                                              dice.normal(0.05),
+                                   .first_path_dbm = -81.0,
+                                   .received_dbm = -79.0});
+      }
+    }
+    return rows;
+  }
+};
+
+TEST_F(CalibrateRange, WritesTheAntennaDelayOfEveryModule) {
+  write_swarm(3);
+
+  const auto report = run();
+
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_TRUE(report->reasons.empty()) << report->reasons.front();
+  const Config config = config_with_fragment();
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(config.swarm.members[i].range_delay_m, kDelays.at(i + 1), 0.01) << i;
+  EXPECT_LT(config.uwb.noise.bias_sigma_m, 0.1);
+  EXPECT_EQ(config.swarm.members[1].name, "r2");
+}
+
+TEST_F(CalibrateRange, GivesEachOfTwoRobotsHalfOfTheirBias) {
+  write_swarm(2);
+
+  const auto report = run();
+
+  ASSERT_TRUE(report) << report.error().message;
+  const Config config = config_with_fragment();
+  EXPECT_NEAR(config.swarm.members[0].range_delay_m, 0.175, 0.01);
+  EXPECT_EQ(config.swarm.members[0].range_delay_m, config.swarm.members[1].range_delay_m);
+  EXPECT_EQ(config.swarm.members[2].range_delay_m, 0.0);
+}
+
+}  // namespace
+}  // namespace crepes
