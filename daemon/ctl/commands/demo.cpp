@@ -6,7 +6,8 @@
 namespace crepes {
 namespace {
 
-constexpr double kViewFor_s = 600.0;  ///< with a page, unless --for is given
+constexpr double kViewFor_s = 600.0;      ///< with a page, unless --for is given
+constexpr double kFormationFor_s = 75.0;  ///< of which 60 s are scored
 
 Result<void> run_demo(DemoOptions options, bool json) {
   options.show_table = !json;
@@ -42,7 +43,12 @@ void add_demo(CommandLine& line) {
                   "UDP port of the first robot's subscription; the others follow")
       ->capture_default_str()
       ->check(CLI::Range(1024, 65000));
-  sub->add_option("--keep", options.keep, "directory in which configurations and logs are kept");
+  sub->add_option("--run", options.run,
+                  "a program that steers the robots of --scenario formation; its options name the "
+                  "first daemon's port and that for commands")
+      ->check(CLI::ExistingFile);
+  sub->add_option("--keep", options.keep,
+                  "directory in which configurations, logs and the true paths are kept");
   CLI::Option* view_flag =
       sub->add_flag("--view", view,
                     "serve a page that shows the robots (crepesctl view), and run for ten minutes "
@@ -53,6 +59,8 @@ void add_demo(CommandLine& line) {
   add_json_flag(sub, json, "one object at the end");
   line.run(sub, [&options, &json, &view, &listen, for_s] {
     if (view) options.view = listen;
+    if (for_s->empty() && options.scenario == SimScenario::kFormation)
+      options.for_s = kFormationFor_s;
     if (view && for_s->empty()) options.for_s = kViewFor_s;
     return run_demo(options, json);
   });
