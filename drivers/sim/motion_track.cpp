@@ -5,10 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
+#include <system_error>
 #include <type_traits>
 #include <utility>
 
@@ -20,7 +19,7 @@ namespace {
 static_assert(std::is_trivially_copyable_v<SteeredState>);
 
 Error fault_of(const std::string& name) {
-  return {ErrorCode::kIo, name + ": " + std::strerror(errno)};
+  return {ErrorCode::kIo, name + ": " + std::generic_category().message(errno)};
 }
 
 }  // namespace
@@ -61,7 +60,7 @@ std::optional<SteeredState> MotionTrackReader::at(std::size_t robot, double t_s)
   const std::int64_t last = records() - 1;
   if (last < 0) return std::nullopt;
   // A record's own time, not its index, says where it begins: rounding must not pick the next one.
-  const auto wanted = static_cast<std::int64_t>(std::floor(t_s / kTrackPeriod_s + 1e-9));
+  const auto wanted = static_cast<std::int64_t>(std::floor(t_s / kTrackPeriod + 1e-9));
   const auto record = static_cast<std::size_t>(std::clamp<std::int64_t>(wanted, 0, last));
   SteeredState state;
   const std::size_t at = (record * robots_ + robot) * sizeof state;

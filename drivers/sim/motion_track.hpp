@@ -17,7 +17,7 @@ namespace crepes {
 /// One record for every 20 ms of world time, written before that time begins. Where a record is not
 /// there yet, the last one continues: its command holds. So all processes agree on where a robot
 /// is, also when the writer is late.
-inline constexpr double kTrackPeriod_s = 0.02;
+inline constexpr double kTrackPeriod = 0.02;  // s
 
 /// One writer, which appends.
 class MotionTrackWriter {
@@ -28,7 +28,7 @@ class MotionTrackWriter {
   /// The next record: where each robot is when its time begins, and what it is told.
   [[nodiscard]] Result<void> append(const std::vector<SteeredState>& robots);
   /// World time at which the next record begins.
-  [[nodiscard]] double next_s() const { return kTrackPeriod_s * static_cast<double>(records_); }
+  [[nodiscard]] double next_s() const { return kTrackPeriod * static_cast<double>(records_); }
 
  private:
   MotionTrackWriter(UniqueFd file, std::string name, std::size_t robots)

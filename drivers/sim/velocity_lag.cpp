@@ -7,7 +7,7 @@ namespace crepes {
 // The velocity's error e = v - command decays as  e(t) = P(t) exp(-w t),  P(t) = c0 + c1 t + c2
 // t^2/2.
 double VelocityLag::derivative(double t_s, int order) const {
-  constexpr double w = kRate_radps;
+  const double w = kRate;
   const double t = t_s - begin_s;
   const double c0 = velocity - command;
   const double c1 = acceleration + w * c0;

@@ -7,7 +7,7 @@ namespace crepes {
 /// from the moment of the command on. Position, velocity, acceleration and jerk are continuous
 /// where one command follows another.
 struct VelocityLag {
-  static constexpr double kRate_radps = 6.0;  ///< of each of the lags: half a second in all
+  static constexpr double kRate = 6.0;  ///< of each of the lags [rad/s]: half a second in all
 
   double begin_s = 0.0;                                                   ///< of the command
   double position = 0.0, velocity = 0.0, acceleration = 0.0, jerk = 0.0;  ///< at `begin_s`

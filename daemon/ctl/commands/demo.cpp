@@ -6,8 +6,8 @@
 namespace crepes {
 namespace {
 
-constexpr double kViewFor_s = 600.0;      ///< with a page, unless --for is given
-constexpr double kFormationFor_s = 75.0;  ///< of which 60 s are scored
+constexpr double kViewFor = 600.0;      ///< s, with a page, unless --for is given
+constexpr double kFormationFor = 75.0;  ///< s, of which 60 are scored
 
 Result<void> run_demo(DemoOptions options, bool json) {
   options.show_table = !json;
@@ -60,8 +60,8 @@ void add_demo(CommandLine& line) {
   line.run(sub, [&options, &json, &view, &listen, for_s] {
     if (view) options.view = listen;
     if (for_s->empty() && options.scenario == SimScenario::kFormation)
-      options.for_s = kFormationFor_s;
-    if (view && for_s->empty()) options.for_s = kViewFor_s;
+      options.for_s = kFormationFor;
+    if (view && for_s->empty()) options.for_s = kViewFor;
     return run_demo(options, json);
   });
 }

@@ -152,7 +152,7 @@ class Demo {
       const fs::path file = dir / "truth" / (name_of_robot(id) + ".csv");
       std::ofstream out(file);
       out << "# t, p_W (3), q_WB (4), v_W (3)\n";
-      for (double t_s = 0.0; t_s < end_s_; t_s += kTrackPeriod_s)
+      for (double t_s = 0.0; t_s < end_s_; t_s += kTrackPeriod)
         out << truth_row(world_.state(id, t_s), t_s);
       out.close();
       if (!out) return fail(ErrorCode::kIo, file.string() + ": cannot be written");

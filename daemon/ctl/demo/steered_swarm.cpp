@@ -12,11 +12,11 @@
 namespace crepes {
 namespace {
 
-constexpr double kHorizon_s = 0.1;     ///< daemons must have a motion before its time
-constexpr double kMinNotice_s = 0.02;  ///< a command does not act sooner after its record
-constexpr double kCommandExpiry_s = 0.5;
-constexpr double kMaxSpeed_mps = 1.0;
-constexpr double kMaxTurnRate_radps = 1.0;
+constexpr double kHorizon = 0.1;        ///< s; daemons must have a motion before its time
+constexpr double kMinNotice = 0.02;     ///< s; a command does not act sooner after its record
+constexpr double kCommandExpiry = 0.5;  // s
+constexpr double kMaxSpeed = 1.0;       // m/s
+constexpr double kMaxTurnRate = 1.0;    // rad/s
 
 SteeredState continued(const SteeredState& s, double t_s, const Eigen::Vector3d& v_W_B,
                        double turn_rate_radps) {
@@ -27,7 +27,7 @@ SteeredState continued(const SteeredState& s, double t_s, const Eigen::Vector3d&
 }
 
 Eigen::Vector3d limited(const Eigen::Vector3d& v) {
-  return v.norm() > kMaxSpeed_mps ? Eigen::Vector3d(kMaxSpeed_mps * v.normalized()) : v;
+  return v.norm() > kMaxSpeed ? Eigen::Vector3d(kMaxSpeed * v.normalized()) : v;
 }
 
 }  // namespace
@@ -86,20 +86,19 @@ Result<void> SteeredSwarm::receive(double world_s) {
 
 /// Level body axes at the moment at which the command begins to act.
 SteeredState SteeredSwarm::next_state(RobotId id, const Steered& robot, double begin_s) const {
-  const bool is_expired = begin_s - robot.commanded_s > kCommandExpiry_s + kHorizon_s;
+  const bool is_expired = begin_s - robot.commanded_s > kCommandExpiry + kHorizon;
   if (is_expired) return continued(robot.state, begin_s, Eigen::Vector3d::Zero(), 0.0);
   const Eigen::Matrix3d R_W_B = world_.T_W_B(id, begin_s).q.toRotationMatrix();
   const Eigen::AngleAxisd R_W_L(std::atan2(R_W_B(1, 0), R_W_B(0, 0)), Eigen::Vector3d::UnitZ());
-  return continued(
-      robot.state, begin_s, R_W_L * limited(robot.command.v_L_B),
-      std::clamp(robot.command.turn_rate_radps, -kMaxTurnRate_radps, kMaxTurnRate_radps));
+  return continued(robot.state, begin_s, R_W_L * limited(robot.command.v_L_B),
+                   std::clamp(robot.command.turn_rate_radps, -kMaxTurnRate, kMaxTurnRate));
 }
 
 Result<void> SteeredSwarm::run_until(double world_s) {
   if (auto done = receive(world_s); !done) return done;
-  while (track_.next_s() <= world_s + kHorizon_s) {
+  while (track_.next_s() <= world_s + kHorizon) {
     const double begin_s = track_.next_s();
-    const bool is_late = begin_s < world_s + kMinNotice_s;
+    const bool is_late = begin_s < world_s + kMinNotice;
     if (is_late) ++late_;
     std::vector<SteeredState> record;
     for (auto& [id, robot] : robots_) {
