@@ -24,6 +24,7 @@ Result<SimSerial> open_sim_imu(const SimWorld& world, const Config& config) {
   const RobotId self = config.robot.id;
   if (!world.contains(self))
     return fail(ErrorCode::kConfig, fmt::format("sim.scenario has no robot {}", self.value));
+  if (!world.fault().empty()) return fail(ErrorCode::kConfig, "sim.track: " + world.fault());
   SimImu imu(world, self, config.imu.noise);
   return SimSerial::open([imu](double t_s) mutable { return imu.sample(t_s); },
                          config.imu.noise.update_rate);

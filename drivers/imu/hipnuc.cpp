@@ -1,6 +1,7 @@
 #include "drivers/imu/hipnuc.hpp"
 
 #include <chrono>
+#include <cstdint>
 
 #include "drivers/serial/byte_fields.hpp"
 #include "estimator/core/constants.hpp"
@@ -11,6 +12,10 @@ namespace {
 constexpr std::size_t kPayload = 6;
 constexpr std::size_t kHi91Length = 76;
 constexpr std::uint8_t kHi91 = 0x91;
+constexpr std::size_t kHi81NeededLength = 24;  // what follows differs between firmwares
+constexpr std::uint8_t kHi81 = 0x81;
+constexpr double kHi81GyroStep = 1e-3;            // rad/s
+constexpr double kHi81AccelStep = 10.0 / 2048.0;  // m/s^2
 
 /// CRC-16 with polynomial 0x1021, most significant bit first, initial value 0.
 std::uint16_t crc_of(Bytes bytes, std::uint16_t crc) {
@@ -22,6 +27,21 @@ std::uint16_t crc_of(Bytes bytes, std::uint16_t crc) {
     }
   }
   return crc;
+}
+
+ImuReading read_hi91(Bytes payload) {
+  return {.verdict = ImuVerdict::kSample,
+          .gyro_radps = vector_at<float>(payload, 24) * kRadPerDeg,
+          .accel_mps2 = vector_at<float>(payload, 12) * kGravityMps2,
+          .time = DeviceTime::ticks(unsigned_at(payload, 8, 4), std::chrono::milliseconds{1}, 32)};
+}
+
+/// Its only clock is that of GNSS, which may have no reception.
+ImuReading read_hi81(Bytes payload) {
+  return {.verdict = ImuVerdict::kSample,
+          .gyro_radps = vector_at<std::int16_t>(payload, 12) * kHi81GyroStep,
+          .accel_mps2 = vector_at<std::int16_t>(payload, 18) * kHi81AccelStep,
+          .time = {}};
 }
 
 }  // namespace
@@ -41,12 +61,10 @@ FrameCheck Hipnuc::examine(Bytes bytes) {
 }
 
 ImuReading Hipnuc::read(Bytes frame) {
-  if (frame.size() != kPayload + kHi91Length || frame[kPayload] != kHi91) return {};
-  return {.verdict = ImuVerdict::kSample,
-          .gyro_radps = vector_at<float>(frame, kPayload + 24) * kRadPerDeg,
-          .accel_mps2 = vector_at<float>(frame, kPayload + 12) * kGravityMps2,
-          .time = DeviceTime::ticks(unsigned_at(frame, kPayload + 8, 4),
-                                    std::chrono::milliseconds{1}, 32)};
+  const Bytes payload = frame.subspan(kPayload);
+  if (payload[0] == kHi91 && payload.size() == kHi91Length) return read_hi91(payload);
+  if (payload[0] == kHi81 && payload.size() >= kHi81NeededLength) return read_hi81(payload);
+  return {};
 }
 
 }  // namespace crepes

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "drivers/sim/velocity_lag.hpp"
 #include "estimator/core/pose.hpp"
 
 namespace crepes {
@@ -51,7 +52,9 @@ struct Motion {
   Wave x, y, z;           ///< origin of the body in the world [m]
   Wave yaw, pitch, roll;  ///< Z-Y-X Euler angles [rad]; kThrust uses yaw only
 
-  [[nodiscard]] BodyState at(double t_s) const;
+  [[nodiscard]] BodyState at(double t_s) const { return at(t_s, {}); }
+  /// Of a robot that is steered away from this motion.
+  [[nodiscard]] BodyState at(double t_s, const SteeredState& steered) const;
 };
 
 }  // namespace crepes

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 
 #include "estimator/core/settings_schema.hpp"
 
@@ -16,6 +17,7 @@ enum class SimScenario : std::uint8_t {
   kOccluded,
   kLine,
   kStatic,
+  kFormation,
 };
 inline constexpr std::array kSimScenarios{Choice{"two", SimScenario::kTwo},
                                           Choice{"four", SimScenario::kFour},
@@ -23,7 +25,8 @@ inline constexpr std::array kSimScenarios{Choice{"two", SimScenario::kTwo},
                                           Choice{"aggressive", SimScenario::kAggressive},
                                           Choice{"occluded", SimScenario::kOccluded},
                                           Choice{"line", SimScenario::kLine},
-                                          Choice{"static", SimScenario::kStatic}};
+                                          Choice{"static", SimScenario::kStatic},
+                                          Choice{"formation", SimScenario::kFormation}};
 
 /// A simulated world instead of devices.
 struct SimConfig {
@@ -33,6 +36,7 @@ struct SimConfig {
   double epoch_s = 0.0;
   double clock_offset_s = 0.0;
   double clock_skew_ppm = 0.0;
+  std::string track;
 
   [[nodiscard]] bool operator==(const SimConfig&) const = default;
 
@@ -48,6 +52,9 @@ struct SimConfig {
             "this robot's clock minus world time");
     v.field("clock_skew_ppm", clock_skew_ppm, Bounds{-200, 200},
             "rate error of this robot's clock");
+    v.field(
+        "track", track,
+        "file with the motions of steered robots, which crepesctl demo writes; empty: they hover");
   }
 };
 

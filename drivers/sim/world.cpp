@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <numbers>
+#include <utility>
 
 #include "drivers/sim/seeded_noise.hpp"
 #include "estimator/core/constants.hpp"
@@ -103,6 +105,19 @@ Motion resting(WaveSource waves, double x, double y, double z, double yaw) {
           .roll = askew(0.0)};
 }
 
+/// A multirotor in a light wind, which is told where to fly; it begins near a place.
+Motion steered(WaveSource waves, double x, double y, double spread, double yaw) {
+  const double near_x = waves.within(x, spread);
+  const double near_y = waves.within(y, spread);
+  return {.rule = AttitudeRule::kThrust,
+          .x = waves.wander(near_x, 0.08, 0.1),
+          .y = waves.wander(near_y, 0.08, 0.1),
+          .z = waves.wander(waves.within(1.4, 0.1), 0.05, 0.1),
+          .yaw = waves.wander(yaw, 3.0 * kRadPerDeg, 0.1),
+          .pitch = {},
+          .roll = {}};
+}
+
 /// 5 m to 27.5 m along x and back within a minute.
 Wave excursion() { return {.offset = 16.25, .sines = {{11.25, 2.0 * kPi / 60.0, -kPi / 2.0}}}; }
 
@@ -143,6 +158,19 @@ std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
       }
       return motions;
     }
+    case SimScenario::kFormation: {
+      // A triangle with the pillar inside, near the first one, who is to lead it around. All face
+      // its center; the others begin beside their places.
+      std::map<RobotId, Motion> motions;
+      for (std::uint16_t id = 1; id <= 3; ++id) {
+        const double bearing = kPi - 2.0 * kPi / 3.0 * (id - 1);
+        const double radius = kFormationSide / std::sqrt(3.0);
+        motions.emplace(RobotId{id},
+                        steered(waves(id), 1.4 + radius * std::cos(bearing),
+                                radius * std::sin(bearing), id == 1 ? 0.0 : 0.4, bearing + kPi));
+      }
+      return motions;
+    }
     case SimScenario::kStatic:
       return {{RobotId{1}, resting(waves(1), 0.0, 0.0, 1.2, 0.0)},
               {RobotId{2}, resting(waves(2), 5.0, 0.4, 1.0, kPi)}};
@@ -153,6 +181,7 @@ std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
 std::vector<Pillar> pillars_of(SimScenario scenario) {
   // Adjacent robots on the circle always see past the pillar, the others only at times.
   if (scenario == SimScenario::kOccluded) return {{.radius_m = 1.0}};
+  if (scenario == SimScenario::kFormation) return {{.radius_m = 0.25}};
   // Opposite the second and the third: each robot sees only the next one in the line.
   if (scenario == SimScenario::kLine) {
     return {{.center_W = {kLineStep, -kLineSide}, .radius_m = 1.3},
@@ -166,7 +195,15 @@ std::vector<Pillar> pillars_of(SimScenario scenario) {
 SimWorld::SimWorld(const SimConfig& config)
     : seed_(config.seed),
       motions_(motions_of(config.scenario, config.seed)),
-      pillars_(pillars_of(config.scenario)) {}
+      pillars_(pillars_of(config.scenario)) {
+  if (config.track.empty()) return;
+  Result<MotionTrackReader> track = MotionTrackReader::open(config.track, motions_.size());
+  if (track) {
+    track_ = std::make_shared<const MotionTrackReader>(std::move(*track));
+  } else {
+    fault_ = track.error().message;
+  }
+}
 
 std::vector<RobotId> SimWorld::robots() const {
   std::vector<RobotId> ids;
@@ -177,7 +214,9 @@ std::vector<RobotId> SimWorld::robots() const {
 BodyState SimWorld::state(RobotId robot, double t_s) const {
   const auto it = motions_.find(robot);
   CREPES_EXPECT(it != motions_.end(), "the robot is part of the scenario");
-  return it->second.at(t_s);
+  if (track_ == nullptr) return it->second.at(t_s);
+  const auto index = static_cast<std::size_t>(std::distance(motions_.begin(), it));
+  return it->second.at(t_s, track_->at(index, t_s).value_or(SteeredState{}));
 }
 
 bool SimWorld::has_rotors(RobotId robot) const {

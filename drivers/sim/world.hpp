@@ -3,9 +3,12 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "drivers/sim/motion.hpp"
+#include "drivers/sim/motion_track.hpp"
 #include "drivers/sim/sim_config.hpp"
 #include "estimator/core/measurements.hpp"
 
@@ -17,15 +20,20 @@ struct Pillar {
   double radius_m = 0.0;
 };
 
+/// Of the triangle in which the robots of `kFormation` begin, more or less [m].
+inline constexpr double kFormationSide = 4.0;
+
 /// The robots of a scenario, ids 1..n, in a z-up world W. Immutable: threads may share it.
 class SimWorld {
  public:
-  /// Uses `scenario` and `seed` only.
+  /// Uses `scenario`, `seed` and `track` only.
   explicit SimWorld(const SimConfig& config);
 
   [[nodiscard]] std::vector<RobotId> robots() const;
   [[nodiscard]] bool contains(RobotId robot) const { return motions_.contains(robot); }
   [[nodiscard]] int seed() const { return seed_; }
+  /// Why the track cannot be read; empty if it can, or there is none.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
 
   /// Truth at world time `t_s`; the robot must exist.
   [[nodiscard]] BodyState state(RobotId robot, double t_s) const;
@@ -43,6 +51,8 @@ class SimWorld {
   int seed_;
   std::map<RobotId, Motion> motions_;
   std::vector<Pillar> pillars_;
+  std::shared_ptr<const MotionTrackReader> track_;  ///< copies of a world read the same
+  std::string fault_;
 };
 
 }  // namespace crepes

@@ -21,6 +21,11 @@ Time now() { return std::chrono::steady_clock::now(); }
 
 std::string text_of_error(int number) { return std::generic_category().message(number); }
 
+/// The sockets' interface knows addresses of one type for all families.
+sockaddr* any_family(sockaddr_in6& address) {
+  return static_cast<sockaddr*>(static_cast<void*>(&address));
+}
+
 socklen_t size_of(const sockaddr_in6& address) {
   return address.sin6_family == AF_INET ? sizeof(sockaddr_in) : sizeof(sockaddr_in6);
 }
@@ -106,7 +111,7 @@ void Connection::close() {
 /// What cannot be sent is asked for again, like what gets lost.
 void Connection::send(const std::string& datagram) {
   const auto sent = ::sendto(socket_, datagram.data(), datagram.size(), MSG_NOSIGNAL,
-                             reinterpret_cast<const sockaddr*>(&daemon_), size_of(daemon_));
+                             any_family(daemon_), size_of(daemon_));
   send_errno_ = sent < 0 ? errno : 0;
 }
 
@@ -119,8 +124,7 @@ std::optional<std::string> Connection::read() {
   std::array<char, 2048> bytes{};
   sockaddr_in6 from{};
   socklen_t size = sizeof from;
-  const auto received =
-      ::recvfrom(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
+  const auto received = ::recvfrom(socket_, bytes.data(), bytes.size(), 0, any_family(from), &size);
   if (received < 0) return std::nullopt;
   if (!is_same(from, daemon_)) return std::string();
   return std::string(bytes.data(), static_cast<std::size_t>(received));

@@ -69,8 +69,18 @@ TEST(ImuReading, HoldsTheSensorsOwnTime) {
   expect_time(Mavlink::read(scaled.bytes), ticks(scaled, "time_ms"), 1ms);
 }
 
+TEST(Hipnuc, ReadsThePacketOfSensorsWithGnss) {
+  const RecordedFrame file = recorded_file("imu/hipnuc_hi81_built");
+
+  ASSERT_EQ(Hipnuc::examine(file.bytes).length, file.bytes.size());
+  const ImuReading reading = Hipnuc::read(file.bytes);
+  expect_sample(reading, vector_of(file.decoded["gyro_rads"]), vector_of(file.decoded["acc_mps2"]));
+  EXPECT_FALSE(reading.time);
+}
+
 TEST(Hipnuc, RefusesEveryTruncationSplitAndBitError) {
   expect_refuses_damage<HipnucParser>(recorded_file("imu/hipnuc_hi91_official").bytes);
+  expect_refuses_damage<HipnucParser>(recorded_file("imu/hipnuc_hi81_built").bytes);
 }
 
 TEST(Xsens, ReadsTheRecordedMessage) {

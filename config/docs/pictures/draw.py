@@ -3,6 +3,7 @@
 
     draw.py paths RESULTS SWARM_DIR OUT.svg     the robots' true paths, and where each saw the other
     draw.py screen TEXT_FILE OUT.svg            a terminal's text
+    draw.py formation KEPT OUT.svg              a triangle of robots, from `crepesctl demo --keep KEPT`
 """
 import bisect
 import csv
@@ -111,6 +112,32 @@ def paths(results, swarm, out):
     write(out, round(width), round(height), parts, "system-ui, sans-serif")
 
 
+def formation(kept, out, from_s=10.0, to_s=70.0):
+    """The paths from above; every ten seconds the triangle."""
+    truth = {robot: Truth(pathlib.Path(kept) / "truth" / f"r{robot}.csv") for robot in (1, 2, 3)}
+    scale, width, height = 58, 760, 560
+
+    def at(robot, t):
+        p, _ = truth[robot].at(t)
+        return width / 2 + scale * p[0], height / 2 - scale * p[1]
+
+    steps = [from_s + 0.1 * i for i in range(int(10 * (to_s - from_s)))]
+    parts = [f'<circle cx="{width / 2}" cy="{height / 2}" r="{0.25 * scale}" fill="#666"/>']
+    for t in range(int(from_s) + 10, int(to_s), 10):
+        corners = [at(robot, t) for robot in (1, 2, 3)]
+        parts.append(polyline([*corners, corners[0]], "#b8c2cf", 1))
+    for robot, color in zip(truth, ["#c0392b", "#1f4e9c", "#2c8a57"]):
+        parts.append(polyline([at(robot, t) for t in steps], color, 2))
+        x, y = at(robot, to_s)
+        parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5" fill="{color}"/>')
+        parts.append(text(x, y - 14, "r1 leads" if robot == 1 else f"r{robot} follows", color, "middle"))
+    parts.append(text(width / 2, height / 2 + 4, "pillar", "#fff", "middle", 10))
+    parts.append(polyline([(20, height - 20), (20 + scale, height - 20)], "#222", 2))
+    parts.append(text(20, height - 28, "1 m"))
+    parts.append(text(width - 20, height - 20, "true paths over 60 s, simulated; thin: the triangle every 10 s", "#222", "end"))
+    write(out, width, height, parts, "sans-serif")
+
+
 def screen(source, out):
     lines = []
     for line in pathlib.Path(source).read_text(encoding="utf-8").rstrip("\n").split("\n"):
@@ -133,4 +160,4 @@ def write(out, width, height, parts, font):
     pathlib.Path(out).write_text(svg, encoding="utf-8")
 
 
-{"paths": paths, "screen": screen}[sys.argv[1]](*sys.argv[2:])
+{"paths": paths, "screen": screen, "formation": formation}[sys.argv[1]](*sys.argv[2:])

@@ -24,5 +24,8 @@ sleep 15
 "$tool" status --port 47581 >"$scratch/status"
 wait "$demo"
 "$here/draw.py" screen "$scratch/status" "$here/status.svg"
+PYTHONPATH=config/examples/clients/python "$tool" demo --scenario formation --port 47591 --keep "$scratch/formation" \
+  --run config/examples/clients/python/examples/formation.py >/dev/null
+"$here/draw.py" formation "$scratch/formation" "$here/formation.svg"
 CREPES_TOOL=$tool "$source/tests/page/make_pictures.py" "$here"
 ls -l "$here"/*.svg "$here"/*.png

@@ -6,7 +6,8 @@
 namespace crepes {
 namespace {
 
-constexpr double kViewFor_s = 600.0;  ///< with a page, unless --for is given
+constexpr double kViewFor = 600.0;      ///< s, with a page, unless --for is given
+constexpr double kFormationFor = 75.0;  ///< s, of which 60 are scored
 
 /// A live table, or a bar where standard output is for one object.
 Result<DemoSummary> demo_with_progress(DemoOptions options, bool json) {
@@ -48,7 +49,12 @@ void add_demo(CommandLine& line) {
                   "UDP port of the first robot's subscription; the others follow")
       ->capture_default_str()
       ->check(CLI::Range(1024, 65000));
-  sub->add_option("--keep", options.keep, "directory in which configurations and logs are kept");
+  sub->add_option("--run", options.run,
+                  "a program that steers the robots of --scenario formation; its options name the "
+                  "first daemon's port and that for commands")
+      ->check(CLI::ExistingFile);
+  sub->add_option("--keep", options.keep,
+                  "directory in which configurations, logs and the true paths are kept");
   CLI::Option* view_flag =
       sub->add_flag("--view", view,
                     "serve a page that shows the robots (crepesctl view), and run for ten minutes "
@@ -59,7 +65,9 @@ void add_demo(CommandLine& line) {
   add_json_flag(sub, json, "one object at the end");
   line.run(sub, [&options, &json, &view, &listen, for_s] {
     if (view) options.view = listen;
-    if (view && for_s->empty()) options.for_s = kViewFor_s;
+    if (for_s->empty() && options.scenario == SimScenario::kFormation)
+      options.for_s = kFormationFor;
+    if (view && for_s->empty()) options.for_s = kViewFor;
     return run_demo(options, json);
   });
 }

@@ -17,6 +17,7 @@
 #include "daemon/ctl/demo/demo_screen.hpp"
 #include "daemon/ctl/demo/demo_swarm.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
+#include "daemon/ctl/demo/steered_swarm.hpp"
 #include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
 #include "daemon/ctl/live/neighbor_view.hpp"
@@ -33,7 +34,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
-constexpr double kInFlight = 0.1;  // s; the last poses have not arrived when the time is over
+constexpr int kCommandPortOffset = 3;  ///< of the port for velocity commands: after three daemons
+constexpr double kInFlight = 0.1;      // s; the last poses have not arrived when the time is over
 
 /// One robot, and the connection to its daemon.
 struct RunningRobot {
@@ -60,6 +62,13 @@ std::string tail_of(const fs::path& log) {
   return text.substr(std::min(text.find('\n') + 1, text.size()));
 }
 
+std::string truth_row(const BodyState& state, double t_s) {
+  const auto& [p, q] = state.T_W_B;
+  const Eigen::Vector3d& v = state.v_W_B;
+  return fmt::format("{:.3f},{},{},{},{},{},{},{},{},{},{}\n", t_s, p.x(), p.y(), p.z(), q.w(),
+                     q.x(), q.y(), q.z(), v.x(), v.y(), v.z());
+}
+
 /// Checks that the subscription ports are free, and finds a free port for the mesh.
 Result<std::uint16_t> free_mesh_port(std::uint16_t first, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
@@ -72,10 +81,24 @@ Result<std::uint16_t> free_mesh_port(std::uint16_t first, std::size_t count) {
   });
 }
 
+SimConfig sim_config(const DemoOptions& options, const fs::path& dir) {
+  SimConfig sim;
+  sim.enabled = true;
+  sim.scenario = options.scenario;
+  sim.seed = options.seed;
+  if (options.scenario == SimScenario::kFormation) sim.track = (dir / "motions").string();
+  return sim;
+}
+
 class Demo {
  public:
-  explicit Demo(const DemoOptions& options)
-      : options_(options), world_(sim_config(options)), start_(clock_.now()) {}
+  /// With robots that are steered if the world has a track, which must exist.
+  Demo(const DemoOptions& options, const SimConfig& sim, std::optional<SteeredSwarm> steered)
+      : options_(options),
+        sim_(sim),
+        steered_(std::move(steered)),
+        world_(sim),
+        start_(clock_.now()) {}
 
   Result<void> start(const fs::path& dir) {
     const std::vector<RobotId> ids = world_.robots();
@@ -85,10 +108,10 @@ class Demo {
     const fs::path tool = fs::read_symlink("/proc/self/exe", status);
     const fs::path daemon = tool.parent_path() / "crepesd";
     start_ = clock_.now();
-    for (DemoRobot& robot :
-         demo_swarm(sim_config(options_), ids, epoch_s(), options_.port, *mesh_port)) {
+    for (DemoRobot& robot : demo_swarm(sim_, ids, epoch_s(), options_.port, *mesh_port)) {
       if (auto done = start_robot(dir, daemon, std::move(robot)); !done) return done;
     }
+    if (auto done = start_program(dir); !done) return done;
     return options_.view.empty() ? Result<void>() : start_page(tool, dir);
   }
 
@@ -103,6 +126,9 @@ class Demo {
     Timestamp redraw = start_;
     while (world_s() < options_.for_s && !stop.requested() && !table_.should_quit()) {
       if (auto alive = check_daemons(); !alive) return alive;
+      if (steered_) {
+        if (auto done = steered_->run_until(world_s()); !done) return done;
+      }
       listen();
       for (auto key = next_key(keys); key; key = next_key(keys)) {
         table_.handle_key(*key);
@@ -118,9 +144,26 @@ class Demo {
 
   void stop() {
     end_s_ = world_s();
+    program_.reset();
     for (const ChildProcess& daemon : daemons_) daemon.terminate();
     daemons_.clear();
     page_.reset();
+  }
+
+  /// DIR/truth/<robot>.csv, as in data sets.
+  [[nodiscard]] Result<void> write_truth(const fs::path& dir) const {
+    std::error_code status;
+    fs::create_directories(dir / "truth", status);
+    for (const RobotId id : world_.robots()) {
+      const fs::path file = dir / "truth" / (name_of_robot(id) + ".csv");
+      std::ofstream out(file);
+      out << "# t, p_W (3), q_WB (4), v_W (3)\n";
+      for (double t_s = 0.0; t_s < end_s_; t_s += kTrackPeriod)
+        out << truth_row(world_.state(id, t_s), t_s);
+      out.close();
+      if (!out) return fail(ErrorCode::kIo, file.string() + ": cannot be written");
+    }
+    return {};
   }
 
   /// Scores the whole run of each pair.
@@ -130,6 +173,7 @@ class Demo {
                         .from_s = scored_from_s(),
                         .to_s = end_s_,
                         .pairs = {}};
+    if (steered_) summary.formation = score_formation(world_, scored_from_s(), end_s_ - kInFlight);
     for (const Pair& pair : pairs_) {
       summary.pairs.push_back({.observer = robots_.at(pair.observer).robot.config.robot.id,
                                .neighbor = pair.neighbor,
@@ -140,19 +184,13 @@ class Demo {
   }
 
  private:
-  static SimConfig sim_config(const DemoOptions& options) {
-    SimConfig sim;
-    sim.enabled = true;
-    sim.scenario = options.scenario;
-    sim.seed = options.seed;
-    return sim;
-  }
-
   [[nodiscard]] double epoch_s() const { return to_seconds(start_.time_since_epoch()); }
   [[nodiscard]] double world_s() const { return to_seconds(clock_.now() - start_); }
 
   /// The start is reported separately, as the time to the first pose.
-  [[nodiscard]] double scored_from_s() const { return std::min(5.0, end_s_ / 2.0); }
+  [[nodiscard]] double scored_from_s() const {
+    return std::min(steered_ ? 15.0 : 5.0, end_s_ / 2.0);
+  }
 
   [[nodiscard]] std::string name_of(const Pair& pair) const {
     return fmt::format("{}->{}", name_of_robot(robots_.at(pair.observer).robot.config.robot.id),
@@ -192,6 +230,18 @@ class Demo {
     return {};
   }
 
+  Result<void> start_program(const fs::path& dir) {
+    if (options_.run.empty()) return {};
+    std::vector<std::string> arguments{"--port", std::to_string(options_.port)};
+    if (steered_)
+      arguments.insert(arguments.end(), {"--commands", std::to_string(steered_->port())});
+    program_log_ = dir / "program.log";
+    auto program = ChildProcess::start(fs::absolute(options_.run), arguments, program_log_);
+    if (!program) return tl::unexpected(program.error());
+    program_.emplace(std::move(*program));
+    return {};
+  }
+
   Result<void> start_page(const fs::path& tool, const fs::path& dir) {
     return DemoPage::start(tool, dir, options_.view, options_.port, robots_.size())
         .map([this](DemoPage&& page) { page_.emplace(std::move(page)); });
@@ -205,6 +255,10 @@ class Demo {
       return fail(ErrorCode::kIo, fmt::format("crepesd of {} ended: {}\n{}",
                                               name_of_robot(robot.robot.config.robot.id),
                                               *exit_reason, tail_of(robot.log)));
+    }
+    if (program_ && program_->exit_reason()) {
+      return fail(ErrorCode::kIo, fmt::format("{} ended: {}\n{}", options_.run.string(),
+                                              *program_->exit_reason(), tail_of(program_log_)));
     }
     return page_ ? page_->check() : Result<void>();
   }
@@ -243,6 +297,18 @@ class Demo {
     return keys ? keys->next() : std::nullopt;
   }
 
+  /// What the steered robots hear; empty without any.
+  [[nodiscard]] std::string steering() const {
+    if (!steered_) return "";
+    const double now_s = world_s();
+    const FormationScore score = score_formation(world_, std::max(0.0, now_s - 5.0), now_s);
+    return fmt::format(
+        "formation: {} m RMS over the last seconds\n"
+        "commands to UDP port {}: {} received, {} refused, {} motions late\n",
+        fixed(score.rms_m, 3), steered_->port(), steered_->received(), steered_->refused(),
+        steered_->late());
+  }
+
   [[nodiscard]] std::string table(bool is_interactive) const {
     ScreenFormat format = format_of_output();
     format.is_interactive = is_interactive;
@@ -250,8 +316,8 @@ class Demo {
     rows.reserve(pairs_.size());
     for (const Pair& pair : pairs_) rows.push_back(live_row(pair));
     const std::string page = page_ ? fmt::format("page: {}\n", page_->url()) : "";
-    const std::string head = fmt::format("{}world time {} s of {}\n", page, fixed(world_s(), 1),
-                                         fixed(options_.for_s, 0));
+    const std::string head = fmt::format("{}world time {} s of {}\n{}", page, fixed(world_s(), 1),
+                                         fixed(options_.for_s, 0), steering());
     return table_.text(head, rows, format);
   }
 
@@ -281,13 +347,17 @@ class Demo {
   }
 
   DemoOptions options_;
+  SimConfig sim_;
   MonotonicClock clock_;
+  std::optional<SteeredSwarm> steered_;
   SimWorld world_;
   Timestamp start_;
   std::vector<RunningRobot> robots_;
   std::vector<ChildProcess> daemons_;  ///< one for each of robots_, while they run
   std::optional<DemoPage> page_;
   DemoScreen table_;
+  std::optional<ChildProcess> program_;
+  fs::path program_log_;
   std::vector<Pair> pairs_;
   std::map<std::pair<RobotId, RobotId>, std::size_t> pair_index_;
   double end_s_ = 0.0;  ///< world time at the end
@@ -298,11 +368,22 @@ class Demo {
 Result<DemoSummary> demo(const DemoOptions& options) {
   const Result<ScratchDirectory> directory = ScratchDirectory::create(options.keep);
   if (!directory) return tl::unexpected(directory.error());
+  const SimConfig sim = sim_config(options, directory->path());
+  std::optional<SteeredSwarm> steered;
+  if (!sim.track.empty()) {
+    Result<SteeredSwarm> opened =
+        SteeredSwarm::open(sim, static_cast<std::uint16_t>(options.port + kCommandPortOffset));
+    if (!opened) return tl::unexpected(opened.error());
+    steered.emplace(std::move(*opened));
+  }
   StopSignals stop;
-  Demo demo(options);
+  Demo demo(options, sim, std::move(steered));
   const Result<void> ran = demo.start(directory->path()).and_then([&] { return demo.run(stop); });
   demo.stop();
   if (!ran) return tl::unexpected(ran.error());
+  if (!options.keep.empty()) {
+    if (auto done = demo.write_truth(directory->path()); !done) return tl::unexpected(done.error());
+  }
   return demo.summarize();
 }
 

@@ -17,6 +17,7 @@ struct DemoOptions {
   double for_s = 30.0;
   std::uint16_t port = 47481;  ///< subscription port of the first robot; the others follow
   std::filesystem::path keep;  ///< where configurations and logs are kept; empty: they are removed
+  std::filesystem::path run;   ///< a program that steers the robots; empty: none
   std::string view;            ///< ADDRESS:PORT of a page that shows the robots; empty: none
   bool show_table = true;      ///< live, on standard output
   std::function<void(double)> on_progress{};  ///< progress, 0..1, called regularly

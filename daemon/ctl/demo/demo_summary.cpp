@@ -43,6 +43,21 @@ Json pair_json(const DemoSummary::Pair& pair) {
   return json;
 }
 
+std::string formation_text(const FormationScore& formation) {
+  return fmt::format(
+      "formation: {} m RMS over {} s, at most {} m; a pair was hidden {} % of the time\n",
+      fixed(formation.rms_m, 3), fixed(formation.to_s - formation.from_s, 0),
+      fixed(formation.max_m, 3), fixed(100.0 * formation.hidden, 0));
+}
+
+Json formation_json(const FormationScore& formation) {
+  return {{"from_s", formation.from_s},
+          {"to_s", formation.to_s},
+          {"rms_m", formation.rms_m},
+          {"max_m", formation.max_m},
+          {"hidden", formation.hidden}};
+}
+
 std::vector<std::string> row_of(const DemoSummary::Pair& pair) {
   const ErrorStatistics p = statistics_of(pair.score.position_errors_m);
   const ErrorStatistics r = statistics_of(pair.score.rotation_errors_rad);
@@ -66,8 +81,9 @@ std::string demo_text(const DemoSummary& summary) {
                                               "max m", "median deg", "max deg", "direct", "graph",
                                               "predicted"}};
   for (const DemoSummary::Pair& pair : summary.pairs) rows.push_back(row_of(pair));
-  return fmt::format("{}availability and errors from second {} to {}\n", text_table(rows),
-                     fixed(summary.from_s, 1), fixed(summary.to_s, 1));
+  return fmt::format("{}availability and errors from second {} to {}\n{}", text_table(rows),
+                     fixed(summary.from_s, 1), fixed(summary.to_s, 1),
+                     summary.formation ? formation_text(*summary.formation) : "");
 }
 
 std::string demo_json(const DemoSummary& summary) {
@@ -77,6 +93,7 @@ std::string demo_json(const DemoSummary& summary) {
             {"to_s", summary.to_s},
             {"pairs", Json::array()}};
   for (const DemoSummary::Pair& pair : summary.pairs) json["pairs"].push_back(pair_json(pair));
+  if (summary.formation) json["formation"] = formation_json(*summary.formation);
   return json_line(json);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "config/schema/config.hpp"
+#include "daemon/ctl/demo/formation_score.hpp"
 #include "daemon/ctl/score/pair_score.hpp"
 #include "estimator/core/result.hpp"
 
@@ -24,6 +25,7 @@ struct DemoSummary {
   double from_s = 0.0;  ///< world time of what is scored
   double to_s = 0.0;
   std::vector<Pair> pairs;
+  std::optional<FormationScore> formation{};  ///< of robots that were steered
 };
 
 /// The name of a robot of the demo: r1, r2, ...

@@ -44,6 +44,7 @@ class Pose:
     position: Vector  #: of N's origin, in B's axes [m]
     orientation: Quaternion  #: rotates coordinates in N's axes into B's
     velocity: Vector | None = None  #: of N minus B over ground, in B's axes [m/s]
+    up: Vector | None = None  #: against gravity, in B's axes
     #: Upper triangle, row by row, of the covariance of [dp, dtheta]: dp in B's axes [m],
     #: R_true = R Exp(dtheta) with dtheta in N's axes [rad].
     covariance: tuple[float, ...] | None = None
@@ -160,6 +161,7 @@ def _pose(content: dict[str, Any]) -> Pose:
         position=_vector(content["position"]),
         orientation=Quaternion(float(q["w"]), float(q["x"]), float(q["y"]), float(q["z"])),
         velocity=_vector(content["velocity"]) if "velocity" in content else None,
+        up=_vector(content["up"]) if "up" in content else None,
         covariance=covariance,
         seq=content.get("seq"),
         t_pub_ns=int(content["t_pub_ns"]) if "t_pub_ns" in content else None,
