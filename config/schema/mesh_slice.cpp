@@ -8,7 +8,8 @@ SendSettings send_settings(const Config& config) {
   const ImuNoise& noise = config.imu.noise;
   const double half_of_samples = 0.5 * std::sqrt(noise.update_rate);
   return {.rate_hz = config.net.report_rate_hz,
-          .air_kbps = config.net.air_kbps,
+          .airtime_of_all = config.net.airtime_of_all,
+          .broadcasts = {config.net.broadcast_mbps, config.net.broadcast_repeats},
           .gyro_step_radps = half_of_samples * noise.gyroscope_noise_density,
           .accel_step_mps2 = half_of_samples * noise.accelerometer_noise_density,
           .session_salt = 0};

@@ -116,7 +116,7 @@ class NetLoop {
     next_second_ = clock_.now() + std::chrono::seconds{1};
     key_monitor_.update(link_);
     const AirTotals before = std::exchange(air_totals_, air_totals(link_, clock_.now()));
-    air_ = air_share(before, air_totals_, settings_.net.broadcast_mbps);
+    air_ = air_share(before, air_totals_, settings_.send.broadcasts);
     notify_service();
   }
 
@@ -174,6 +174,7 @@ class NetLoop {
   void handle(SensorStatus& status) { sensors_[status.name] = std::move(status); }
 
   void broadcast(const Report& report, Timestamp now) {
+    if (!link_.is_due(now)) return;
     UdpSocket* socket = mesh_.get(now);
     if (socket == nullptr) return;
     const Result<void> sent =

@@ -25,20 +25,33 @@ constexpr double kAttitudeSigma = 0.002;  // rad
 
 // Two bearings confirm each other within this time and angle, after compensation of own rotation.
 constexpr Duration kConfirmationTime = std::chrono::milliseconds{100};
+// Where the air is short, a report brings one bearing of a neighbor every 0.12 to 0.24 s.
+constexpr Duration kSparseConfirmationTime = std::chrono::milliseconds{300};
 constexpr double kConfirmationAngle = 0.02;  // rad; kLineRate adds to it
 
+bool is_within(Duration apart, Duration reach) { return apart > Duration{0} && apart <= reach; }
+
 bool is_confirmed(const Bearing& bearing, const BoundedFifo<Bearing, 256>& log,
-                  const ImuHistory& imu) {
+                  const ImuHistory& imu, Duration reach = kConfirmationTime) {
   Timestamp from = bearing.stamp;  // start of `turn`; all bearings of a frame share it
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
   return std::any_of(log.all().begin(), log.all().end(), [&](const Bearing& other) {
     const Duration apart = std::chrono::abs(other.stamp - bearing.stamp);
-    if (apart == Duration{0} || apart > kConfirmationTime) return false;
+    if (!is_within(apart, reach)) return false;
     if (other.stamp != std::exchange(from, other.stamp))
       turn = imu.rotation(other.stamp, bearing.stamp).conjugate();
     return (turn * other.u_B - bearing.u_B).norm() <
            kConfirmationAngle + kLineRate * to_seconds(apart);
   });
+}
+
+/// The same where bearings may be far apart: then the next one counts.
+bool is_confirmed_by_next(const Bearing& bearing, const BoundedFifo<Bearing, 256>& log,
+                          const ImuHistory& imu) {
+  const bool is_dense = std::ranges::any_of(log.all(), [&](const Bearing& other) {
+    return is_within(std::chrono::abs(other.stamp - bearing.stamp), kConfirmationTime);
+  });
+  return is_confirmed(bearing, log, imu, is_dense ? kConfirmationTime : kSparseConfirmationTime);
 }
 
 }  // namespace
@@ -120,7 +133,7 @@ ObservationBuffer::mutual_initializations(const Bearing& peer_bearing, const Rob
   const auto tilt_B = self.tilt_at(t);
   const auto tilt_N = neighbor.tilt_at(t);
   if (!tilt_B || !tilt_N) return NoPoseReason::kTiltUnknown;
-  if (!is_confirmed(peer_bearing, peer_, neighbor.imu)) return NoPoseReason::kDoesNotSeeUs;
+  if (!is_confirmed_by_next(peer_bearing, peer_, neighbor.imu)) return NoPoseReason::kDoesNotSeeUs;
   const std::vector<Bearing> own = own_at(t, self.imu);
   if (own.empty()) return NoPoseReason::kNotSeen;
   const auto range = range_at(t);

@@ -3,7 +3,7 @@
 namespace crepes {
 namespace {
 
-constexpr Duration kRepeated = std::chrono::milliseconds{260};
+constexpr Duration kRepeated = std::chrono::milliseconds{520};
 
 }  // namespace
 

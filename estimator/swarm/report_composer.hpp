@@ -11,7 +11,7 @@
 
 namespace crepes {
 
-/// Every report has the measurements of the last 260 ms; the mesh decides how often each is
+/// Every report has the measurements of the last 520 ms; the mesh decides how often each is
 /// repeated. Bearings are thinned to one a neighbor and report; the filter at the other end gains
 /// nothing from a camera's every frame.
 class ReportComposer {

@@ -45,7 +45,7 @@ class ClockOffset {
   /// Accurate enough to convert stamps (sigma below 5 ms).
   [[nodiscard]] bool is_usable() const;
   /// At the last packet; empty until packets went both ways. `to_local` applies this offset and
-  /// skew. Corrections are slewed at up to 1 ms a second, not stepped.
+  /// skew. For 2.5 s corrections are steps; later they are slewed at up to 1 ms a second.
   [[nodiscard]] std::optional<ClockEstimate> estimate() const;
   /// Only while `estimate()` has a value, and for stamps within a few hours of the last packet.
   [[nodiscard]] Timestamp to_local(PeerTimestamp stamp) const;

@@ -95,7 +95,8 @@ std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> da
   Session* const session = accept(peer, *message, arrival);
   if (trust_.keys.contains(sender)) {
     const bool is_of_use = session != nullptr && peer.live && session == &*peer.live;
-    is_of_use ? limiter_.count_accepted(from, arrival) : limiter_.count_in_vain(from, arrival);
+    is_of_use ? limiter_.count_accepted(from, sender, arrival)
+              : limiter_.count_in_vain(from, sender, arrival);
   }
   if (session == nullptr) return std::nullopt;
   if (!session->clock.is_usable()) {
@@ -117,7 +118,7 @@ std::optional<PeerMessage> PeerLink::open(std::span<const std::uint8_t> datagram
   if (header && is_our_own(*header)) return std::nullopt;
   auto message = header.and_then([&](const PeerHeader&) { return read(*plain, arrival, from); });
   if (message && message->report.sender == self_) {
-    if (trust_.keys.contains(self_)) limiter_.count_in_vain(from, arrival);
+    if (trust_.keys.contains(self_)) limiter_.count_in_vain(from, self_, arrival);
     count_doubled(MeshCounter::kRefusedOwnId, self_, arrival);
     return std::nullopt;
   }
@@ -166,9 +167,10 @@ std::optional<MeshCounter> PeerLink::refusal_of(std::span<const std::uint8_t> pl
       if (refusal) return refusal;
     }
   }
-  if (!limiter_.allows(from, arrival)) return MeshCounter::kRefusedSignatureUnchecked;
+  if (!limiter_.allows(from, header.sender, arrival))
+    return MeshCounter::kRefusedSignatureUnchecked;
   if (is_authentic(plain, key->second)) return std::nullopt;
-  limiter_.count_in_vain(from, arrival);
+  limiter_.count_in_vain(from, header.sender, arrival);
   return MeshCounter::kRefusedSignatureWrong;
 }
 
@@ -312,22 +314,41 @@ std::uint64_t PeerLink::own_session() const {
   return settings_.session_salt ^ static_cast<std::uint64_t>(to_ns(*first_sent_));
 }
 
-/// Copies for the peer that loses the most of ours; room for those that are heard.
-WireLimits PeerLink::limits(Timestamp now, std::size_t overhead) const {
+/// With a part of the air for each that is heard.
+Pace PeerLink::pace(Timestamp now) const {
+  const auto heard = std::ranges::count_if(peers_, [&](const auto& known) {
+    const std::optional<Session>& session = known.second.heard();
+    return session && now - session->last_arrival <= kEchoAge;
+  });
+  return pace_of(settings_, static_cast<std::size_t>(heard));
+}
+
+bool PeerLink::is_due(Timestamp now) const {
+  constexpr double kEarliest = 0.5;  // reports: their times jitter
+  if (sent_.empty()) return true;
+  const double reports = static_cast<double>(pace(now).reports) - kEarliest;
+  return now - sent_.back() >= from_seconds(reports / settings_.rate_hz);
+}
+
+/// Of the peer that loses the most.
+double PeerLink::worst_loss_of_ours(Timestamp now) const {
   constexpr double kUnknownLoss = 0.2;
-  double loss = 0.0;
-  std::size_t heard = 0;
+  std::optional<double> worst;
   for (const auto& [id, peer] : peers_) {
     if (!peer.live || now - peer.live->last_arrival > kEchoAge) continue;
-    ++heard;
-    loss = std::max(loss, peer.live->loss.of_ours.value_or(kUnknownLoss));
+    worst = std::max(worst.value_or(0.0), peer.live->loss.of_ours.value_or(kUnknownLoss));
   }
-  return {
-      .bytes = std::max(datagram_bytes(settings_, heard), kMinPeerMessage + overhead) - overhead,
-      .copies = copies_for(heard > 0 ? loss : kUnknownLoss),
-      .period = from_seconds(1 / settings_.rate_hz),
-      .gyro_step_radps = settings_.gyro_step_radps,
-      .accel_step_mps2 = settings_.accel_step_mps2};
+  return worst.value_or(kUnknownLoss);
+}
+
+WireLimits PeerLink::limits(Timestamp now, std::size_t overhead) const {
+  const Pace pace = this->pace(now);
+  return {.bytes = std::max(pace.bytes, kMinPeerMessage + overhead) - overhead,
+          .copies = copies_for(worst_loss_of_ours(now)),
+          .period = from_seconds(static_cast<double>(pace.reports) / settings_.rate_hz),
+          .reports = pace.reports,
+          .gyro_step_radps = settings_.gyro_step_radps,
+          .accel_step_mps2 = settings_.accel_step_mps2};
 }
 
 std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,

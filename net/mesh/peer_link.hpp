@@ -51,6 +51,9 @@ class PeerLink {
       std::span<const std::uint8_t> datagram, Timestamp arrival,
       const std::optional<PacketSeal>& seal = std::nullopt, const Endpoint& from = {});
 
+  /// Whether it is time for a datagram. Where the air is short, what a report has waits for the
+  /// next one that is sent.
+  [[nodiscard]] bool is_due(Timestamp now) const;
   /// The datagram to broadcast immediately; `now` is the time of sending.
   [[nodiscard]] std::vector<std::uint8_t> compose(
       const Report& report, Timestamp now, const std::optional<PacketSeal>& seal = std::nullopt,
@@ -116,6 +119,8 @@ class PeerLink {
   static void update_loss(Session& session);
   [[nodiscard]] std::optional<Timestamp> sent_by_us(std::uint32_t code, Timestamp now) const;
   [[nodiscard]] std::uint64_t own_session() const;
+  [[nodiscard]] Pace pace(Timestamp now) const;
+  [[nodiscard]] double worst_loss_of_ours(Timestamp now) const;
   [[nodiscard]] WireLimits limits(Timestamp now, std::size_t overhead) const;
 
   RobotId self_;

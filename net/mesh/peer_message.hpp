@@ -59,6 +59,7 @@ struct WireLimits {
   std::size_t bytes = kMaxPeerMessage;  ///< of the datagram, at least kMinPeerMessage
   std::size_t copies = 6;               ///< datagrams that carry a measurement
   Duration period{40'000'000};          ///< between datagrams
+  std::size_t reports = 1;              ///< that a datagram stands for
   double gyro_step_radps = 1e-3;        ///< coarsest rounding of angular rates
   double accel_step_mps2 = 1e-2;        ///< coarsest rounding of specific forces
 };
@@ -71,9 +72,11 @@ struct EncodedPeerMessage {
   std::size_t refused = 0;           ///< measurements that are not finite or cannot be encoded
 };
 
-/// Encodes what fits. What must give, in this order: the older copies of bearings and ranges, those
-/// of inertial samples, then as many neighbors as necessary, by turns. Each datagram carries
-/// the next one of the estimates and the next three of the echoes.
+/// Encodes what fits. What must give, in this order: of the bearings and ranges of a datagram that
+/// stands for several reports, all but one a neighbor, evenly; their older copies; those of
+/// inertial samples; then as many neighbors as necessary, by turns, and most estimates. Each
+/// datagram has the next one of the estimates and the next three of the echoes, up to eight where
+/// datagrams are fewer.
 [[nodiscard]] EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
                                                      const WireLimits& limits = {});
 

@@ -13,7 +13,8 @@ namespace crepes {
 namespace wire {
 namespace {
 
-constexpr std::size_t kMaxEchoes = 3;
+constexpr std::size_t kEchoesPerReport = 3;
+constexpr std::size_t kMaxEchoes = 8;
 constexpr std::size_t kMaxCameras = 8;
 constexpr std::size_t kMaxItems = BodyReader::kMaxItems;
 
@@ -180,9 +181,10 @@ class Quantizer {
 
   /// By turns if there are more peers than room.
   void add_echoes(const OutgoingPeerMessage& message) {
-    const std::size_t count = std::min(message.echoes.size(), kMaxEchoes);
+    const std::size_t most = std::min(kEchoesPerReport * limits_.reports, kMaxEchoes);
+    const std::size_t count = std::min(message.echoes.size(), most);
     for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t turn = std::size_t{message.sequence} * kMaxEchoes + i;
+      const std::size_t turn = std::size_t{message.sequence} * most + i;
       const ClockEcho& echo = message.echoes[turn % message.echoes.size()];
       const std::int64_t age_us = (to_ns(message.sent) - echo.received_ns + 500) / 1000;
       CREPES_EXPECT(std::in_range<std::uint32_t>(age_us), "an echo is of the recent past");
@@ -271,28 +273,62 @@ class Quantizer {
 
 /// What a datagram leaves out so that it fits.
 struct Omission {
-  std::size_t copies;     ///< of bearings and ranges that remain
+  std::int64_t spacing;  ///< ticks from one bearing or range of a neighbor to the next, at least
+  std::size_t bearings;  ///< of a neighbor that remain
+  std::size_t ranges;
   std::size_t samples;    ///< of the IMU that remain
+  bool fewer_estimates;   ///< three datagrams in four have none
   std::size_t neighbors;  ///< that remain
 };
 
+/// Ticks between reports.
+std::int64_t report_ticks(const WireLimits& limits) {
+  return limits.period.count() / kTick / static_cast<std::int64_t>(limits.reports);
+}
+
 /// The omissions in the order in which they are tried.
-std::vector<Omission> omissions(const CodedBody& body, std::size_t copies) {
-  constexpr std::size_t kNewestSamples = 6;
+std::vector<Omission> omissions(const CodedBody& body, const WireLimits& limits) {
+  // Those since the last datagram at 100 Hz and 25 reports a second, and two more.
+  const std::size_t newest_samples = 4 * limits.reports + 2;
   std::vector<Omission> all;
   const std::size_t samples = body.imu.samples.size();
   const std::size_t neighbors = std::min(body.sources.size(), kMaxItems);
-  for (std::size_t n = copies; n > 0; --n) all.push_back({n, samples, neighbors});
-  for (std::size_t n = samples; n > kNewestSamples; n -= std::min<std::size_t>(4, n))
-    all.push_back({1, n, neighbors});
+  const std::int64_t report = report_ticks(limits);
+  std::int64_t spacing = 0;
+  for (std::size_t m = 1; m < limits.reports; ++m) {
+    const std::size_t n = limits.copies * limits.reports;
+    all.push_back({spacing, n, n, samples, false, neighbors});
+    // Half a report less than the next multiple, because stamps jitter.
+    spacing = static_cast<std::int64_t>(m) * report + report / 2;
+  }
+  for (std::size_t n = limits.copies; n > 0; --n)
+    all.push_back({spacing, n, n, samples, false, neighbors});
+  for (std::size_t n = samples; n > newest_samples; n -= std::min<std::size_t>(4, n))
+    all.push_back({spacing, 1, 1, n, false, neighbors});
+  // By turns, a neighbor's bearings are so rare that the receiver needs two to believe them.
+  const bool is_rare = limits.reports > 1;
   for (std::size_t n = neighbors; n > 0; n -= std::max<std::size_t>(n / 10, 1))
-    all.push_back({1, kNewestSamples, n});
+    all.push_back({is_rare ? 0 : spacing, is_rare ? 2U : 1U, 1, newest_samples, is_rare, n});
   return all;
+}
+
+/// Leaves at least `spacing` between items, which are the newest first. Two of one age are a board
+/// and its mirror image, or two cameras: they stay together.
+template <class Item>
+void thin_out(std::vector<Item>& items, std::int64_t spacing) {
+  if (items.empty()) return;
+  std::int64_t kept = items.front().age;
+  std::erase_if(items, [&](const Item& item) {
+    const bool remains = item.age == kept || item.age >= kept + spacing;
+    if (remains) kept = item.age;
+    return !remains;
+  });
 }
 
 CodedBody without(CodedBody body, const Omission& omission, std::uint32_t sequence) {
   const auto shorten = [](auto& items, std::size_t n) { items.resize(std::min(items.size(), n)); };
   shorten(body.imu.samples, omission.samples);
+  if (omission.fewer_estimates && sequence % 4 != 0) body.estimates.clear();
   std::vector<CodedSource> remaining;
   const std::size_t count = body.sources.size();
   for (std::size_t i = 0; i < count; ++i) {
@@ -300,9 +336,10 @@ CodedBody without(CodedBody body, const Omission& omission, std::uint32_t sequen
     const std::size_t turn = (i + count - sequence * omission.neighbors % count) % count;
     if (turn >= omission.neighbors) continue;
     CodedSource& source = remaining.emplace_back(std::move(body.sources[i]));
-    shorten(source.ranges, omission.copies);
-    // Two of one stamp are a board and its mirror image, or two cameras: they stay together.
-    std::size_t kept = std::min(source.bearings.size(), omission.copies);
+    thin_out(source.ranges, omission.spacing);
+    thin_out(source.bearings, omission.spacing);
+    shorten(source.ranges, omission.ranges);
+    std::size_t kept = std::min(source.bearings.size(), omission.bearings);
     while (kept > 0 && kept < source.bearings.size() &&
            source.bearings[kept].age == source.bearings[kept - 1].age)
       ++kept;
@@ -349,7 +386,7 @@ EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
                                        const WireLimits& limits) {
   CREPES_EXPECT(limits.bytes >= kMinPeerMessage && limits.bytes <= kMaxPeerMessage,
                 "what a datagram cannot do without has room");
-  CREPES_EXPECT(limits.copies > 0, "every measurement is sent");
+  CREPES_EXPECT(limits.copies > 0 && limits.reports > 0, "every measurement is sent");
   CREPES_EXPECT(wire::is_robot(message.report.sender), "a sender has an id");
   CREPES_EXPECT(std::abs(to_ns(message.sent)) <= wire::kMaxStamp, "a clock counts from its epoch");
   wire::Quantizer quantizer(message, limits);
@@ -358,7 +395,7 @@ EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
   EncodedPeerMessage encoded;
   encoded.refused = refused;
   std::optional<wire::CodedBody> wanted;  // the first that is tried
-  for (const wire::Omission& omission : wire::omissions(whole, limits.copies)) {
+  for (const wire::Omission& omission : wire::omissions(whole, limits)) {
     wire::CodedBody body = wire::without(whole, omission, message.sequence);
     encoded.bytes = wire::written(message, body);
     if (!wanted) wanted = body;

@@ -3,9 +3,25 @@
 #include <algorithm>
 #include <cmath>
 
-#include "net/mesh/peer_message.hpp"
-
 namespace crepes {
+namespace {
+
+constexpr double kHeaders = 8 + 20 + 14 + 14 + 8 + 24 + 4;  // UDP IP Ethernet batman LLC MAC FCS
+constexpr double kPreamble = 20.0;                          // us
+constexpr double kSymbol = 4.0;                             // us
+constexpr double kServiceAndTailBits = 16 + 6;
+constexpr double kDifsAndMeanBackoff = 34.0 + 7.5 * 9.0;  // us
+
+/// The longest datagram that is on the air for at most `air_s` with all its repeats. Below zero if
+/// there is none.
+double bytes_within(double air_s, const Broadcasts& broadcasts) {
+  const double frame_us = 1e6 * air_s / broadcasts.repeats;
+  const double symbols = std::floor((frame_us - kDifsAndMeanBackoff - kPreamble) / kSymbol);
+  const double bits = symbols * broadcasts.rate_mbps * kSymbol - kServiceAndTailBits;
+  return std::floor(bits / 8) - kHeaders;
+}
+
+}  // namespace
 
 std::size_t copies_for(double loss) {
   constexpr double kAllLost = 1.0 / 500;
@@ -16,37 +32,41 @@ std::size_t copies_for(double loss) {
       std::clamp(std::ceil(std::log(kAllLost) / std::log(p)), kLeast, kMost));
 }
 
-std::size_t datagram_bytes(const SendSettings& settings, std::size_t neighbors) {
-  constexpr double kOwn = 9500.0;         // B/s
-  constexpr double kPerNeighbor = 100.0;  // B/s
+Pace pace_of(const SendSettings& settings, std::size_t neighbors) {
+  constexpr double kMostOfOwn = 9500.0;        // B/s
+  constexpr double kMostPerNeighbor = 100.0;   // B/s
+  constexpr double kWantedOfOwn = 280.0;       // B: header, echoes, inertial samples, signature
+  constexpr double kWantedPerNeighbor = 13.0;  // B: a bearing and a range
+  constexpr double kSlowest = 4.0;             // Hz
   const auto n = static_cast<double>(neighbors);
-  const double share = settings.air_kbps * 1000 / 8 / (n + 1);
-  const double bytes = std::min(share, kOwn + kPerNeighbor * n) / settings.rate_hz;
-  return static_cast<std::size_t>(std::clamp(bytes, static_cast<double>(kMinPeerMessage),
-                                             static_cast<double>(kMaxPeerMessage)));
+  const double share = settings.airtime_of_all / (n + 1);
+  Pace pace;
+  for (;; ++pace.reports) {
+    const double rate_hz = settings.rate_hz / static_cast<double>(pace.reports);
+    const double most = std::min((kMostOfOwn + kMostPerNeighbor * n) / rate_hz,
+                                 static_cast<double>(kMaxPeerMessage));
+    const double bytes = std::min(bytes_within(share / rate_hz, settings.broadcasts), most);
+    pace.bytes = static_cast<std::size_t>(std::max(bytes, static_cast<double>(kMinPeerMessage)));
+    const bool is_slowest = settings.rate_hz < kSlowest * static_cast<double>(pace.reports + 1);
+    if (is_slowest || bytes >= std::min(kWantedOfOwn + kWantedPerNeighbor * n, most)) return pace;
+  }
 }
 
-double airtime(double datagrams_per_s, double bytes_per_datagram, double rate_mbps) {
-  constexpr double kHeaders = 8 + 20 + 14 + 14 + 8 + 24 + 4;  // UDP IP Ethernet batman LLC MAC FCS
-  constexpr double kPreamble = 20.0;                          // us
-  constexpr double kSymbol = 4.0;                             // us
-  constexpr double kServiceAndTailBits = 16 + 6;
-  constexpr double kDifsAndMeanBackoff = 34.0 + 7.5 * 9.0;  // us
-  constexpr double kRepeats = 3.0;
+double airtime(double datagrams_per_s, double bytes_per_datagram, const Broadcasts& broadcasts) {
   const double bits = 8 * (kHeaders + bytes_per_datagram) + kServiceAndTailBits;
-  const double symbols = std::ceil(bits / (rate_mbps * kSymbol));
+  const double symbols = std::ceil(bits / (broadcasts.rate_mbps * kSymbol));
   const double frame_us = kDifsAndMeanBackoff + kPreamble + symbols * kSymbol;
-  return 1e-6 * frame_us * kRepeats * datagrams_per_s;
+  return 1e-6 * frame_us * broadcasts.repeats * datagrams_per_s;
 }
 
-AirShare air_share(const AirTotals& before, const AirTotals& after, double rate_mbps) {
+AirShare air_share(const AirTotals& before, const AirTotals& after, const Broadcasts& broadcasts) {
   const double dt = to_seconds(after.at - before.at);
   const auto difference = [](std::uint64_t from, std::uint64_t to) {
     return to > from ? static_cast<double>(to - from) : 0.0;
   };
   const auto share = [&](double datagrams, double bytes, double unheard) {
     if (dt <= 0 || datagrams <= 0) return 0.0;
-    return airtime((datagrams + unheard) / dt, bytes / datagrams, rate_mbps);
+    return airtime((datagrams + unheard) / dt, bytes / datagrams, broadcasts);
   };
   const double own = share(difference(before.sent, after.sent),
                            difference(before.sent_bytes, after.sent_bytes), 0.0);

@@ -4,13 +4,23 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "net/mesh/peer_message.hpp"
 #include "net/mesh/peer_status.hpp"
 
 namespace crepes {
 
+/// How a datagram travels.
+struct Broadcasts {
+  double rate_mbps = 6.0;  ///< the lowest basic rate of the Wi-Fi
+  int repeats = 3;         ///< how often it is on the air; batman-adv sends each broadcast 3 times
+
+  [[nodiscard]] bool operator==(const Broadcasts&) const = default;
+};
+
 struct SendSettings {
-  double rate_hz = 25.0;           ///< datagrams per second
-  double air_kbps = 4000.0;        ///< what all robots that hear each other may send together
+  double rate_hz = 25.0;           ///< reports per second, and datagrams at most
+  double airtime_of_all = 0.5;     ///< share of the channel for all robots that hear each other
+  Broadcasts broadcasts{};         ///< what a datagram takes of it
   double gyro_step_radps = 1e-3;   ///< coarsest rounding of angular rates
   double accel_step_mps2 = 1e-2;   ///< coarsest rounding of specific forces
   std::uint64_t session_salt = 0;  ///< makes the session's number unlike any other; random where
@@ -23,14 +33,23 @@ struct SendSettings {
 /// and at most 6. `loss` is the share of datagrams that is lost, each by itself.
 [[nodiscard]] std::size_t copies_for(double loss);
 
-/// Bytes of a datagram, sealed if it is: the robot's share of the air, and no more than 9.5 kB/s
-/// and 0.1 kB/s a neighbor.
-[[nodiscard]] std::size_t datagram_bytes(const SendSettings& settings, std::size_t neighbors);
+/// When a robot sends, and how much.
+struct Pace {
+  std::size_t reports = 1;              ///< a datagram is sent for each of so many
+  std::size_t bytes = kMaxPeerMessage;  ///< of a datagram, sealed if it is
+};
 
-/// Seconds of air that a robot takes per second with broadcasts at `rate_mbps` (IEEE 802.11a/g,
-/// 20 MHz): preamble and symbols, mean backoff, and the repeats of batman-adv, which sends each
-/// broadcast three times. Headers of UDP, IP, batman-adv, LLC and MAC are added to `bytes`.
-[[nodiscard]] double airtime(double datagrams_per_s, double bytes_per_datagram, double rate_mbps);
+/// A robot takes an equal part of the air, and no more than 9.5 kB/s and 0.1 kB/s a neighbor. Where
+/// a datagram a report would be too short, it sends fewer and fuller ones, because most of a short
+/// one is headers and waiting; but at least four a second, because others predict its motion from
+/// one to the next. Below kMinPeerMessage no datagram is shortened.
+[[nodiscard]] Pace pace_of(const SendSettings& settings, std::size_t neighbors);
+
+/// Seconds of air that a robot takes per second with broadcasts (IEEE 802.11a/g, 20 MHz): preamble
+/// and symbols, mean backoff, and all repeats. Headers of UDP, IP, batman-adv, LLC and MAC are
+/// added to `bytes`.
+[[nodiscard]] double airtime(double datagrams_per_s, double bytes_per_datagram,
+                             const Broadcasts& broadcasts);
 
 /// Totals of what was on the air since the start.
 struct AirTotals {
@@ -43,6 +62,7 @@ struct AirTotals {
 };
 
 /// The shares of the channel between two instants. Lost datagrams are as long as those received.
-[[nodiscard]] AirShare air_share(const AirTotals& before, const AirTotals& after, double rate_mbps);
+[[nodiscard]] AirShare air_share(const AirTotals& before, const AirTotals& after,
+                                 const Broadcasts& broadcasts);
 
 }  // namespace crepes

@@ -32,6 +32,7 @@ struct RobotReport {
   std::optional<std::map<RobotId, std::uint64_t>> id_mistakes;
   std::uint64_t datagrams_sent = 0;
   std::uint64_t bytes_sent = 0;
+  double airtime = 0.0;  ///< share of the channel's time, by the model in send_pacing.hpp
   std::vector<std::pair<std::string, std::uint64_t>> network;  ///< received and refused, by reason
   std::vector<std::pair<std::string, double>> cpu_s;           ///< by stage
 };

@@ -70,6 +70,7 @@ Json robot_json(const RobotReport& robot, const ReplayOutput::Names& names) {
   json["name"] = name_in(names, robot.robot);
   json["datagrams_sent"] = robot.datagrams_sent;
   json["bytes_sent"] = robot.bytes_sent;
+  json["airtime"] = robot.airtime;
   json["network"] = object_of(robot.network);
   json["refused_samples"] = robot.status.refused_samples;
   json["refused_imu"] = refused_imu_json(robot.status.refused_imu);

@@ -133,6 +133,12 @@ struct Robot {
   std::uint64_t bytes_sent = 0;
   StageTimes cpu;
 
+  [[nodiscard]] double airtime(double duration_s) const {
+    if (datagrams_sent == 0) return 0.0;
+    const auto datagrams = static_cast<double>(datagrams_sent);
+    return crepes::airtime(datagrams / duration_s, static_cast<double>(bytes_sent) / datagrams,
+                           send_settings(recording.config).broadcasts);
+  }
   [[nodiscard]] RobotId id() const { return recording.robot.id; }
   [[nodiscard]] const RobotClock& clock() const { return recording.robot.clock; }
 };
@@ -311,11 +317,12 @@ void SwarmReplay::handle_outputs(const Arrival& arrival, const Outputs& outputs)
 
 void SwarmReplay::broadcast(const Arrival& arrival, const Report& report) {
   Robot& robot = robots_[arrival.robot];
+  const Timestamp now = robot.clock().local(arrival.true_s);
+  if (!robot.link.is_due(now)) return;
   std::vector<std::uint8_t> datagram;
   {
     const CpuTimer timer(robot.cpu.net_s);
-    datagram =
-        robot.link.compose(report, robot.clock().local(arrival.true_s), robot.seal, robot.signer);
+    datagram = robot.link.compose(report, now, robot.seal, robot.signer);
   }
   ++robot.datagrams_sent;
   robot.bytes_sent += datagram.size();
@@ -373,6 +380,7 @@ ReplayReport SwarmReplay::report(const ReplayOptions& options) const {
     if (truth_) one.id_mistakes = robot.id_mistakes;
     one.datagrams_sent = robot.datagrams_sent;
     one.bytes_sent = robot.bytes_sent;
+    one.airtime = robot.airtime(manifest_.duration_s);
     one.network = robot.link.counters().totals();
     one.cpu_s = {{"vision", robot.cpu.vision_s},
                  {"estimator", robot.cpu.estimator_s},

@@ -121,6 +121,24 @@ TEST_F(Sighted, TakesNothingForARobotThatWasSeenOnlyOnce) {
   EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNone);
 }
 
+TEST_F(Sighted, BelievesAPeerWhoseBearingsAreFarApart) {
+  const Timestamp later = kNow + 200ms;
+  buffer_.add_own_bearing(own(later - 5ms));
+  buffer_.add_own_bearing(own(later));
+  add_range(later);
+
+  EXPECT_EQ(reason(peer(later)), NoPoseReason::kNone);  // 0.26 s after the one before
+  Bearing glint = peer(later);
+  glint.u_B = so3_exp(0.2 * neighbor_.tilt->up_B) * glint.u_B;
+  EXPECT_EQ(reason(glint), NoPoseReason::kDoesNotSeeUs);
+
+  // One that is near decides alone.
+  Bearing between = peer(later - 50ms);
+  between.u_B = so3_exp(0.2 * neighbor_.tilt->up_B) * between.u_B;
+  buffer_.add_peer_bearing(between);
+  EXPECT_EQ(reason(peer(later)), NoPoseReason::kDoesNotSeeUs);
+}
+
 TEST_F(Sighted, SaysWhatIsMissing) {
   EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNotSeen);
 

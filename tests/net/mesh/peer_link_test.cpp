@@ -254,9 +254,41 @@ TEST(PeerLink, SealedDatagramsAreNoLongerThanOthers) {
 
   for (const std::optional<PacketSeal>& seal : {std::optional<PacketSeal>{}, {kSeal}}) {
     const std::size_t size = link.compose(report, Timestamp{}, seal).size();
-    EXPECT_LE(size, datagram_bytes(settings, 0));
-    EXPECT_GT(size, datagram_bytes(settings, 0) - 90);  // another copy of all
+    EXPECT_LE(size, pace_of(settings, 0).bytes);
+    EXPECT_GT(size, pace_of(settings, 0).bytes - 90);  // another copy of all
   }
+}
+
+/// Of the robots 1 to 20 hears the last: reports that are sent in a second of 25.
+int datagrams_of_twenty(const SendSettings& settings) {
+  std::vector<RobotId> members;
+  for (std::uint16_t id = 1; id <= 20; ++id) members.emplace_back(id);
+  PeerLink link(members.back(), members, settings);
+  int sent = 0;
+  for (int i = 0; i < 50; ++i) {
+    const Timestamp now{milliseconds{40 * i}};
+    Report report;
+    report.stamp = now;
+    for (std::size_t k = 0; k + 1 < members.size() && i % 10 == 0; ++k) {
+      PeerLink peer(members[k], members);
+      report.sender = members[k];
+      (void)link.receive(peer.compose(report, now), now);
+    }
+    report.sender = members.back();
+    if (!link.is_due(now)) continue;
+    (void)link.compose(report, now);
+    sent += i >= 25 ? 1 : 0;
+  }
+  return sent;
+}
+
+TEST(PeerLink, SendsFewerDatagramsWhereTheAirIsShort) {
+  const SendSettings slow{.broadcasts = {.rate_mbps = 6, .repeats = 3}};
+  const auto reports = static_cast<double>(pace_of(slow, 19).reports);
+
+  EXPECT_EQ(datagrams_of_twenty({.broadcasts = {.rate_mbps = 54, .repeats = 1}}), 25);
+  EXPECT_GT(reports, 1);
+  EXPECT_NEAR(datagrams_of_twenty(slow), 25 / reports, 1);
 }
 
 TEST(PeerLink, RepeatsMoreWhereMoreIsLost) {

@@ -153,6 +153,51 @@ TEST(PeerMessage, LeavesOutTheOldestCopiesFirst) {
   EXPECT_LT(decoded->report.bearings.size(), 18U);
 }
 
+TEST(PeerMessage, ThinsOutEvenlyWhatADatagramHasOfSeveralReports) {
+  constexpr int kNeighbors = 8;
+  OutgoingPeerMessage message = full_message(kNeighbors);
+  message.report.bearings.clear();
+  message.report.ranges.clear();
+  message.report.imu.resize(4);
+  const auto ago = [](int reports) { return kSent - milliseconds{40 * reports + 3}; };
+  for (int i = 0; i < 13; ++i) {
+    for (int n = 0; n < kNeighbors; ++n) {
+      const RobotId neighbor{static_cast<std::uint16_t>(n + 2)};
+      message.report.bearings.push_back(
+          {ago(i), neighbor, Eigen::Vector3d::UnitX(), Eigen::Vector3d::Zero(), 1e-3});
+      message.report.ranges.push_back({ago(i), neighbor, 3.0, -80.0, -79.0});
+    }
+  }
+  const auto ages_of = [&](std::size_t bytes) {
+    const auto decoded = decode_peer_message(
+        encode_peer_message(
+            message, {.bytes = bytes, .copies = 2, .period = milliseconds{200}, .reports = 5})
+            .bytes);
+    std::map<RobotId, std::vector<int>> ages;  // reports
+    for (const auto& bearing : decoded->report.bearings)
+      ages[bearing.neighbor].push_back(
+          static_cast<int>((to_ns(kSent) - to_ns(bearing.stamp)) / 40'000'000));
+    return ages;
+  };
+  const auto expect_for_all = [&](std::size_t bytes, const std::vector<int>& expected) {
+    const auto ages = ages_of(bytes);
+    EXPECT_EQ(ages.size(), std::size_t{kNeighbors});
+    for (const auto& [neighbor, reports] : ages) EXPECT_EQ(reports, expected) << bytes;
+  };
+
+  expect_for_all(1400, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
+  const std::size_t least = 320 + 8 * 14;
+  std::set<std::vector<int>> seen;
+  for (std::size_t bytes = least; bytes < 1000; bytes += 10) {
+    const auto ages = ages_of(bytes);
+    ASSERT_EQ(ages.size(), std::size_t{kNeighbors}) << bytes;
+    seen.insert(ages.begin()->second);
+  }
+  EXPECT_TRUE(seen.contains({0, 2, 4, 6, 8}));
+  EXPECT_TRUE(seen.contains({0, 4, 8}) || seen.contains({0, 3, 6, 9}));
+  EXPECT_FALSE(seen.contains({0, 1, 2, 3, 4}));
+}
+
 TEST(PeerMessage, KeepsToItsLimitWithFiftyNeighborsAndReportsThemInTurn) {
   constexpr int kNeighbors = 50;
   constexpr std::size_t kLimit = 500;

@@ -278,9 +278,27 @@ TEST(SignedLink, AccountsForSealAndSignatureInItsShareOfTheAir) {
 
     // The least that a datagram may be limited to, with seal and signature, is above the share.
     const std::size_t least = kMinPeerMessage + PacketSeal::kOverhead + PacketSigner::kOverhead;
-    EXPECT_LE(size, std::max(datagram_bytes({}, neighbors), least)) << neighbors;
-    EXPECT_LE(25 * size, neighbors == 19 ? 12'000U : 10'000U) << neighbors;
+    EXPECT_LE(size, std::max(pace_of({}, neighbors).bytes, least)) << neighbors;
+    EXPECT_LE(25 * size / pace_of({}, neighbors).reports, neighbors == 19 ? 12'000U : 10'000U)
+        << neighbors;
   }
+}
+
+TEST(SignedLink, HearsARobotInWhoseNameAndAddressAnInsiderFillsTheChannel) {
+  SignedPair pair;
+  pair.run_until(101.0);
+  std::uint32_t ahead = 0;
+  pair.attack = [&] {
+    OutgoingPeerMessage message = forged(pair);
+    message.sequence += ahead++ % 60;
+    pair.deliver(kSeal->seal(signer_of(kLost)->sign(encode_peer_message(message).bytes)), kTwo);
+  };
+  pair.received.clear();
+  pair.run_until(106.0);  // 1000 a second, 70 % of a channel of 6 Mbit/s
+
+  EXPECT_GE(pair.received.size(), 124U);
+  EXPECT_GE(pair.count(MeshCounter::kRefusedSignatureWrong), 4900U);
+  EXPECT_EQ(pair.count(MeshCounter::kRefusedSignatureUnchecked), 0U);
 }
 
 /// Reports with 100 forged datagrams a millisecond.
