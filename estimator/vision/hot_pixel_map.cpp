@@ -21,6 +21,12 @@ std::uint8_t median_around(const GrayImage& image, int u, int v) {
 
 }  // namespace
 
+HotPixelMap::HotPixelMap() {
+  suspects_.reserve(kMaxSuspects);
+  known_.reserve(kMaxSuspects);
+  new_.reserve(kMaxNew);
+}
+
 bool HotPixelMap::is_before(const Suspect& a, const Suspect& b) {
   return a.v != b.v ? a.v < b.v : a.u < b.u;
 }
@@ -59,9 +65,15 @@ void HotPixelMap::admit() {
   std::sort(new_.begin(), new_.end(), is_before);
   const auto is_same = [](const Suspect& a, const Suspect& b) { return a.u == b.u && a.v == b.v; };
   new_.erase(std::unique(new_.begin(), new_.end(), is_same), new_.end());
-  const auto middle = static_cast<std::ptrdiff_t>(suspects_.size());
-  suspects_.insert(suspects_.end(), new_.begin(), new_.end());
-  std::inplace_merge(suspects_.begin(), suspects_.begin() + middle, suspects_.end(), is_before);
+  // Merged from the end, in place.
+  std::size_t old_count = suspects_.size();
+  std::size_t new_count = new_.size();
+  suspects_.resize(old_count + new_count);
+  while (new_count > 0) {
+    Suspect& last = suspects_[old_count + new_count - 1];
+    const bool is_old = old_count > 0 && is_before(new_[new_count - 1], suspects_[old_count - 1]);
+    last = is_old ? suspects_[--old_count] : new_[--new_count];
+  }
   new_.clear();
 }
 

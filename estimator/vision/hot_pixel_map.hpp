@@ -17,6 +17,9 @@ class HotPixelMap {
   static constexpr int kKnown = 400;  ///< pictures: 2 s at 200 Hz
   static constexpr std::size_t kMaxSuspects = 8192;
 
+  /// Nothing is allocated later.
+  HotPixelMap();
+
   /// Looks at all suspects in the next picture; they shine from `level` on.
   void look(const GrayImage& image, int level);
   /// A pixel of a speck of light. Takes effect with the next look().

@@ -100,6 +100,7 @@ SpotDetector::SpotDetector(const VisionConfig& config) : config_(config) {
   groups_.reserve(kUsualBlobs);
   candidates_.reserve(kUsualBlobs);
   faint_.reserve(kUsualBlobs);
+  faint_places_.reserve(kUsualBlobs);
   spots_.reserve(kUsualBlobs);
 }
 

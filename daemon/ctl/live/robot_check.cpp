@@ -278,7 +278,7 @@ void check_air(const client::Status::Mesh& mesh, Section& section) {
   const std::string text =
       fmt::format("{} % of the air by all that are heard", fixed(100.0 * mesh.airtime_of_all, 1));
   const std::string advice =
-      "raise the Wi-Fi's basic rate and net.broadcast_mbps, or lower net.air_kbps";
+      "raise the Wi-Fi's basic rate and net.broadcast_mbps, or lower net.airtime_of_all";
   if (mesh.airtime_of_all > kFull) return section.fault(text, advice);
   if (mesh.airtime_of_all > kBusy) return section.doubt(text, advice);
   section.good(text);
