@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Reads back what `crepesctl convert --to mcap` writes, with a reader of its own: twice, from the beginning to the end and by the
 index, and against the recording's rows.
-    convert_test.py SOURCE crepesctl"""
+    mcap_files.py SOURCE crepesctl"""
 import csv
 import json
 import math
