@@ -145,6 +145,7 @@ struct TeamPose {
   /// Of [p, v, theta], theta a right perturbation.
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
   Timestamp last_sighting{};  ///< when anybody saw it, or it anybody
+  Duration clock_ahead{};     ///< its sensors' stamps are so much ahead of this robot's
 };
 
 /// What the team's filter knows of a robot's IMU.
@@ -163,10 +164,13 @@ struct TeamFault {
     kCameraTurned,   ///< its bearings are used with the misalignment that the team found
     kCameraRefused,  ///< it contradicts the team whatever its misalignment
     kRanges,         ///< its ranges are refused
+    kClock,          ///< its stamps are used with the offset that the team found
   };
   RobotId robot{};
   Kind kind = Kind::kCameraTurned;
-  double size = 0.0;  ///< [rad] of a camera, [m] of ranges, positive if they are too long
+  /// [rad] of a camera, [m] of ranges, positive if they are too long, [s] of a clock, positive if
+  /// it is ahead.
+  double size = 0.0;
 
   [[nodiscard]] bool operator==(const TeamFault&) const = default;
 };

@@ -57,6 +57,12 @@ FreeMotion RobotTrajectory::motion_at(double t_s) const {
   return step.moved(grid_[step.index].motion);
 }
 
+Eigen::Vector3d RobotTrajectory::velocity_F(double t_s, const Eigen::Vector3d& p_B) const {
+  const Step step = step_at(t_s);
+  const FreeMotion motion = step.moved(grid_[step.index].motion);
+  return motion.v_F + motion.q_F_B * step.w.cross(p_B);
+}
+
 const FreeMotionAt& RobotTrajectory::nearest(double t_s) const {
   const auto last = static_cast<double>(grid_.size() - 1);
   return grid_[static_cast<std::size_t>(std::clamp(std::round(t_s / kStepSeconds), 0.0, last))];

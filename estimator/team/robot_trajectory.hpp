@@ -42,6 +42,8 @@ class RobotTrajectory {
   [[nodiscard]] FreeMotionAt at(double t_s) const;
   /// The motion alone, which costs a tenth.
   [[nodiscard]] FreeMotion motion_at(double t_s) const;
+  /// Of a point of the body [m/s].
+  [[nodiscard]] Eigen::Vector3d velocity_F(double t_s, const Eigen::Vector3d& p_B) const;
   /// At the step nearest to `t_s`.
   [[nodiscard]] const FreeMotionAt& nearest(double t_s) const;
   [[nodiscard]] const FreeMotionAt& end() const { return grid_.back(); }

@@ -22,6 +22,9 @@ constexpr double kShareOfModules = 0.8;
 // An accelerometer's scale errors act as a bias that changes while the robot turns, and keeps its
 // direction for so long.
 constexpr double kTurnMemory = 1.0;  // s
+// What the mesh's clocks leave.
+constexpr double kClockSigma = 3e-3;  // s
+constexpr double kClockWalk = 1e-4;   // s/sqrt(s)
 
 /// Mean over an interval [rad/s].
 double turn_rate(const TeamMember& member) {
@@ -34,20 +37,24 @@ double turn_rate(const TeamMember& member) {
 struct Moved {
   int index = 0;
   int bias_index = 0;
+  int clock_index = 0;
   Eigen::Matrix<double, kMotion, kMotion> by_motion{};
   Eigen::Matrix<double, kMotion, kBias> by_bias{};
   Eigen::Matrix<double, kMotion, kBias> by_self_bias{};
   Eigen::Matrix<double, kMotion, kMotion> by_self{};  ///< by this robot's motion at the end
+  Eigen::Vector3d p_by_clock{};
   Eigen::Matrix<double, kMotion, kMotion> noise{};
 };
 
 /// With S this robot at the end of the interval, the new frame's motions are
-///   p' = R_S^T (p - p_S),  v' = R_S^T (v - v_S),  R' = R_S^T R,
-/// and their errors  dp' = R_S^T (dp - dp_S) + [p']x dtheta_S,  dv' likewise,
-/// dtheta' = dtheta - R'^T dtheta_S. `next` becomes the new motion.
-Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, FreeMotion& next) {
+///   p' = R_S^T (p - p_S + tau v_S),  v' = R_S^T (v - v_S),  R' = R_S^T R,
+/// because the robot is there tau before the new frame begins, and their errors
+///   dp' = R_S^T (dp - dp_S + tau dv_S + v_S dtau) + [p']x dtheta_S,
+///   dv' = R_S^T (dv - dv_S) + [v']x dtheta_S,  dtheta' = dtheta - R'^T dtheta_S.
+/// `next` becomes the new motion.
+Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, double clock_s, FreeMotion& next) {
   const Eigen::Matrix3d R_S_F = self.motion.R().transpose();
-  next.p_F = R_S_F * (end.motion.p_F - self.motion.p_F);
+  next.p_F = R_S_F * (end.motion.p_F - self.motion.p_F + clock_s * self.motion.v_F);
   next.v_F = R_S_F * (end.motion.v_F - self.motion.v_F);
   next.q_F_B = (self.motion.q_F_B.conjugate() * end.motion.q_F_B).normalized();
   Moved moved;
@@ -56,7 +63,9 @@ Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, FreeMotion& next)
   turn.block<3, 3>(0, 0) = R_S_F;
   turn.block<3, 3>(3, 3) = R_S_F;
   moved.by_self.setZero();
+  moved.p_by_clock = R_S_F * self.motion.v_F;
   moved.by_self.block<3, 3>(0, 0) = -R_S_F;
+  moved.by_self.block<3, 3>(0, 3) = clock_s * R_S_F;
   moved.by_self.block<3, 3>(3, 3) = -R_S_F;
   moved.by_self.block<3, 3>(0, 6) = hat(next.p_F);
   moved.by_self.block<3, 3>(3, 6) = hat(next.v_F);
@@ -77,12 +86,14 @@ void carry(const std::vector<Moved>& all, int self_bias,
                                       m.by_bias * P.middleRows<kBias>(m.bias_index) +
                                       m.by_self_bias * P.middleRows<kBias>(self_bias))
                                          .eval();
+    P.middleRows<3>(m.index) += m.p_by_clock * P.row(m.clock_index);
   }
   for (const Moved& m : all) {
     P.middleCols<kMotion>(m.index) = (P.middleCols<kMotion>(m.index) * m.by_motion.transpose() +
                                       P.middleCols<kBias>(m.bias_index) * m.by_bias.transpose() +
                                       P.middleCols<kBias>(self_bias) * m.by_self_bias.transpose())
                                          .eval();
+    P.middleCols<3>(m.index) += P.col(m.clock_index) * m.p_by_clock.transpose();
   }
   for (const Moved& a : all) {
     P.block<kMotion, kMotion>(a.index, a.index) += a.noise;
@@ -106,6 +117,7 @@ TeamBelief TeamBelief::beginning(const TeamInterval& interval) {
   TeamRobot& self = belief.robots[interval.self];
   self.bias_index = belief.append_calibration(interval.settings.priors);
   self.is_trusted = true;
+  belief.P(self.clock_index(), self.clock_index()) = kLeastVariance;  // it is what others err from
   return belief;
 }
 
@@ -125,6 +137,7 @@ int TeamBelief::append_calibration(const Priors& priors) {
   P.diagonal().segment<3>(index + 3).setConstant(
       std::max(accel_bias_variance(priors), kLeastVariance));
   append(1, std::sqrt(0.5 * kShareOfModules) * priors.range_bias_m);
+  append(1, kClockSigma);
   return index;
 }
 
@@ -198,6 +211,37 @@ GaussianPose TeamBelief::pose(RobotId id) const {
   return result;
 }
 
+TeamPose TeamBelief::team_pose(RobotId id, const TeamMember& member) const {
+  const TeamRobot& robot = robots.at(id);
+  const double tau = robot.clock_s;
+  const ImuMean& last = member.imu.back();
+  const Eigen::Vector3d rate = last.gyro_radps - robot.bias.gyro_radps;
+  const Eigen::Vector3d w = rate - robot.bias.gyro_scale * rate;
+  const Eigen::Vector3d a = robot.motion.q_F_B * (last.accel_mps2 - robot.bias.accel_mps2);
+  const Eigen::Vector3d v = robot.motion.v_F + tau * a;
+
+  using Matrix9d = Eigen::Matrix<double, kMotion, kMotion>;
+  Matrix9d by_motion = Matrix9d::Identity();
+  by_motion.block<3, 3>(0, 3).diagonal().setConstant(tau);
+  by_motion.block<3, 3>(6, 6) = so3_exp(-tau * w).toRotationMatrix();
+  Eigen::Matrix<double, kMotion, 1> by_clock;
+  by_clock << v, a, w;
+  const Matrix9d of_motion = P.block<kMotion, kMotion>(robot.motion_index, robot.motion_index);
+  const Eigen::Matrix<double, kMotion, 1> with_clock =
+      by_motion * P.block<kMotion, 1>(robot.motion_index, robot.clock_index());
+  const Matrix9d carried = by_motion.lazyProduct(of_motion);
+  Matrix9d covariance = carried.lazyProduct(by_motion.transpose());
+  covariance += with_clock * by_clock.transpose() + by_clock * with_clock.transpose() +
+                P(robot.clock_index(), robot.clock_index()) * by_clock * by_clock.transpose();
+  return {.neighbor = id,
+          .T_B_N = {robot.motion.p_F + tau * robot.motion.v_F + 0.5 * tau * tau * a,
+                    (robot.motion.q_F_B * so3_exp(tau * w)).normalized()},
+          .v_B_N = v,
+          .covariance = 0.5 * (covariance + covariance.transpose()),
+          .last_sighting = robot.last_sighting,
+          .clock_ahead = from_seconds(tau)};
+}
+
 Eigen::Matrix3d TeamBelief::position_covariance(RobotId from, RobotId to) const {
   const int i = robots.at(from).motion_index;
   const int j = robots.at(to).motion_index;
@@ -220,6 +264,7 @@ void TeamBelief::inject(const Eigen::VectorXd& dx) {
     robot.bias.accel_mps2 += dx.segment<3>(robot.bias_index + 3);
     robot.bias.gyro_scale += dx.segment<9>(robot.bias_index + 6).reshaped<Eigen::ColMajor>(3, 3);
     robot.antenna_delay_m += dx(robot.delay_index());
+    robot.clock_s += dx(robot.clock_index());
     for (TeamCamera& camera : robot.cameras) camera.misalignment += dx.segment<3>(camera.index);
   }
   for (auto& [pair, range] : ranges) range.bias_m += dx(range.index);
@@ -231,9 +276,10 @@ void TeamBelief::advance(const TeamInterval& interval) {
   std::vector<Moved> all;
   for (auto& [id, robot] : robots) {
     if (robot.motion_index < 0) continue;
-    all.push_back(moved(paths.at(id).end(), end_of_self, robot.motion));
+    all.push_back(moved(paths.at(id).end(), end_of_self, robot.clock_s, robot.motion));
     all.back().index = robot.motion_index;
     all.back().bias_index = robot.bias_index;
+    all.back().clock_index = robot.clock_index();
   }
   carry(all, robots.at(self).bias_index, end_of_self.noise, P);
   add_drift(interval);
@@ -251,6 +297,7 @@ void TeamBelief::add_drift(const TeamInterval& interval) {
         interval.settings.priors.accel_scale * kGravityMps2 * turn_rate(*interval.member(id));
     P.diagonal().segment<3>(robot.bias_index + 3).array() +=
         noise.accel_walk * noise.accel_walk * dt + turning * turning * kTurnMemory * dt;
+    if (id != self) P(robot.clock_index(), robot.clock_index()) += kClockWalk * kClockWalk * dt;
   }
   const double kept_bias = std::exp(-noise.range_bias_return / (1.0 - kShareOfModules) * dt);
   for (auto& [pair, range] : ranges) {

@@ -294,13 +294,7 @@ void TeamFilter::report(const TeamInterval& interval, TeamSolution& solution) co
                                sigma(robot.bias_index + 3)});
     // On probation it is known worse than by its pair's filter, if there is one.
     if (robot.motion_index < 0 || (!robot.is_trusted && has_own_edge(interval, id))) continue;
-    solution.poses.push_back(
-        {.neighbor = id,
-         .T_B_N = {robot.motion.p_F, robot.motion.q_F_B},
-         .v_B_N = robot.motion.v_F,
-         .covariance = belief_.P.block<FreeMotionAt::kMotion, FreeMotionAt::kMotion>(
-             robot.motion_index, robot.motion_index),
-         .last_sighting = robot.last_sighting});
+    solution.poses.push_back(belief_.team_pose(id, *interval.member(id)));
   }
   std::ranges::sort(solution.poses, {}, &TeamPose::neighbor);
   solution.faults = faults_of(belief_, interval.settings.priors);

@@ -33,6 +33,12 @@ void add_motion(const Eigen::Matrix<double, 2, 3>& by_p,
                   (3.0 * row.dimension);
 }
 
+/// Adds the derivatives by both clocks, for what moves with the neighbor.
+void add_clocks(const Eigen::Vector2d& by_neighbor, const TeamPair& pair, TeamRow& row) {
+  add_columns(pair.neighbor.clock_index(), by_neighbor, row);
+  add_columns(pair.observer.clock_index(), -by_neighbor, row);
+}
+
 /// From the camera to the neighbor's LEDs, in the observer's body frame.
 struct LineOfSight {
   Eigen::Matrix3d R_F_N;
@@ -65,7 +71,8 @@ Eigen::Matrix2d TeamRow::covariance(const Eigen::MatrixXd& P) const {
 std::optional<SightModel> SightModel::at(const TeamPair& pair, const TeamCamera& camera, double t_s,
                                          double sigma_rad) {
   const FreeMotionAt& i = pair.observer_path.nearest(t_s);
-  const FreeMotionAt& j = pair.neighbor_path.nearest(t_s);
+  const double t_j_s = pair.neighbor_time_s(t_s);
+  const FreeMotionAt& j = pair.neighbor_path.nearest(t_j_s);
   const LineOfSight line = line_of_sight(pair, camera, i.motion, j.motion);
   const double distance = line.d.norm();
   if (distance < kMinDistance) return std::nullopt;
@@ -87,13 +94,16 @@ std::optional<SightModel> SightModel::at(const TeamPair& pair, const TeamCamera&
              row);
   add_columns(camera.index, -across * hat(direction) * so3_right_jacobian(camera.misalignment),
               row);
+  add_clocks(
+      by_d * line.R_B_F * pair.neighbor_path.velocity_F(t_j_s, pair.neighbor_arms.p_body_led), pair,
+      row);
   return model;
 }
 
 std::optional<Eigen::Vector2d> SightModel::residual(const TeamPair& pair, const TeamCamera& camera,
                                                     const Eigen::Vector3d& u_B, double t_s) const {
   const LineOfSight line = line_of_sight(pair, camera, pair.observer_path.motion_at(t_s),
-                                         pair.neighbor_path.motion_at(t_s));
+                                         pair.neighbor_path.motion_at(pair.neighbor_time_s(t_s)));
   const Eigen::Vector3d then = so3_exp(camera.misalignment) * line.d.normalized();
   const Eigen::Vector3d u = shortest_rotation(then, predicted_) * u_B;
   const double cosine = predicted_.dot(u);
@@ -106,10 +116,11 @@ std::optional<Eigen::Vector2d> SightModel::residual(const TeamPair& pair, const 
 std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias,
                                  const RangeReading& reading, double t_s,
                                  const Eigen::Matrix3d& covariance) {
+  const double t_j_s = pair.neighbor_time_s(t_s);
   const FreeMotionAt& i = pair.observer_path.nearest(t_s);
-  const FreeMotionAt& j = pair.neighbor_path.nearest(t_s);
+  const FreeMotionAt& j = pair.neighbor_path.nearest(t_j_s);
   const FreeMotion now_i = pair.observer_path.motion_at(t_s);
-  const FreeMotion now_j = pair.neighbor_path.motion_at(t_s);
+  const FreeMotion now_j = pair.neighbor_path.motion_at(t_j_s);
   const Eigen::Vector3d& q_i = pair.observer_arms.p_body_uwb;
   const Eigen::Vector3d& q_j = pair.neighbor_arms.p_body_uwb;
   const Eigen::Vector3d d = now_j.p_F + now_j.q_F_B * q_j - now_i.p_F - now_i.q_F_B * q_i;
@@ -131,6 +142,7 @@ std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias
   add_motion(in_first_row(u), in_first_row(-u * now_j.R() * hat(q_j)), j, pair.neighbor, row);
   for (const int index : {pair.observer.delay_index(), pair.neighbor.delay_index(), bias.index})
     add_columns(index, Eigen::Vector2d(1.0, 0.0), row);
+  add_clocks(Eigen::Vector2d(u.dot(pair.neighbor_path.velocity_F(t_j_s, q_j)), 0.0), pair, row);
 
   const Eigen::Matrix<double, 3, 2> across = tangent_basis(d / distance);
   const Eigen::Matrix2d P = across.transpose() * covariance * across;

@@ -13,7 +13,7 @@ namespace crepes {
 
 /// A measurement of one or two dimensions, z = h(x) + residual, and the states that it depends on.
 struct TeamRow {
-  static constexpr int kMaxColumns = 2 * FreeMotionAt::kStart + 3;
+  static constexpr int kMaxColumns = 2 * FreeMotionAt::kStart + 5;
 
   int dimension = 0;
   int size = 0;  ///< of the columns that are used
@@ -34,12 +34,19 @@ struct TeamPair {
   const TeamMember& neighbor_arms;
   const RobotTrajectory& observer_path;
   const RobotTrajectory& neighbor_path;
+
+  /// The neighbor's clock when the observer's shows `t_s`.
+  [[nodiscard]] double neighbor_time_s(double t_s) const {
+    return t_s + neighbor.clock_s - observer.clock_s;
+  }
 };
 
 /// All bearings of one camera to one robot within an interval are one measurement: the errors of
 /// lens and spot last longer than that. `reading`s are turned to the instant `t_s` of the row.
 ///
 ///   u = Exp(m) d / |d|,  d = R_i^T (p_j + R_j l_j - p_i) - c_i
+///
+/// with robot j at its own clock's time t + tau_j - tau_i. All times are by the observer's clock.
 class SightModel {
  public:
   /// Empty if the robots are too near to each other.

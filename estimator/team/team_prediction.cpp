@@ -23,7 +23,7 @@ TeamPose predicted(const TeamPose& pose, const TeamImus& imus, Timestamp from, T
     const Timestamp next = std::min(to, t + TeamInterval::kStep);
     const double dt = to_seconds(next - t);
     const ImuMean mean_B = imus.imu_B.mean(t, next);
-    const ImuMean mean_N = imus.imu_N.mean(t, next);
+    const ImuMean mean_N = imus.imu_N.mean(t + pose.clock_ahead, next + pose.clock_ahead);
     const BodyRates body = rates(mean_B, imus.bias_B);
     const BodyRates neighbor = rates(mean_N, imus.bias_N);
     const RelativeMotion before = motion;

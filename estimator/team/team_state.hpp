@@ -43,13 +43,15 @@ struct TeamCamera {
 };
 
 struct TeamRobot {
-  /// [gyroscope and accelerometer bias, the gyroscope's scale errors, antenna delay]
-  static constexpr int kCalibration = FreeMotionAt::kBias + 1;
+  /// [gyroscope and accelerometer bias, the gyroscope's scale errors, antenna delay, clock]
+  static constexpr int kCalibration = FreeMotionAt::kBias + 2;
 
   FreeMotion motion{};
   ImuBias bias{};
   double antenna_delay_m = 0.0;  ///< of its module; lengthens all its ranges
-  int motion_index = -1;         ///< none for this robot
+  /// Its clock is so much ahead of this robot's. Its motion is by its own clock.
+  double clock_s = 0.0;
+  int motion_index = -1;  ///< none for this robot
   int bias_index = 0;
   std::vector<TeamCamera> cameras{};
   Timestamp last_sighting{};
@@ -59,6 +61,7 @@ struct TeamRobot {
   bool is_trusted = false;
 
   [[nodiscard]] int delay_index() const { return bias_index + FreeMotionAt::kBias; }
+  [[nodiscard]] int clock_index() const { return delay_index() + 1; }
 };
 
 /// The error of all ranges between two robots that their modules' antenna delays do not explain.

@@ -17,6 +17,7 @@ constexpr double kDoubtPerLoss = 4.0;
 constexpr double kWrongPriors = 4.0;
 constexpr double kWrongSigmas = 3.0;
 constexpr double kLeastMisalignment = radians(0.1);  // rad
+constexpr double kWrongClock = 8e-3;                 // s
 
 /// How many cameras agree with each robot's place, and how many contradict it.
 using Witnesses = std::map<RobotId, Agreement>;
@@ -101,6 +102,31 @@ void add_range_fault(const TeamBelief& belief, RobotId id, std::vector<TeamFault
     faults.push_back({id, TeamFault::Kind::kRanges, sum_m / contradicted});
 }
 
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+/// Clocks that differ from most others, this robot's among them.
+void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) {
+  if (belief.robots.size() < 3) return;
+  std::vector<double> ahead_s;
+  std::vector<double> variances;
+  for (const auto& [id, robot] : belief.robots) {
+    ahead_s.push_back(robot.clock_s);
+    variances.push_back(belief.P(robot.clock_index(), robot.clock_index()));
+  }
+  const double most_s = median(ahead_s);
+  const double variance = median(variances);
+  for (std::size_t i = 0; const auto& [id, robot] : belief.robots) {
+    const double size_s = robot.clock_s - most_s;
+    const double sigma_s = std::sqrt(variances[i++] + variance);
+    if (std::abs(size_s) > std::max(kWrongClock, kWrongSigmas * sigma_s))
+      faults.push_back({id, TeamFault::Kind::kClock, size_s});
+  }
+}
+
 }  // namespace
 
 std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBelief& belief) {
@@ -179,6 +205,7 @@ std::vector<TeamFault> faults_of(const TeamBelief& belief, const Priors& priors)
     add_camera_faults(belief, id, priors, faults);
     add_range_fault(belief, id, faults);
   }
+  add_clock_faults(belief, faults);
   return faults;
 }
 

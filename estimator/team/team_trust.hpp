@@ -45,7 +45,8 @@ class TeamTrust {
 /// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.
 void end_probations(TeamBelief& belief);
 
-/// Cameras that are turned or refused, and robots most of whose ranges are refused.
+/// Cameras that are turned or refused, robots most of whose ranges are refused, and clocks that are
+/// off.
 [[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief, const Priors& priors);
 
 }  // namespace crepes

@@ -20,6 +20,9 @@ std::string text_of(const TeamFault& fault) {
     case TeamFault::Kind::kRanges:
       return fmt::format("its ranges are {:.2f} m too {} and are left out; check its antenna delay",
                          std::abs(fault.size), fault.size > 0.0 ? "long" : "short");
+    case TeamFault::Kind::kClock:
+      return fmt::format("its clock is {:.0f} ms {} of the others'; check what stamps its sensors",
+                         1e3 * std::abs(fault.size), fault.size > 0.0 ? "ahead" : "behind");
   }
   return {};
 }

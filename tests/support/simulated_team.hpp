@@ -54,6 +54,8 @@ class SimulatedTeam {
   /// Which robot sees which, and what a robot measures is changed to.
   std::function<bool(RobotId, RobotId)> sees = [](RobotId, RobotId) { return true; };
   std::function<void(TeamInterval&)> damage = [](TeamInterval&) {};
+  /// How late a robot's IMU samples and bearings are stamped, in whole steps of the interval.
+  std::map<RobotId, double> late_s;
 
   /// The next interval, with estimates of direct neighbors that are wrong by a little.
   TeamInterval next() {
@@ -64,8 +66,10 @@ class SimulatedTeam {
     interval.settings = team_settings();
     std::map<RobotId, RobotTrajectory> paths;
     for (auto& [id, body] : bodies_) {
+      const std::vector<ImuMean> before = body.imu;
       body.imu = true_imu(body);
-      interval.members.push_back({id, p_body_led_, p_body_uwb_, measured(body)});
+      interval.members.push_back(
+          {id, p_body_led_, p_body_uwb_, measured(body, late(before, body.imu, late_s[id]))});
       paths.try_emplace(id, body.motion, ImuBias{}, body.imu, kIntervalSeconds, ProcessNoise{});
     }
     for (const auto& [i, from] : bodies_) {
@@ -118,8 +122,16 @@ class SimulatedTeam {
     return imu;
   }
 
-  std::vector<ImuMean> measured(const Body& body) {
-    std::vector<ImuMean> imu = body.imu;
+  // Of this interval by a clock that is ahead.
+  static std::vector<ImuMean> late(std::vector<ImuMean> before, const std::vector<ImuMean>& imu,
+                                   double late_s) {
+    const auto steps = static_cast<std::ptrdiff_t>(std::lround(late_s / 0.01));
+    before.insert(before.end(), imu.begin(), imu.end());
+    return {before.end() - std::ssize(imu) - std::min(steps, std::ssize(before) - std::ssize(imu)),
+            before.end() - steps};
+  }
+
+  std::vector<ImuMean> measured(const Body& body, std::vector<ImuMean> imu) {
     for (ImuMean& mean : imu) {
       mean.gyro_radps += body.bias.gyro_radps + random_.vector(1e-3 / std::sqrt(0.01));
       mean.accel_mps2 += body.bias.accel_mps2 + random_.vector(1e-2 / std::sqrt(0.01));
@@ -134,7 +146,7 @@ class SimulatedTeam {
     const Eigen::Vector3d d =
         from.q_F_B.conjugate() * (to.p_F + to.q_F_B * p_body_led_ - from.p_F) - p_body_camera_;
     const Eigen::Vector3d u = so3_exp(bodies_.at(i).misalignment) * d.normalized();
-    return {.stamp = now_ + from_seconds(t_s),
+    return {.stamp = now_ + from_seconds(t_s + late_s[i]),
             .neighbor = j,
             .u_B = so3_exp(error) * u,
             .p_B_C = p_body_camera_,

@@ -140,8 +140,12 @@ TEST(TeamFilter, FindsNoFaultInAHealthyTeam) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SimulatedTeam team(seed);
     TeamFilter filter;
-    for (double t = 0.0; t < 5.0; t += kIntervalSeconds)
-      EXPECT_TRUE(filter.step(team.next()).faults.empty()) << seed;
+    for (double t = 0.0; t < 5.0; t += kIntervalSeconds) {
+      for (const TeamFault& fault : filter.step(team.next()).faults) {
+        ADD_FAILURE() << "seed " << seed << " at " << t << " s, robot " << fault.robot.value
+                      << ": kind " << static_cast<int>(fault.kind) << ", " << fault.size;
+      }
+    }
   }
 }
 
@@ -194,6 +198,40 @@ TEST(TeamFilter, NamesRangesThatAreTooLong) {
     for (const TeamPose& pose : solution.poses)
       EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0) << seed;
   }
+}
+
+// All sensors of a robot are stamped 20 ms late. These robots are slow, so it takes some seconds.
+TEST(TeamFilter, NamesAClockThatIsOff) {
+  constexpr RobotId kLiar{4};
+  constexpr double kLate = 0.02;  // s
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.late_s[kLiar] = kLate;
+    TeamFilter filter;
+    const TeamSolution solution = solution_after(team, filter, 10.0);
+    ASSERT_EQ(solution.faults.size(), 1U) << seed;
+    const TeamFault& fault = solution.faults.front();
+    EXPECT_EQ(fault.robot, kLiar);
+    EXPECT_EQ(fault.kind, TeamFault::Kind::kClock);
+    EXPECT_NEAR(fault.size, kLate, 0.008) << seed;
+    for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+      const TeamPose* pose = find(solution, robot);
+      ASSERT_NE(pose, nullptr) << seed;
+      EXPECT_LT(nees_of(*pose, team.truth(robot)), 30.0) << seed;
+    }
+  }
+}
+
+// The frame moves on by what this robot's own clock says.
+TEST(TeamFilter, NamesItselfIfItsOwnClockIsOff) {
+  SimulatedTeam team(1);
+  team.late_s[kSelf] = 0.02;
+  TeamFilter filter;
+  const TeamSolution solution = solution_after(team, filter, 10.0);
+  ASSERT_EQ(solution.faults.size(), 1U);
+  EXPECT_EQ(solution.faults.front().robot, kSelf);
+  EXPECT_EQ(solution.faults.front().kind, TeamFault::Kind::kClock);
+  EXPECT_GT(solution.faults.front().size, 0.0);
 }
 
 // All estimates of a robot are a metre off at a sigma of 5 cm.
