@@ -303,7 +303,7 @@ TEST(EstimatorFaults, ABoardThatBlinksAnothersCodeForHalfASecondDoesLittleHarm) 
 
 TEST(EstimatorFaults, ReadsIdsThroughALensThatIsNotCalibratedAndFusesNoDirection) {
   const auto all = [](const EstimatorPair& pair, MeasurementKind kind) {
-    const auto& counts = pair.status().measurements.at(static_cast<std::size_t>(kind));
+    const auto counts = pair.status().measurements.at(static_cast<std::size_t>(kind));
     return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
   };
   EstimatorPair pair(1, [](EstimatorSettings& settings) {
