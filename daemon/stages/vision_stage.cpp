@@ -103,6 +103,7 @@ SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::ui
                                  {"delay_p99_us", p99_us},
                                  {"threshold", static_cast<std::uint64_t>(found.threshold)},
                                  {"background", static_cast<std::uint64_t>(found.background)},
+                                 {"hot_pixels", found.hot_pixels},
                                  {"hot", rejected.hot},
                                  {"huge", rejected.huge},
                                  {"faint", rejected.faint},
