@@ -15,7 +15,6 @@ namespace {
 
 constexpr int kMotion = FreeMotionAt::kMotion;
 constexpr int kBias = FreeMotionAt::kBias;
-constexpr double kLeastVariance = 1e-12;  // of a prior: one known exactly stays regular
 // A pair's range bias is mostly its modules' antenna delays, the same toward everybody: so much of
 // its variance. The rest is the pair's own, and drifts.
 constexpr double kShareOfModules = 0.8;

@@ -19,9 +19,8 @@ constexpr double kStartSpeed = 0.3;              // m/s
 constexpr double kUnknownDistance = 0.10;        // m; the least by which a step is judged
 constexpr double kLinear = 0.01;                 // rad, and relative to the distance
 constexpr int kMaxIterations = 4;
-constexpr double kAgreementMemory = 0.5;             // s
-constexpr std::size_t kMaxCameras = 4;               // of a robot, whatever it reports
-constexpr double kUnknownAlignment = radians(20.0);  // rad; sigma of a camera that is realigned
+constexpr double kAgreementMemory = 0.5;  // s
+constexpr std::size_t kMaxCameras = 4;    // of a robot, whatever it reports
 
 /// Whether this robot itself has an estimate of the other one, or is estimated by it.
 bool has_own_edge(const TeamInterval& interval, RobotId id) {
@@ -122,10 +121,11 @@ void TeamFilter::append_cameras(const TeamInterval& interval) {
     if (cameras.size() >= kMaxCameras ||
         std::ranges::find(cameras, p_B_C, &TeamCamera::p_B_C) != cameras.end())
       continue;
-    const bool is_unknown = trust_.is_realigned(reading.observer, belief_.stamp);
+    const auto turn = trust_.turn_covariance(reading.observer, belief_.stamp);
     cameras.push_back({.p_B_C = p_B_C,
-                       .index = belief_.append(3, is_unknown ? kUnknownAlignment : known),
-                       .is_refused = is_unknown && trust_.is_refused(reading.observer)});
+                       .index = belief_.append(3, known),
+                       .is_refused = turn && trust_.is_refused(reading.observer)});
+    if (turn) belief_.P.bottomRightCorner<3, 3>() = *turn;
   }
 }
 
@@ -271,14 +271,14 @@ void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const Gaus
   robot.motion_index = belief_.append(FreeMotionAt::kMotion, doubt * kStartSpeed);
   auto block = belief_.P.bottomRightCorner<FreeMotionAt::kMotion, FreeMotionAt::kMotion>();
   const Matrix6d& covariance = T_S_N.covariance;
-  const double turn = trust_.is_realigned(id, belief_.stamp) ? kUnknownAlignment : 0.0;
   block.topLeftCorner<3, 3>() = covariance.topLeftCorner<3, 3>();
   block.topLeftCorner<3, 3>().diagonal().array() += std::pow(doubt * kStartPosition, 2);
   block.topRightCorner<3, 3>() = covariance.topRightCorner<3, 3>();
   block.bottomLeftCorner<3, 3>() = covariance.bottomLeftCorner<3, 3>();
   block.bottomRightCorner<3, 3>() = covariance.bottomRightCorner<3, 3>();
-  block.bottomRightCorner<3, 3>().diagonal().array() +=
-      std::pow(doubt * kStartAttitude, 2) + turn * turn;
+  block.bottomRightCorner<3, 3>().diagonal().array() += std::pow(doubt * kStartAttitude, 2);
+  if (const auto turn = trust_.turn_covariance(id, belief_.stamp))
+    block.bottomRightCorner<3, 3>() += *turn;
   robot.bias_index = belief_.append_calibration(interval.settings.priors);
   robot.last_sighting = belief_.stamp;
   robot.since = belief_.stamp;

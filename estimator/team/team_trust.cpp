@@ -1,5 +1,6 @@
 #include "estimator/team/team_trust.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -17,15 +18,58 @@ constexpr double kDoubtPerLoss = 4.0;
 constexpr double kWrongPriors = 4.0;
 constexpr double kWrongSigmas = 3.0;
 constexpr double kLeastMisalignment = radians(0.1);  // rad
-constexpr double kWrongClock = 8e-3;                 // s
+constexpr double kTurnedChi2 = 25.0;                 // exceeded by one right camera in 65,000
+// Sigmas of a turned camera about the axis of its turn, and across.
+constexpr double kTurn = radians(20.0);       // rad
+constexpr double kTurnAcross = radians(2.0);  // rad
+constexpr double kWrongClock = 8e-3;          // s
 
 /// How many cameras agree with each robot's place, and how many contradict it.
 using Witnesses = std::map<RobotId, Agreement>;
 using Robots = std::map<RobotId, TeamRobot>;
 
-/// A camera may be misaligned by so much. A configuration may claim to know it exactly.
-double largest_misalignment(const Priors& priors) {
-  return kWrongPriors * std::max(priors.misalignment_rad, kLeastMisalignment);
+/// A configuration may claim to know it exactly.
+double believed_misalignment(const Priors& priors) {
+  return std::max(priors.misalignment_rad, kLeastMisalignment);
+}
+
+/// What was measured of a camera's misalignment, against its prior.
+struct MisalignmentTest {
+  double chi2 = 0.0;  ///< of three degrees of freedom, if the camera is as it was calibrated
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< its significant components
+};
+
+/// The estimate is drawn to zero by its prior, so a turn shows long before the estimate is large:
+/// the difference of two estimates, the later of which knows more, has the difference of their
+/// covariances (Hausman 1978). In the axes of that difference, what was measured alone has the mean
+/// m P0 / (P0 - P) and the variance P P0 / (P0 - P).
+MisalignmentTest tested(const TeamBelief& belief, const TeamCamera& camera, const Priors& priors) {
+  constexpr double kObserved =
+      1e-4;  // of the prior's variance; an axis that taught less is unknown
+  const double prior = std::max(std::pow(priors.misalignment_rad, 2), TeamBelief::kLeastVariance);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> learned(
+      prior * Eigen::Matrix3d::Identity() - belief.P.block<3, 3>(camera.index, camera.index));
+  MisalignmentTest test;
+  for (int i = 0; i < 3; ++i) {
+    const double difference = learned.eigenvalues()(i);
+    if (difference < kObserved * prior) continue;
+    const Eigen::Vector3d axis = learned.eigenvectors().col(i);
+    const double mean = axis.dot(camera.misalignment) * prior / difference;
+    const double variance = (prior - difference) * prior / difference;
+    const double chi2 = mean * mean / (variance + std::pow(believed_misalignment(priors), 2));
+    test.chi2 += chi2;
+    test.turn += chi2 * mean * axis;
+  }
+  return test;
+}
+
+/// Of a camera that is turned about this axis, in the body's axes. Its length does not matter;
+/// zero: any.
+Eigen::Matrix3d turned_covariance(const Eigen::Vector3d& axis) {
+  const Eigen::Matrix3d along = axis.isZero(0.0)
+                                    ? Eigen::Matrix3d::Identity().eval()
+                                    : (axis * axis.transpose() / axis.squaredNorm()).eval();
+  return kTurn * kTurn * along + kTurnAcross * kTurnAcross * Eigen::Matrix3d::Identity();
 }
 
 /// A camera that is refused or excluded is no witness.
@@ -79,7 +123,8 @@ void add_camera_faults(const TeamBelief& belief, RobotId id, const Priors& prior
     const double sigma = std::sqrt(belief.P.diagonal().segment<3>(camera.index).maxCoeff());
     if (camera.is_refused) {
       faults.push_back({id, TeamFault::Kind::kCameraRefused, angle});
-    } else if (angle > largest_misalignment(priors) && angle > kWrongSigmas * sigma) {
+    } else if (angle > kWrongPriors * believed_misalignment(priors) &&
+               angle > kWrongSigmas * sigma) {
       faults.push_back({id, TeamFault::Kind::kCameraTurned, angle});
     }
   }
@@ -100,6 +145,20 @@ void add_range_fault(const TeamBelief& belief, RobotId id, std::vector<TeamFault
   }
   if (contradicted >= 2 && 2 * contradicted > measured)
     faults.push_back({id, TeamFault::Kind::kRanges, sum_m / contradicted});
+}
+
+/// Trusted robots measure other distances to it than it does to them, and its place fits its own.
+bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {
+  return std::ranges::any_of(belief.ranges, [&](const auto& entry) {
+    const auto& [pair, range] = entry;
+    if (pair.first != id && pair.second != id) return false;
+    const RobotId other = pair.first == id ? pair.second : pair.first;
+    const auto of_other = range.agreement.find(other);
+    const auto own = range.agreement.find(id);
+    return belief.robots.at(other).is_trusted && of_other != range.agreement.end() &&
+           of_other->second.is_contradiction() && own != range.agreement.end() &&
+           !own->second.is_contradiction();
+  });
 }
 
 double median(std::vector<double> values) {
@@ -134,7 +193,7 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
     return is_turned(belief.robots, observer, camera);
   });
   // A robot that was away may have been repaired.
-  std::erase_if(realigned_,
+  std::erase_if(verdicts_,
                 [&](const auto& entry) { return interval.member(entry.first) == nullptr; });
   std::vector<RobotId> lost;
   for (const auto& [id, robot] : belief.robots) {
@@ -149,24 +208,42 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
 }
 
 std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamBelief& belief) {
-  const double most = largest_misalignment(interval.settings.priors);
   std::vector<RobotId> turned;
   for (const auto& [id, robot] : belief.robots) {
-    const bool is_unknown = is_realigned(id, belief.stamp);
-    if (std::ranges::any_of(robot.cameras, [&](const TeamCamera& camera) {
-          return is_turned(belief.robots, id, camera) ||
-                 (!is_unknown && camera.misalignment.norm() > most);
-        }))
+    const bool was_realigned = is_realigned(id, belief.stamp);
+    for (const TeamCamera& camera : robot.cameras) {
+      const bool contradicts = is_turned(belief.robots, id, camera);
+      const MisalignmentTest test =
+          was_realigned ? MisalignmentTest{} : tested(belief, camera, interval.settings.priors);
+      if (!contradicts && test.chi2 <= kTurnedChi2) continue;
+      convict(id, belief.stamp, turned_covariance(test.turn));
       turned.push_back(id);
+      break;
+    }
   }
-  for (const RobotId id : turned)
-    realigned_[id] = {.since = belief.stamp, .is_refused = is_realigned(id, belief.stamp)};
   return turned;
 }
 
+/// Whoever was found turned before and once, was found so while this one strained the team.
+void TeamTrust::convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance) {
+  Verdict& verdict = verdicts_[robot];
+  verdict.is_refused = is_realigned(robot, now);
+  verdict.is_withdrawn = false;
+  verdict.since = now;
+  verdict.covariance = covariance;
+  ++verdict.count;
+  for (auto& [id, other] : verdicts_)
+    if (id != robot && other.count == 1) other.is_withdrawn = true;
+}
+
+std::optional<Eigen::Matrix3d> TeamTrust::turn_covariance(RobotId robot, Timestamp now) const {
+  if (!is_realigned(robot, now)) return std::nullopt;
+  return verdicts_.at(robot).covariance;
+}
+
 bool TeamTrust::is_realigned(RobotId robot, Timestamp now) const {
-  const auto found = realigned_.find(robot);
-  return found != realigned_.end() &&
+  const auto found = verdicts_.find(robot);
+  return found != verdicts_.end() && found->second.count > 0 && !found->second.is_withdrawn &&
          (!found->second.is_refused || now - found->second.since < kRefusal);
 }
 
@@ -195,7 +272,9 @@ void end_probations(TeamBelief& belief) {
   for (auto& [id, robot] : belief.robots) {
     const Agreement& agreement = all[id];
     const bool is_long_enough = belief.stamp - robot.since >= kProbation;
-    if (is_long_enough && agreement.fused > 4.0 * agreement.gated + 2.0) robot.is_trusted = true;
+    if (is_long_enough && agreement.fused > 4.0 * agreement.gated + 2.0 &&
+        !is_placed_by_its_own_ranges(belief, id))
+      robot.is_trusted = true;
   }
 }
 

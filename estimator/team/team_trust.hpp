@@ -1,7 +1,9 @@
 /// Whose measurements contradict the others'.
 #pragma once
 
+#include <Eigen/Core>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "estimator/team/team_belief.hpp"
@@ -16,14 +18,15 @@ class TeamTrust {
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
   /// Robots with a camera that is turned, newly. Such a robot has a wrong attitude too. It must
-  /// start anew with a camera whose direction is unknown, so that the others' measurements
-  /// determine it. If that camera contradicts them again, it is refused.
+  /// start anew with a camera that may be turned, so that the others' measurements determine it. If
+  /// that camera contradicts them again, it is refused.
   [[nodiscard]] std::vector<RobotId> turned(const TeamInterval& interval, const TeamBelief& belief);
 
-  /// The directions of its cameras are unknown.
-  [[nodiscard]] bool is_realigned(RobotId robot, Timestamp now) const;
+  /// How uncertain the misalignment of its cameras is, and likewise its attitude, in its body's
+  /// axes [rad^2]. None if its cameras are as they were calibrated.
+  [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot, Timestamp now) const;
   /// A realigned robot's cameras contradicted the others after that, too.
-  [[nodiscard]] bool is_refused(RobotId robot) const { return realigned_.at(robot).is_refused; }
+  [[nodiscard]] bool is_refused(RobotId robot) const { return verdicts_.at(robot).is_refused; }
   /// How many times less certain a robot starts that was contradicted of late.
   [[nodiscard]] double doubt(RobotId robot, Timestamp now) const;
 
@@ -32,14 +35,19 @@ class TeamTrust {
     Timestamp last{};
     int count = 0;
   };
-  struct Realignment {
+  struct Verdict {
     Timestamp since{};
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    int count = 0;  ///< how often its cameras were found turned
     bool is_refused = false;
+    bool is_withdrawn = false;
   };
+  void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
+  [[nodiscard]] bool is_realigned(RobotId robot, Timestamp now) const;
   [[nodiscard]] int recent_losses(RobotId robot, Timestamp now) const;
 
   std::map<RobotId, Losses> losses_;
-  std::map<RobotId, Realignment> realigned_;
+  std::map<RobotId, Verdict> verdicts_;
 };
 
 /// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.

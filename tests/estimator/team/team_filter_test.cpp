@@ -36,6 +36,11 @@ double nees_of(const TeamPose& pose, const Pose& truth) {
   return e.dot(P.llt().solve(e));
 }
 
+double position_nees_of(const TeamPose& pose, const Pose& truth) {
+  const Eigen::Vector3d e = error_of(pose, truth).head<3>();
+  return e.dot(pose.covariance.topLeftCorner<3, 3>().llt().solve(e));
+}
+
 TeamSolution solution_after(SimulatedTeam& team, TeamFilter& filter, double seconds) {
   TeamSolution solution;
   for (double t = 0.0; t < seconds; t += kIntervalSeconds) solution = filter.step(team.next());
@@ -136,6 +141,43 @@ const TeamFault* fault_of(const TeamSolution& solution, RobotId robot) {
   return found == solution.faults.end() ? nullptr : &*found;
 }
 
+// Robots that start from what a turned camera sees take its carrier to be turned. Then only motion
+// contradicts it, little by little. It is found before the others are wrong beyond their
+// covariance.
+TEST(TeamFilter, ACameraThatWasTurnedFromTheBeginningLeavesTheOthersHonest) {
+  constexpr RobotId kLiar{4};
+  int beyond = 0;
+  int named = 0;
+  constexpr int kSeeds = 20;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    SimulatedTeam team(seed);
+    const Eigen::Quaterniond turn = so3_exp(radians(20.0) * Eigen::Vector3d::UnitZ());
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamBearing& b : interval.bearings)
+        if (b.observer == kLiar) b.bearing.u_B = turn * b.bearing.u_B;
+      for (RelativePoseEdge& edge : interval.edges) {
+        Pose& T = edge.T_from_to.pose;
+        if (edge.to == kLiar) T = T * Pose{Eigen::Vector3d::Zero(), turn.conjugate()};
+        if (edge.from == kLiar) T = Pose{Eigen::Vector3d::Zero(), turn} * T;
+      }
+    };
+    TeamFilter filter;
+    TeamSolution solution;
+    for (double t = 0.0; t < 12.0; t += kIntervalSeconds) {
+      solution = filter.step(team.next());
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        if (pose != nullptr && position_nees_of(*pose, team.truth(robot)) > 35.0) ++beyond;
+      }
+    }
+    named += fault_of(solution, kLiar) != nullptr ? 1 : 0;
+    for (const RobotId robot : {kSelf, RobotId{2}, RobotId{3}})
+      EXPECT_EQ(fault_of(solution, robot), nullptr) << "seed " << seed;
+  }
+  EXPECT_LE(beyond, 4);  // of some 4,700
+  EXPECT_GE(named, kSeeds - 1);
+}
+
 TEST(TeamFilter, FindsNoFaultInAHealthyTeam) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SimulatedTeam team(seed);
@@ -177,6 +219,41 @@ TEST(TeamFilter, NamesATurnedCamera) {
     }
   }
   EXPECT_GE(measured, 2);
+}
+
+// As when its pair's filter believed it from the beginning: its place fits its own ranges, and all
+// others' contradict. Nobody else is drawn along.
+TEST(TeamFilter, ARobotThatStartsByItsOwnLongRangesMovesNobody) {
+  constexpr RobotId kLiar{4};
+  int beyond = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      const std::vector<TeamRange> by_one = interval.ranges;
+      for (TeamRange range : by_one) {
+        std::swap(range.observer, range.neighbor);
+        interval.ranges.push_back(range);
+      }
+      for (TeamRange& range : interval.ranges)
+        if (range.observer == kLiar) range.reading.range_m += 1.0;
+      for (RelativePoseEdge& edge : interval.edges)
+        if (edge.from == kLiar || edge.to == kLiar)
+          edge.T_from_to.pose.p += edge.T_from_to.pose.p.normalized();
+    };
+    TeamFilter filter;
+    for (double t = 0.0; t < 8.0; t += kIntervalSeconds) {
+      const bool are_alone = t < kProbation;
+      team.sees = [=](RobotId i, RobotId j) {
+        return !are_alone || std::set{i, j} == std::set{kSelf, kLiar};
+      };
+      const TeamSolution solution = filter.step(team.next());
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        if (pose != nullptr && position_nees_of(*pose, team.truth(robot)) > 35.0) ++beyond;
+      }
+    }
+  }
+  EXPECT_EQ(beyond, 0);
 }
 
 TEST(TeamFilter, NamesRangesThatAreTooLong) {
@@ -247,6 +324,10 @@ TEST(TeamFilter, ARobotThatStartsAtAWrongPlaceMovesNobody) {
     };
     TeamFilter filter;
     for (double t = 0.0; t < 8.0; t += kIntervalSeconds) {
+      const bool are_alone = t < kProbation;
+      team.sees = [=](RobotId i, RobotId j) {
+        return !are_alone || std::set{i, j} == std::set{kSelf, kLiar};
+      };
       for (const TeamPose& pose : filter.step(team.next()).poses) {
         if (pose.neighbor == kLiar) continue;
         EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 40.0) << seed << " at " << t;
