@@ -190,6 +190,14 @@ void check_driver(const std::string& key, const CameraConfig& camera, RuleFaults
     faults.push_back({key + ".offset", "driver mindvision reads out the whole sensor"});
 }
 
+void check_rows(const std::string& key, const CameraCalibration& camera, RuleFaults& faults) {
+  const double readout_s =
+      1e-6 * std::abs(camera.rolling_shutter_us_per_row) * camera.resolution[1];
+  if (readout_s > 1.0 / camera.rate_hz)
+    faults.push_back({key + ".rolling_shutter_us_per_row",
+                      "all rows together take longer than a frame at rate_hz"});
+}
+
 void check_cameras(const std::vector<CameraConfig>& cameras, RuleFaults& faults) {
   if (cameras.empty())
     faults.push_back({"cameras", "is empty: without a camera nobody is recognized"});
@@ -205,6 +213,7 @@ void check_cameras(const std::vector<CameraConfig>& cameras, RuleFaults& faults)
     const Eigen::Vector3d& arm = cameras[i].calibration.T_cam_imu.p;
     if (!(arm.cwiseAbs().maxCoeff() <= kMostArm_m))
       faults.push_back({key + ".T_cam_imu", "moves by more than 5 m: the unit is metres"});
+    check_rows(key, cameras[i].calibration, faults);
     check_driver(key, cameras[i], faults);
   }
 }

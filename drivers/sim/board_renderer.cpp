@@ -133,7 +133,7 @@ void BoardRenderer::expose(const MovingBoard& moving, std::uint64_t index, doubl
       double t = t_step;
       auto uv = camera_.project(moving.T_C_M(t) * p_M);
       for (int round = 0; uv && effects_.row_delay_s > 0.0 && round < 2; ++round) {
-        t = t_step + effects_.row_delay_s * (uv->y() - 0.5 * camera_.height());
+        t = t_step + effects_.row_delay_s * (uv->y() - 0.5 * (camera_.height() - 1));
         uv = camera_.project(moving.T_C_M(t) * p_M);
       }
       if (!uv || !moving.is_lit(t)) continue;

@@ -71,6 +71,7 @@ RingRenderer::RingRenderer(const SimWorld& world, RobotId robot, CameraModel mod
       model_(std::move(model)),
       index_(index),
       T_C_B_(camera.T_cam_imu),
+      row_delay_s_(1e-6 * camera.rolling_shutter_us_per_row),
       noise_{kCameraKey, static_cast<std::uint64_t>(world.seed()), robot.value, index} {
   T_C_B_.q = so3_exp(kMisalignment * noise_.gaussian3(0)) * T_C_B_.q;
   grain_.resize(kGrain);
@@ -101,11 +102,22 @@ std::optional<Eigen::Vector2d> RingRenderer::project(const Eigen::Vector3d& p_W,
   return uv && model_.contains(*uv) ? uv : std::nullopt;
 }
 
+double RingRenderer::exposure_s(const Board& board, double t_s) const {
+  constexpr int kRounds = 2;  // the row moves little while the rows are read
+  double exposed_s = t_s;
+  for (int round = 0; row_delay_s_ != 0.0 && round < kRounds; ++round) {
+    const auto uv = project_ring(board.robot, exposed_s);
+    if (uv) exposed_s = t_s + row_delay_s_ * (uv->y() - 0.5 * (model_.height() - 1));
+  }
+  return exposed_s;
+}
+
 std::vector<RingRenderer::View> RingRenderer::views(double t_s) const {
   std::vector<View> views;
   for (const Board& board : boards_) {
-    const auto center = project_ring(board.robot, t_s);
-    const std::vector<Blob> blobs = blobs_of(board, t_s);
+    const double exposed_s = exposure_s(board, t_s);
+    const auto center = project_ring(board.robot, exposed_s);
+    const std::vector<Blob> blobs = blobs_of(board, exposed_s);
     if (!center || blobs.empty()) continue;
     double reach = 0.0;
     double peak = 0.0;
@@ -206,7 +218,7 @@ Frame RingRenderer::render(double t_s) {
               .pixels = clean_pixels()};
   LoanedFrame loaned{frame.pixels.data(), {}};
   for (const Board& board : boards_) {
-    const std::vector<Blob> blobs = blobs_of(board, t_s);
+    const std::vector<Blob> blobs = blobs_of(board, exposure_s(board, t_s));
     if (!blobs.empty()) loaned.touched.push_back(draw(blobs, frame.pixels));
   }
   // The memory of this frame may be that of an earlier frame that was never recycled.

@@ -76,6 +76,8 @@ class RingRenderer {
   RingRenderer(const SimWorld& world, RobotId robot, CameraModel model,
                const CameraCalibration& camera, std::uint8_t index);
 
+  /// When the rows of the board's image are exposed in the frame of `t_s`.
+  [[nodiscard]] double exposure_s(const Board& board, double t_s) const;
   [[nodiscard]] std::vector<Blob> blobs_of(const Board& board, double t_s) const;
   [[nodiscard]] Rectangle draw(const std::vector<Blob>& blobs, std::vector<std::uint8_t>& pixels);
   [[nodiscard]] std::vector<std::uint8_t> clean_pixels();
@@ -84,7 +86,8 @@ class RingRenderer {
   RobotId robot_;
   CameraModel model_;
   std::uint8_t index_;
-  Pose T_C_B_;  ///< true value
+  Pose T_C_B_;          ///< true value
+  double row_delay_s_;  ///< of a rolling shutter; frames have the time of the middle row
   SeededNoise noise_;
   std::vector<Board> boards_;
   std::vector<std::uint8_t> background_;

@@ -30,6 +30,9 @@ struct CameraCalibration {
   double rate_hz = 200.0;
   Pose T_cam_imu;
   double timeshift_cam_imu = 0.0;
+  /// A frame's stamp belongs to its middle row, number (height - 1) / 2; row v is exposed
+  /// (v - (height - 1) / 2) times this after it. Negative where the bottom row comes first.
+  double rolling_shutter_us_per_row = 0.0;
   bool calibrated = true;
 
   [[nodiscard]] bool operator==(const CameraCalibration&) const = default;
@@ -52,6 +55,9 @@ struct CameraCalibration {
     v.field("rate_hz", rate_hz, Bounds{10, 1000}, "frames per second");
     v.required("T_cam_imu", T_cam_imu, "4x4, maps body coordinates to camera coordinates (Kalibr)");
     v.field("timeshift_cam_imu", timeshift_cam_imu, Bounds{-1, 1}, "t_imu = t_cam + shift [s]");
+    v.field("rolling_shutter_us_per_row", rolling_shutter_us_per_row, Bounds{-200, 200},
+            "how much later each row is exposed than the one above; a frame's stamp is that of its "
+            "middle row; 0: global shutter");
     v.field("calibrated", calibrated,
             "false: lens and mounting are a guess, good enough to record and to calibrate; no pose "
             "comes from this camera");

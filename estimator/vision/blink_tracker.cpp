@@ -40,6 +40,7 @@ BlinkTracker::BlinkTracker(const CameraCalibration& camera, CameraModel model,
       T_B_C_(camera.T_cam_imu.inverse()),
       T_C_B_(camera.T_cam_imu),
       timeshift_(from_seconds(camera.timeshift_cam_imu)),
+      row_delay_s_(1e-6 * camera.rolling_shutter_us_per_row),
       decoder_(library, config, camera.rate_hz, own) {
   period_ = from_seconds(1.0 / camera.rate_hz);
   timeout_ = std::max(from_seconds(config.track_timeout_ms * 1e-3), decoder_.longest_dark());
@@ -59,8 +60,8 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
   // A frame that was lost shows nothing, not even darkness.
   const Duration looked = now_ ? std::min(stamp - *now_, 3 * period_ / 2) : Duration{};
   predict(stamp);
-  unproject(frame);
-  const Pairing& sighting_of = assign(stamp);
+  unproject(frame, stamp);
+  const Pairing& sighting_of = assign();
 
   std::vector<Bearing> bearings;
   unclear_.clear();
@@ -70,7 +71,7 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
     Track& track = tracks_[t];
     const Sighting& sighting = sightings_[*sighting_of[t]];
     is_taken_[*sighting_of[t]] = true;
-    if (hides_another(t, sighting_of, stamp)) {
+    if (hides_another(t, sighting_of)) {
       ++counts_.merged_spots;
       unclear_.push_back(*sighting_of[t]);
       track.last_seen = stamp;
@@ -94,7 +95,7 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
     if (is_hidden(tracks_[t])) {
       tracks_[t].is_ambiguous = true;
     } else {
-      observe_absence(tracks_[t], stamp);
+      observe_absence(tracks_[t]);
     }
   }
   retire(stamp);
@@ -106,7 +107,19 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
   return bearings;
 }
 
-void BlinkTracker::unproject(const SpotFrame& frame) {
+/// The middle of the exposure of a row. The stamp is that of the middle row.
+Timestamp BlinkTracker::exposure_of(double v_px, Timestamp stamp) const {
+  return stamp + from_seconds(row_delay_s_ * (v_px - 0.5 * (model_.height() - 1)));
+}
+
+Timestamp BlinkTracker::exposure_of(const Track& track, Timestamp stamp) const {
+  if (row_delay_s_ == 0.0) return stamp;
+  const auto uv = model_.project(T_C_B_.q * track.u_B);
+  return uv && model_.contains(*uv) ? exposure_of(uv->y(), stamp) : stamp;
+}
+
+/// Directions in the body at `stamp`:  u = R_B(stamp)_B(exposed) u_B(exposed).
+void BlinkTracker::unproject(const SpotFrame& frame, Timestamp stamp) {
   sightings_.clear();
   for (const Spot& spot : frame.spots) {
     CameraModel::UnprojectionJacobian J;
@@ -119,7 +132,11 @@ void BlinkTracker::unproject(const SpotFrame& frame) {
     const double px_rad = std::sqrt(0.5 * J.squaredNorm());
     sightings_.push_back({.u_B = T_B_C_.q * *u_C,
                           .radius_rad = std::sqrt(spot.area_px2 / std::numbers::pi) * px_rad,
-                          .px_rad = px_rad});
+                          .px_rad = px_rad,
+                          .exposed = exposure_of(spot.v_px, stamp)});
+    Sighting& sighting = sightings_.back();
+    if (row_delay_s_ != 0.0 && !imu_.empty())
+      sighting.u_B = imu_.rotation(stamp, sighting.exposed) * sighting.u_B;
   }
   // Not the order of the file but of the world: ties are broken alike for every order of spots.
   std::sort(sightings_.begin(), sightings_.end(), [](const Sighting& a, const Sighting& b) {
@@ -147,6 +164,7 @@ void BlinkTracker::predict(Timestamp stamp) {
                       q * dt * dt * dt / 3.0 + std::pow(kGyroSigma * dt, 2);
     track.covariance += dt * track.rate_variance + q * dt * dt / 2.0;
     track.rate_variance += q * dt;
+    track.exposed = exposure_of(track, stamp);
   }
   now_ = stamp;
 }
@@ -160,12 +178,13 @@ double BlinkTracker::gate_of(const Track& track) const {
 /// The pairing of the greatest likelihood. A pair's benefit is the log likelihood of finding the
 /// track there and lit, against a new source there and the track dark:
 ///   ln p / (1 - p)  -  d^2 / 2 s^2  -  ln 2 pi s^2 n,   n new sources a steradian.
-const BlinkTracker::Pairing& BlinkTracker::assign(Timestamp stamp) {
+const BlinkTracker::Pairing& BlinkTracker::assign() {
   pairs_.clear();
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     const Track& track = tracks_[t];
     const double gate = gate_of(track);
-    const double lit = decoder_.lit_probability(track.evidence, stamp).value_or(kLitProbability);
+    const double lit =
+        decoder_.lit_probability(track.evidence, track.exposed).value_or(kLitProbability);
     const double log_odds = std::log(lit / (1.0 - lit));
     const double newness = track.hits < kEstablishedHits ? kNewness : 0.0;
     const auto first = std::partition_point(
@@ -190,13 +209,12 @@ bool BlinkTracker::is_established(const Track& track) const {
 }
 
 /// Whether another board that may well be lit has no spot of its own but could be in this one.
-bool BlinkTracker::hides_another(std::size_t track, const Pairing& sighting_of,
-                                 Timestamp stamp) const {
+bool BlinkTracker::hides_another(std::size_t track, const Pairing& sighting_of) const {
   const Sighting& sighting = sightings_[*sighting_of[track]];
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     const Track& other = tracks_[t];
     if (t == track || sighting_of[t] || !is_established(other)) continue;
-    const double lit = decoder_.lit_probability(other.evidence, stamp).value_or(1.0);
+    const double lit = decoder_.lit_probability(other.evidence, other.exposed).value_or(1.0);
     const double reach = other.seen.radius_rad + sighting.radius_rad + kMergePx * sighting.px_rad;
     if (lit > kMinLitProbability && distance2(other.u_B, sighting.u_B) < reach * reach) return true;
   }
@@ -243,16 +261,16 @@ void BlinkTracker::observe(Track& track, const Sighting& sighting, Timestamp sta
   track.is_ambiguous = false;
   ++track.hits;
 
-  decoder_.observe_lit(track.evidence, stamp, phases_);
-  decoder_.learn(track.evidence, stamp, phases_);
+  decoder_.observe_lit(track.evidence, sighting.exposed, phases_);
+  decoder_.learn(track.evidence, sighting.exposed, phases_);
   if (!was_assigned && track.evidence.assigned)
     ++counts_.decodes[decoder_.code_id(*track.evidence.assigned)];
   if (was_assigned && !track.evidence.assigned) ++counts_.lost_ids;
 }
 
-void BlinkTracker::observe_absence(Track& track, Timestamp stamp) const {
+void BlinkTracker::observe_absence(Track& track) const {
   const auto uv = model_.project(T_C_B_.q * track.u_B);
-  if (uv && model_.contains(*uv)) decoder_.observe_dark(track.evidence, stamp);
+  if (uv && model_.contains(*uv)) decoder_.observe_dark(track.evidence, track.exposed);
 }
 
 void BlinkTracker::retire(Timestamp stamp) {
@@ -286,7 +304,7 @@ void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp) {
   track.seen = sighting;
   track.last_seen = stamp;
   track.hits = 1;
-  decoder_.observe_lit(track.evidence, stamp, phases_);
+  decoder_.observe_lit(track.evidence, sighting.exposed, phases_);
   tracks_.push_back(std::move(track));
 }
 

@@ -32,8 +32,9 @@ struct TrackerStatus {
 };
 
 /// Follows spots as directions in the body frame, turned by the gyro between frames, and reads
-/// what they blink. The same ID seen twice gives two bearings: which is the mirror image is for
-/// the estimator to decide.
+/// what they blink. Directions seen by a rolling shutter are turned by the gyro from the exposure
+/// of their row to the frame's stamp, and blinks are read at that exposure. The same ID seen twice
+/// gives two bearings: which is the mirror image is for the estimator to decide.
 class BlinkTracker {
  public:
   /// `own`: the robot that carries the camera. It sees itself in mirrors only; never reported.
@@ -51,6 +52,7 @@ class BlinkTracker {
     Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
     double radius_rad = 0.0;  ///< of the blob
     double px_rad = 0.0;      ///< what a pixel subtends here
+    Timestamp exposed{};      ///< middle of its row's exposure, body time
   };
   struct Track {
     Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
@@ -60,7 +62,8 @@ class BlinkTracker {
     double variance = 0.0;                               ///< of the direction, per axis [rad^2]
     double covariance = 0.0;
     double rate_variance = 0.0;
-    Sighting seen;  ///< the latest
+    Timestamp exposed{};  ///< of its row in the frame at hand
+    Sighting seen;        ///< the latest
     Timestamp last_seen{};
     Duration unseen{};          ///< in frames since; those that were lost do not count
     bool is_ambiguous = false;  ///< since then it may have been in a spot with another
@@ -70,18 +73,19 @@ class BlinkTracker {
   /// The sighting of each track, for those that have one.
   using Pairing = std::vector<std::optional<std::size_t>>;
 
-  void unproject(const SpotFrame& frame);
+  void unproject(const SpotFrame& frame, Timestamp stamp);
+  [[nodiscard]] Timestamp exposure_of(double v_px, Timestamp stamp) const;
+  [[nodiscard]] Timestamp exposure_of(const Track& track, Timestamp stamp) const;
   void predict(Timestamp stamp);
   [[nodiscard]] double gate_of(const Track& track) const;
-  [[nodiscard]] const Pairing& assign(Timestamp stamp);
+  [[nodiscard]] const Pairing& assign();
   [[nodiscard]] bool is_established(const Track& track) const;
-  [[nodiscard]] bool hides_another(std::size_t track, const Pairing& sighting_of,
-                                   Timestamp stamp) const;
+  [[nodiscard]] bool hides_another(std::size_t track, const Pairing& sighting_of) const;
   [[nodiscard]] bool is_hidden(const Track& track) const;
   void observe(Track& track, const Sighting& sighting, Timestamp stamp);
   [[nodiscard]] bool is_another(const Track& track, const Sighting& sighting,
                                 Timestamp stamp) const;
-  void observe_absence(Track& track, Timestamp stamp) const;
+  void observe_absence(Track& track) const;
   void retire(Timestamp stamp);
   void begin(const Sighting& sighting, Timestamp stamp);
 
@@ -91,7 +95,8 @@ class BlinkTracker {
   Pose T_C_B_;
   Duration timeshift_{};
   Duration timeout_{};
-  Duration period_{};  ///< of frames
+  Duration period_{};         ///< of frames
+  double row_delay_s_ = 0.0;  ///< of a rolling shutter
   IdDecoder decoder_;
   ImuHistory imu_;
   PhaseMemory phases_;

@@ -187,6 +187,27 @@ TEST(RingRenderer, RefusesCamerasAndMembersThatDoNotWork) {
   EXPECT_FALSE(RingRenderer::make(world, RobotId{1}, swarm, forward_camera(), 0));
 }
 
+TEST(RingRenderer, ExposesRowAfterRowWhereTheShutterRolls) {
+  constexpr double kRow = 10e-6;  // s
+  const SimWorld world(config_of(SimScenario::kTwo));
+  auto camera = forward_camera();
+  camera.rolling_shutter_us_per_row = 1e6 * kRow;
+  const auto rolling = RingRenderer::make(world, RobotId{1}, swarm_of(2), camera, 0);
+  const auto global = renderer_for(world, swarm_of(2));
+  ASSERT_TRUE(rolling);
+  double farthest_row = 0.0;
+  for (double t = 0.0; t < 20.0; t += 0.0317) {
+    for (const RingRenderer::View& view : rolling->views(t)) {
+      const double after = view.spot.v_px - 0.5 * (camera.resolution[1] - 1);
+      const auto uv = global.project_ring(view.robot, t + kRow * after);
+      ASSERT_TRUE(uv);
+      EXPECT_LT((*uv - Eigen::Vector2d(view.spot.u_px, view.spot.v_px)).norm(), 0.002);
+      farthest_row = std::max(farthest_row, std::abs(after));
+    }
+  }
+  EXPECT_GT(farthest_row, 30.0) << "or nothing was tested";
+}
+
 TEST(SimCamera, KeepsItsBeatAndMissesFramesRatherThanFallBehind) {
   const SimWorld world(config_of(SimScenario::kTwo));
   ManualClock machine;

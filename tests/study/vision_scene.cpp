@@ -20,12 +20,13 @@ constexpr double kNear_px = 2.0;
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr Timestamp kStart{std::chrono::seconds{100}};
 
-CameraCalibration fisheye() {
+CameraCalibration fisheye(double row_delay_s = 0.0) {
   CameraCalibration camera;
   camera.name = "cam0";
   camera.intrinsics = {-0.1723, 0.5931, 316.8, 316.6, 638.2, 512.5};
   camera.resolution = {1280, 1024};
   camera.rate_hz = 1.0 / kFrame_s;
+  camera.rolling_shutter_us_per_row = 1e6 * row_delay_s;
   Eigen::Matrix3d R_C_B;
   R_C_B << 0, -1, 0, 0, 0, -1, 1, 0, 0;
   camera.T_cam_imu.q = Eigen::Quaterniond(R_C_B);
@@ -137,7 +138,7 @@ class Trial {
   explicit Trial(const VisionScene& scene)
       : scene_(scene),
         stage_(scene),
-        camera_(fisheye()),
+        camera_(fisheye(scene.effects.row_delay_s)),
         model_(CameraModel::from(camera_).value()),
         ours_(library_of(patterns(false))),
         blinking_(library_of(patterns(scene.is_foreign))),
@@ -211,6 +212,11 @@ class Trial {
     return lit / kSteps;
   }
 
+  /// How much later than the middle of the picture the row is exposed.
+  [[nodiscard]] double exposed_after_s(const Eigen::Vector2d& uv) const {
+    return scene_.effects.row_delay_s * (uv.y() - 0.5 * (model_.height() - 1));
+  }
+
   [[nodiscard]] bool is_counted(const Eigen::Vector2d& uv) const {
     if (scene_.effects.glare) {  // in front of it nothing can be seen
       const Eigen::Vector2d d = uv - scene_.effects.glare->center;
@@ -267,7 +273,8 @@ class Trial {
       Board& board = boards_[i];
       if (is_found[i] && !board.first_id_s) board.first_id_s = board.glimpsed_s;
       if (!(scene_.is_hidden && scene_.is_hidden(i, t_s))) board.glimpsed_s += kFrame_s;
-      if (!centers[i] || !is_counted(*centers[i]) || share_lit(i, t_s) < 0.5) continue;
+      if (!centers[i] || !is_counted(*centers[i])) continue;
+      if (share_lit(i, t_s + exposed_after_s(*centers[i])) < 0.5) continue;
       ++score_.all_lit;
       if (t_s < 1.0) continue;
       ++score_.lit;

@@ -463,6 +463,10 @@ TEST(ConfigFile, RefusesWhatACamerasDriverCannotDo) {
   EXPECT_EQ(with("exposure_us: 5000"),
             "f:10: cameras[0].exposure_us: is longer than a frame at rate_hz");
   EXPECT_EQ(with("exposure_us: 4999"), "");
+  EXPECT_EQ(with("rolling_shutter_us_per_row: -4.9"),
+            "f:10: cameras[0].rolling_shutter_us_per_row: all rows together take longer than a "
+            "frame at rate_hz");
+  EXPECT_EQ(with("rolling_shutter_us_per_row: 4.4"), "");
   EXPECT_EQ(with("driver: v4l2"), "f:7: cameras[0].device: driver v4l2 needs one, as /dev/video0");
   EXPECT_NE(with("driver: v4l2\n    device: d\n    trigger: hardware").find(".trigger:"),
             std::string::npos);

@@ -13,12 +13,7 @@ using namespace std::chrono_literals;
 /// Boards and lamps in front of one camera at 200 Hz; positions in a world whose axes are the
 /// body's at rest, origin at the body.
 class BlinkTrackerTest : public testing::Test {
- protected:
-  struct Board {
-    std::size_t code;  ///< index into the library
-    std::function<Eigen::Vector3d(double)> p_W;
-  };
-
+ public:
   static SwarmConfig swarm() {
     SwarmConfig swarm;
     for (const char* pattern : {"001001011111111111", "001010101111111111", "001011110011111111"}) {
@@ -40,6 +35,12 @@ class BlinkTrackerTest : public testing::Test {
     config.timeshift_cam_imu = 0.002;
     return config;
   }
+
+ protected:
+  struct Board {
+    std::size_t code;  ///< index into the library
+    std::function<Eigen::Vector3d(double)> p_W;
+  };
 
   /// What the tracker makes of the next frame; nothing if the frame is lost.
   std::vector<Bearing> step(bool is_lost = false) {
@@ -249,6 +250,66 @@ TEST_F(BlinkTrackerTest, RefusesAndCountsWhatMakesNoSense) {
   EXPECT_EQ(status.refused_frames, 1U);
   EXPECT_EQ(status.refused_imu, 1U);
   EXPECT_EQ(status.tracks, 0U);
+}
+
+/// A board that shines always but in one slot, seen by a camera that turns to and fro by up to 2.6
+/// rad/s; rows are exposed one after the other, or all at once if `row_us` is 0. `told_us` is what
+/// the tracker believes. The error of its bearings [px], root mean square.
+double error_of_a_turning_camera(double row_us, double told_us, std::uint32_t seed) {
+  constexpr double kTurn = 2.6;
+  constexpr double kPace = 4.0;  // rad/s
+  constexpr double kNoise = 0.03;
+  CameraCalibration config = BlinkTrackerTest::camera();
+  config.T_cam_imu.p.setZero();
+  config.rolling_shutter_us_per_row = told_us;
+  const CameraModel model = *CameraModel::from(config);
+  const IdLibrary library = *IdLibrary::from(BlinkTrackerTest::swarm());
+  BlinkTracker tracker(config, model, VisionConfig{}, library);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, kNoise);
+  const double height = std::uniform_real_distribution<double>(0.3, 0.7)(random);
+  const Eigen::Vector3d u_W = Eigen::Vector3d(1.0, 0.1, seed % 2 == 0 ? height : -height);
+  const auto u_B = [&](double t) {
+    const double yaw = kTurn / kPace * std::sin(kPace * t);
+    return Eigen::Vector3d(Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()) * u_W.normalized());
+  };
+  double sum = 0.0;
+  int count = 0;
+  for (double t = 0.0; t < 3.0; t += 0.005) {
+    ImuSample imu;
+    imu.stamp = Timestamp{from_seconds(100.002 + t)};
+    imu.gyro_radps.z() = kTurn * std::cos(kPace * (t - 0.0025));
+    tracker.add_imu(imu);
+    double exposed = t;
+    for (int round = 0; round < 3; ++round)
+      exposed = t + 1e-6 * row_us *
+                        (model.project(config.T_cam_imu.q * u_B(exposed))->y() -
+                         0.5 * (model.height() - 1));
+    SpotFrame frame{.stamp = Timestamp{from_seconds(100.0 + t)}, .camera = 0, .spots = {}};
+    if (library.entries()[0].code.is_lit(from_seconds(200.002 + exposed))) {
+      const Eigen::Vector2d uv = *model.project(config.T_cam_imu.q * u_B(exposed));
+      frame.spots.push_back({uv.x() + noise(random), uv.y() + noise(random), 12.0, 255.0});
+    }
+    for (const Bearing& bearing : tracker.step(frame)) {
+      sum += (*model.project(config.T_cam_imu.q * bearing.u_B) -
+              *model.project(config.T_cam_imu.q * u_B(t)))
+                 .squaredNorm();
+      ++count;
+    }
+  }
+  EXPECT_GT(count, 250) << "of some 600 frames";
+  return std::sqrt(sum / count);
+}
+
+TEST(BlinkTracker, TurnsWhatARollingShutterSawToTheStampOfTheFrame) {
+  for (std::uint32_t seed = 1; seed <= 8; ++seed) {
+    const double global = error_of_a_turning_camera(0.0, 0.0, seed);
+
+    EXPECT_LT(error_of_a_turning_camera(4.4, 4.4, seed), 1.1 * global) << "seed " << seed;
+    EXPECT_LT(error_of_a_turning_camera(-4.4, -4.4, seed), 1.1 * global) << "bottom row first";
+    EXPECT_GT(error_of_a_turning_camera(4.4, 0.0, seed), 5.0 * global) << "nobody told it";
+    EXPECT_GT(error_of_a_turning_camera(4.4, -4.4, seed), 10.0 * global) << "the wrong way round";
+  }
 }
 
 }  // namespace
