@@ -152,6 +152,7 @@ void BlinkTracker::predict(Timestamp stamp) {
       imu_.empty() ? Eigen::Quaterniond::Identity() : imu_.rotation(stamp, *now_);
   const double dt = to_seconds(stamp - *now_);
   const double q = kAccelDensity * kAccelDensity;
+  hidden_.turn(R_now_before);
   for (Track& track : tracks_) {
     track.u_B = (R_now_before * (track.u_B + track.rate_B * dt)).normalized();
     track.rate_B = R_now_before * track.rate_B;
@@ -281,10 +282,36 @@ void BlinkTracker::retire(Timestamp stamp) {
     const Duration patience = is_carried ? std::max(usual, kLongestAbsence) : usual;
     if (track.unseen <= patience && stamp - track.last_seen <= std::max(usual, kLongestAbsence))
       return false;
-    track.evidence.forget();
-    retired_.push_back(std::move(track.evidence));
+    keep_or_forget(track);
     return true;
   });
+  hidden_.drop_old(stamp, retired_);
+}
+
+/// What was seen for a moment only says little, but for what it continues.
+void BlinkTracker::keep_or_forget(Track& track) {
+  const bool is_brief = track.hits < kEstablishedHits && !track.evidence.expected;
+  if (!is_brief && !track.is_ambiguous && IdDecoder::is_worth_keeping(track.evidence)) {
+    hidden_.add({track.seen_B, track.steady_B, track.last_seen, std::move(track.evidence)},
+                retired_);
+  } else {
+    track.evidence.forget();
+    retired_.push_back(std::move(track.evidence));
+  }
+}
+
+/// Continues what was hidden, unless that board is in sight elsewhere.
+void BlinkTracker::resume(Track& track, const Sighting& sighting, Timestamp stamp) {
+  auto hidden = hidden_.take(sighting.u_B, stamp);
+  if (!hidden) return;
+  track.evidence = std::move(hidden->evidence);
+  decoder_.resume(track.evidence, sighting.exposed, hidden->stranger);
+  const auto& code = track.evidence.expected;
+  const bool is_elsewhere =
+      code && std::any_of(tracks_.begin(), tracks_.end(), [&](const Track& other) {
+        return other.evidence.assigned && other.evidence.assigned->code == *code;
+      });
+  if (is_elsewhere) track.evidence.forget();
 }
 
 void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp) {
@@ -293,7 +320,8 @@ void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp) {
     return;
   }
   Track track;
-  if (!retired_.empty()) {
+  resume(track, sighting, stamp);
+  if (track.evidence.score.empty() && !retired_.empty()) {
     track.evidence = std::move(retired_.back());
     retired_.pop_back();
   }

@@ -13,6 +13,7 @@
 #include "estimator/core/measurements.hpp"
 #include "estimator/vision/assignment.hpp"
 #include "estimator/vision/camera_model.hpp"
+#include "estimator/vision/hidden_lights.hpp"
 #include "estimator/vision/id_decoder.hpp"
 #include "estimator/vision/id_library.hpp"
 #include "estimator/vision/vision_config.hpp"
@@ -87,7 +88,9 @@ class BlinkTracker {
                                 Timestamp stamp) const;
   void observe_absence(Track& track) const;
   void retire(Timestamp stamp);
+  void keep_or_forget(Track& track);
   void begin(const Sighting& sighting, Timestamp stamp);
+  void resume(Track& track, const Sighting& sighting, Timestamp stamp);
 
   VisionConfig config_;
   CameraModel model_;
@@ -101,6 +104,7 @@ class BlinkTracker {
   ImuHistory imu_;
   PhaseMemory phases_;
   std::vector<Track> tracks_;
+  HiddenLights hidden_;
   std::optional<Timestamp> now_;
   TrackerStatus counts_;
 

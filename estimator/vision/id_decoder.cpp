@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "estimator/core/contract.hpp"
 
@@ -27,6 +28,7 @@ constexpr double kMarkovOdds = 1.0;    // a source that changes like a Markov ch
 constexpr double kLampOdds = 1.0;      // a lamp on the mains
 constexpr double kMirrorShare = 0.01;  // the observer's own board in a mirror
 constexpr double kReturnOdds = 100.0;  // a board that returns in its known phase
+constexpr double kStrangerOdds = 1.0;  // the same where another light is expected
 constexpr double kImageOdds = 0.1;     // a second image of a board that is in sight
 constexpr Duration kInSight = 200ms;   // a board counts as in sight for this long
 constexpr double kMaxSkew = 200e-6;    // between two crystals
@@ -34,7 +36,8 @@ constexpr Duration kPhaseError = 2500us;
 constexpr Duration kOldPhase = 30s;  // an older phase is too uncertain
 constexpr std::int64_t kPeriodsToLearn = 2;
 constexpr double kImpossible = -1e9;
-constexpr double kNegligible = 40.0;  // nats
+constexpr double kNegligible = 40.0;    // nats
+constexpr double kLeastLikely = -50.0;  // nats; of what is as good as excluded
 
 // If a track continues on another board, that board's code differs in a fifth of the frames.
 constexpr double kOtherDiffers = 0.2;
@@ -82,6 +85,10 @@ double log_mean(std::span<const std::int16_t> scores, std::int16_t top) {
          std::log(static_cast<double>(like_top) / static_cast<double>(scores.size()));
 }
 
+std::int16_t to_units(double nats) {
+  return static_cast<std::int16_t>(std::lround(kUnitsPerNat * nats));
+}
+
 /// The middle of the run of phases that share the best score.
 std::size_t best_phase(std::span<const std::int16_t> scores) {
   const std::size_t n = scores.size();
@@ -117,6 +124,8 @@ void BlinkEvidence::forget() {
   confidence = 0.0;
   doubt = 0.0;
   obstructed_doubt = 0.0;
+  earlier_markov = 0.0;
+  expected.reset();
 }
 
 void PhaseMemory::learn(const CodeMatch& match, Timestamp now) {
@@ -279,10 +288,79 @@ void IdDecoder::end_absence(BlinkEvidence& evidence, Timestamp stamp) const {
   evidence.obstructed_doubt = std::max(evidence.obstructed_doubt, doubt - kObstructedCost);
 }
 
+bool IdDecoder::is_worth_keeping(const BlinkEvidence& evidence) {
+  return is_identified(evidence) || (!evidence.assigned && !evidence.score.empty());
+}
+
+/// With s = p(stranger), likelihoods become those of a source that may have been replaced:
+///   L(code, phase) <- (1 - s) L(code, phase) / mean L + s.
+void IdDecoder::resume(BlinkEvidence& evidence, Timestamp now, double stranger) const {
+  if (!is_worth_keeping(evidence) || !evidence.last_lit) return evidence.forget();
+  if (evidence.assigned) {
+    expect(evidence, now - *evidence.last_lit);
+  } else {
+    summarize(evidence);
+  }
+  const std::int16_t least = to_units(std::log(stranger));
+  for (std::int16_t& score : evidence.score) score = std::max(score, least);
+  evidence.earlier_markov = std::max(evidence.earlier_markov, std::log(stranger));
+  evidence.window.clear();
+  evidence.pending_dark.clear();
+  evidence.last_lit.reset();
+  evidence.assigned.reset();
+  evidence.doubt = 0.0;
+  evidence.obstructed_doubt = 0.0;
+}
+
+/// All of the likelihood is with the assigned code, in the phases that its clock may have by now.
+void IdDecoder::expect(BlinkEvidence& evidence, Duration absence) const {
+  const CodeMatch was = *evidence.assigned;
+  const Code& code = codes_[was.code];
+  const auto n = static_cast<std::int64_t>(code.phases);
+  const std::int64_t reach = phase_reach(code, absence);
+  const double share = static_cast<double>(2 * reach + 1) / static_cast<double>(n);
+  evidence.score.assign(score_count_, to_units(kLeastLikely));
+  for (std::int64_t i = -reach; i <= reach; ++i) {
+    const std::int64_t at = (static_cast<std::int64_t>(was.phase) + i + n) % n;
+    evidence.score[code.first_score + static_cast<std::size_t>(at)] =
+        to_units(-std::log(share) - code.log_share);
+  }
+  evidence.earlier_markov = kLeastLikely;
+  evidence.expected = was.code;
+}
+
+void IdDecoder::summarize(BlinkEvidence& evidence) const {
+  const double mean = log_evidence(evidence);
+  const int shift = to_units(mean);
+  for (std::int16_t& score : evidence.score)
+    score = static_cast<std::int16_t>(std::clamp<int>(score - shift, to_units(kLeastLikely),
+                                                      std::numeric_limits<std::int16_t>::max()));
+  evidence.earlier_markov = log_markov(evidence) - mean;
+}
+
+/// The log of the mean likelihood of all sources, by their priors.
+double IdDecoder::log_evidence(const BlinkEvidence& evidence) const {
+  double top = log_markov(evidence) + std::log(kMarkovOdds);
+  double sum = 1.0;  // relative to the top
+  for (const Code& code : codes_) {
+    const auto scores = scores_of(evidence, code);
+    const double log_code = log_mean(scores, highest(scores)) + code.log_share;
+    sum = log_code > top ? sum * std::exp(top - log_code) + 1.0 : sum + std::exp(log_code - top);
+    top = std::max(top, log_code);
+  }
+  return top + std::log(sum / (1.0 + kMarkovOdds + kLampOdds));
+}
+
 void IdDecoder::learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const {
   if (!is_identified(evidence)) return;
   const Duration enough = kPeriodsToLearn * codes_[evidence.assigned->code].period;
   if (now - evidence.assigned_since >= enough) known.learn(*evidence.assigned, now);
+}
+
+/// So many steps a phase may be off that was known `age` ago.
+std::int64_t IdDecoder::phase_reach(const Code& code, Duration age) {
+  const Duration error = kPhaseError + from_seconds(kMaxSkew * to_seconds(age));
+  return error * static_cast<std::int64_t>(code.phases) / code.period + 1;
 }
 
 /// Log likelihood plus log prior of a code whose phase continues from its last sighting.
@@ -292,8 +370,7 @@ double IdDecoder::log_known(const BlinkEvidence& evidence, std::size_t code, Tim
   if (!phase || now - phase->learned > kOldPhase) return kImpossible;
   const auto scores = scores_of(evidence, codes_[code]);
   const auto n = static_cast<std::int64_t>(scores.size());
-  const Duration error = kPhaseError + from_seconds(kMaxSkew * to_seconds(now - phase->learned));
-  const std::int64_t reach = error * n / codes_[code].period + 1;
+  const std::int64_t reach = phase_reach(codes_[code], now - phase->learned);
   if (2 * reach >= n) return kImpossible;
   double likelihood = 0.0;
   for (std::int64_t i = -reach; i <= reach; ++i) {
@@ -301,7 +378,8 @@ double IdDecoder::log_known(const BlinkEvidence& evidence, std::size_t code, Tim
     likelihood +=
         std::exp((scores[static_cast<std::size_t>(at)] - scores[phase->phase]) / kUnitsPerNat);
   }
-  const double odds = now - phase->learned > kInSight ? kReturnOdds : kImageOdds;
+  const double returns = evidence.expected ? kStrangerOdds : kReturnOdds;
+  const double odds = now - phase->learned > kInSight ? returns : kImageOdds;
   const auto others = static_cast<double>(known.size() * static_cast<std::size_t>(2 * reach + 1));
   return scores[phase->phase] / kUnitsPerNat + std::log(likelihood * odds / others) +
          (own_ == code ? std::log(kMirrorShare) : 0.0);
@@ -318,7 +396,10 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
   double others = 0.0;  // posterior of all other codes, relative to the best one
   std::size_t best = 0;
   for (std::size_t c = 0; c < boards_; ++c) {
-    const double log_c = std::max(anywhere(codes_[c]), log_known(evidence, c, now, known));
+    // What is expected here in its phase has that in its score already.
+    const double log_c = c == evidence.expected
+                             ? anywhere(codes_[c])
+                             : std::max(anywhere(codes_[c]), log_known(evidence, c, now, known));
     if (log_c > best_log) {
       others = (others + 1.0) * std::exp(best_log - log_c);
       best_log = log_c;
@@ -327,12 +408,12 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
       others += std::exp(log_c - best_log);
     }
   }
-  double clutter = kMarkovOdds * std::exp(markov_.log_of(evidence.window.steps()) - best_log);
+  double clutter = kMarkovOdds * std::exp(log_markov(evidence) - best_log);
   for (std::size_t c = boards_; c < codes_.size(); ++c)
     clutter += std::exp(anywhere(codes_[c]) - best_log);
   if (best == own_ || others > max_wrong_id_ || clutter > max_false_robot_) return;
   evidence.assigned = {best, best_phase(scores_of(evidence, codes_[best]))};
-  evidence.assigned_since = now;
+  if (evidence.expected != best) evidence.assigned_since = now;
   evidence.confidence = 1.0 / (1.0 + others + clutter);
   evidence.doubt = 0.0;
   evidence.obstructed_doubt = 0.0;

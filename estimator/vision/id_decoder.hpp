@@ -30,11 +30,15 @@ struct BlinkEvidence {
   std::vector<std::int16_t> score;      ///< log likelihood of every code in every phase
   std::optional<Timestamp> last_lit;
   std::optional<CodeMatch> assigned;  ///< the decision; empty while undecided
-  Timestamp assigned_since{};
-  double confidence = 0.0;  ///< posterior probability of `assigned` when it was decided
-  double doubt = 0.0;       ///< log odds that another board has blinked here since; at least zero
+  Timestamp assigned_since{};         ///< over the times that it was hidden, too
+  double confidence = 0.0;            ///< posterior probability of `assigned` when it was decided
+  double doubt = 0.0;  ///< log odds that another board has blinked here since; at least zero
   /// The same if something hides the light in half of the frames, as a propeller does.
   double obstructed_doubt = 0.0;
+  /// Earlier sights of the light are in `score`, whose mean over all sources is 1 then, and in this
+  /// log likelihood of a two-state Markov chain, relative to that mean.
+  double earlier_markov = 0.0;
+  std::optional<std::size_t> expected;  ///< the code that it was last, if `score` has its phase
 
   /// Returns to the initial state. Allocated memory is kept.
   void forget();
@@ -81,6 +85,12 @@ class IdDecoder {
   /// again within longest_dark(), and no longer in a row than a code is dark: it was hidden then,
   /// which says nothing.
   void observe_dark(BlinkEvidence& evidence, Timestamp stamp) const;
+  /// The light of `evidence` was hidden, and one is seen at `now` where it is expected. What it
+  /// showed becomes the prior: it is the same light in its phase, or, with probability `stranger`,
+  /// any other. Without a code it has to be decided anew.
+  void resume(BlinkEvidence& evidence, Timestamp now, double stranger) const;
+  /// Whether resume() has something to go by.
+  [[nodiscard]] static bool is_worth_keeping(const BlinkEvidence& evidence);
   /// Stores the phase in `known` if the board has been identified for two periods.
   void learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const;
 
@@ -123,6 +133,13 @@ class IdDecoder {
   void decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory& known) const;
   void confirm(BlinkEvidence& evidence, BlinkObservation observation) const;
   void end_absence(BlinkEvidence& evidence, Timestamp stamp) const;
+  [[nodiscard]] static std::int64_t phase_reach(const Code& code, Duration age);
+  void expect(BlinkEvidence& evidence, Duration absence) const;
+  void summarize(BlinkEvidence& evidence) const;
+  [[nodiscard]] double log_evidence(const BlinkEvidence& evidence) const;
+  [[nodiscard]] double log_markov(const BlinkEvidence& evidence) const {
+    return markov_.log_of(evidence.window.steps()) + evidence.earlier_markov;
+  }
   [[nodiscard]] static double doubt_of(const BlinkEvidence& evidence);
 
   std::vector<Code> codes_;  ///< those of the library, then those of lamps

@@ -181,6 +181,54 @@ TEST_F(BlinkTrackerTest, DoesNotTakeALightBesideTheExpectedPlaceForTheBoardThatW
       ASSERT_LT(error_of(bearing, bearing.neighbor.value - 1U), 0.005) << "frame " << i;
 }
 
+TEST_F(BlinkTrackerTest, RecognizesInGlimpsesWhatItHasSeenBefore) {
+  // Each board shows itself for 144 ms, 0.8 of its pattern, and is hidden for 756 ms; the camera
+  // turns, and they move.
+  yaw_rate_radps_ = 0.1;
+  const auto glimpsed = [](double t, double phase, const Eigen::Vector3d& p) {
+    const double turns = t / 0.9 + phase;
+    return turns - std::floor(turns) < 0.16 ? p : Eigen::Vector3d(-5.0, 0.0, 0.0);
+  };
+  boards_ = {{0,
+              [&](double t) {
+                return glimpsed(t, 0.0, {5.0, 0.6 * t, 0.3});
+              }},
+             {1, [&](double t) {
+                return glimpsed(t, 0.4, {5.0, 0.6 * t + 3.0, 0.3});
+              }}};
+  std::size_t named = 0;
+  std::size_t lit = 0;
+  for (int i = 0; i < 1400; ++i) {
+    const auto bearings = step();
+    lit += frame_.spots.size();
+    named += bearings.size();
+    for (const Bearing& bearing : bearings)
+      ASSERT_LT(error_of(bearing, bearing.neighbor.value - 1U), 0.005) << "frame " << i;
+  }
+
+  EXPECT_GT(static_cast<double>(named), 0.15 * static_cast<double>(lit));
+}
+
+TEST_F(BlinkTrackerTest, DoesNotTakeANewBoardForTheOneThatWasHiddenThere) {
+  for (int trial = 0; trial < 60; ++trial) {
+    tracker_ = BlinkTracker(camera_, model_, VisionConfig{}, library_);
+    const double begin = to_seconds(now_.time_since_epoch()) - 100.0;
+    const double shows = begin + 1.8 + 0.013 * trial;
+    const auto shown = [](bool is_shown) {
+      return Eigen::Vector3d(is_shown ? 5.0 : -5.0, 0.0, 0.0);
+    };
+    boards_ = {{0, [=](double t) { return shown(t < begin + 1.0); }},
+               {1, [=](double t) { return shown(t >= shows); }}};
+    int seen = 0;
+    for (int i = 0; i < 900; ++i)
+      for (const Bearing& bearing : step()) {
+        ASSERT_LT(error_of(bearing, bearing.neighbor.value - 1U), 0.005) << "trial " << trial;
+        seen += bearing.neighbor == RobotId{2} ? 1 : 0;
+      }
+    EXPECT_GT(seen, 150);
+  }
+}
+
 TEST_F(BlinkTrackerTest, DeliversAMirrorImageBesideTheBoardItself) {
   boards_ = {{0, [](double) { return Eigen::Vector3d(5.0, 0.0, 0.5); }},
              {0, [](double) { return Eigen::Vector3d(5.0, 0.0, -2.0); }}};

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <random>
 #include <set>
@@ -262,6 +263,87 @@ TEST(IdDecoder, KeepsTheIdOfABoardOfWhichAFrameInTenIsMissed) {
     lit += later.lit_frames;
   }
   EXPECT_GT(named, 0.9 * lit);
+}
+
+/// Glimpses of 90 ms, one a second, of what `light(glimpse)` says; the IDs given in each.
+std::vector<std::set<int>> glimpse(const IdDecoder& decoder, int glimpses, unsigned seed,
+                                   const std::function<Light(int)>& light) {
+  std::vector<std::set<int>> ids;
+  BlinkEvidence evidence;
+  for (int i = 0; i < glimpses; ++i) {
+    const Duration start = 17s + i * 1s;
+    if (i > 0) decoder.resume(evidence, Timestamp{start}, 0.01);
+    const Light shown = light(i);
+    ids.push_back(watch(
+                      decoder, [&](Duration t) { return shown(t + start); }, 90ms,
+                      {.flip_rate = 0.005, .seed = seed + static_cast<unsigned>(i)}, start,
+                      &evidence)
+                      .ids);
+  }
+  return ids;
+}
+
+TEST(IdDecoder, AddsUpGlimpsesOfALightNoneOfWhichIsEnough) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, VisionConfig{}, 200.0);
+  int named_at_once = 0;
+  int named = 0;
+
+  for (unsigned trial = 0; trial < 200; ++trial) {
+    const auto& [id, code] = library.entries()[1 + trial % 3];
+    const Light seen = board(code, Duration{trial * 3'777'777}, 50.0);
+    const auto ids = glimpse(decoder, 7, 10 * trial, [&](int) { return seen; });
+
+    for (const auto& given : ids)
+      for (const int other : given) ASSERT_EQ(other, id.value) << "trial " << trial;
+    named_at_once += ids.front().empty() ? 0 : 1;
+    named += std::any_of(ids.begin(), ids.end(), [](const auto& g) { return !g.empty(); }) ? 1 : 0;
+  }
+
+  EXPECT_EQ(named_at_once, 0) << "half a pattern says little";
+  EXPECT_GT(named, 170);
+}
+
+TEST(IdDecoder, NeverNamesAnotherLightThatAppearsWhereOneIsExpected) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, VisionConfig{}, 200.0);
+  for (const int known_glimpses : {1, 4}) {
+    for (unsigned trial = 0; trial < 500; ++trial) {
+      const std::size_t first = 1 + trial % 3;
+      const std::size_t then = 1 + (trial + 1 + trial / 3 % 2) % 3;
+      const auto& [id, code] = library.entries()[then];
+      const Light before = board(library.entries()[first].code, Duration{trial * 1'777'777}, 50.0);
+      const Light after = board(code, Duration{trial * 7'333'333}, -50.0);
+      const auto ids = glimpse(decoder, known_glimpses + 3, 10 * trial,
+                               [&](int i) { return i < known_glimpses ? before : after; });
+
+      for (std::size_t i = static_cast<std::size_t>(known_glimpses); i < ids.size(); ++i)
+        for (const int given : ids[i]) ASSERT_EQ(given, id.value) << "trial " << trial;
+    }
+  }
+}
+
+TEST(IdDecoder, IsSoonSureOfABoardInThePhaseThatItHad) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, VisionConfig{}, 200.0);
+  std::vector<Duration> delays;
+  for (unsigned trial = 0; trial < 100; ++trial) {
+    const auto& [id, code] = library.entries()[1 + trial % 3];
+    const Light seen = board(code, Duration{trial * 1'777'777}, 80.0);
+    BlinkEvidence evidence;
+    (void)watch(decoder, seen, 600ms, {.seed = trial}, 17s, &evidence);
+    ASSERT_EQ(decoder.id_of(evidence), id);
+    decoder.resume(evidence, Timestamp{19s}, 1e-3);
+    ASSERT_FALSE(decoder.id_of(evidence)) << "it has to show itself";
+
+    const Outcome again = watch(
+        decoder, [&](Duration t) { return seen(t + 2s); }, 300ms, {.seed = trial}, 19s, &evidence);
+    ASSERT_EQ(again.ids, std::set<int>{id.value});
+    delays.push_back(*again.first_id);
+  }
+
+  std::sort(delays.begin(), delays.end());
+  EXPECT_LE(delays[delays.size() / 2], 100ms) << "a pattern is 180 ms";
 }
 
 }  // namespace
