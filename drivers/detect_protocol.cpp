@@ -40,7 +40,8 @@ constexpr std::array kCandidates{
     Candidate{SerialProtocol::kVectorNav, "vectornav", &VectorNav::examine},
     Candidate{SerialProtocol::kMicroStrain, "microstrain", &MicroStrain::examine},
     Candidate{SerialProtocol::kXsens, "xsens", &Xsens::examine},
-    Candidate{SerialProtocol::kMavlink, "mavlink", &Mavlink::examine}};
+    Candidate{SerialProtocol::kMavlink, "mavlink", &Mavlink::examine},
+    Candidate{SerialProtocol::kWitMotionBle, "witmotion_ble", &WitMotionBle::examine}};
 
 bool speaks(const Candidate& candidate, Bytes recent) {
   constexpr std::size_t kEnoughFrames = 3;

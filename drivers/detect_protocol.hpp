@@ -21,7 +21,8 @@ enum class SerialProtocol : std::uint8_t {
   kXsens,
   kMavlink,
   kVectorNav,
-  kMicroStrain
+  kMicroStrain,
+  kWitMotionBle
 };
 
 /// The name in the configuration; for NLink, the name of the product.

@@ -153,6 +153,8 @@ OpenDevice imu_device(SerialProtocol protocol, const ImuSensorSettings& settings
   const ImuPreprocessing preprocessing(settings);
   if (protocol == SerialProtocol::kWitMotion)
     return device_with(WitMotionParser(), preprocessing, clock, sink);
+  if (protocol == SerialProtocol::kWitMotionBle)
+    return device_with(WitMotionBleParser(), preprocessing, clock, sink);
   if (protocol == SerialProtocol::kHipnuc)
     return device_with(HipnucParser(), preprocessing, clock, sink);
   if (protocol == SerialProtocol::kXsens)
@@ -302,6 +304,8 @@ OpenDevice configured_imu(const ImuSensorSettings& settings, const Clock& clock,
   switch (settings.device.protocol) {
     case ImuProtocol::kWitMotion:
       return imu_device(SerialProtocol::kWitMotion, settings, clock, sink);
+    case ImuProtocol::kWitMotionBle:
+      return imu_device(SerialProtocol::kWitMotionBle, settings, clock, sink);
     case ImuProtocol::kHipnuc:
       return imu_device(SerialProtocol::kHipnuc, settings, clock, sink);
     case ImuProtocol::kXsens:

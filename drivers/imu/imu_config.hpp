@@ -19,7 +19,8 @@ enum class ImuProtocol : std::uint8_t {
   kXsens,
   kMavlink,
   kVectorNav,
-  kMicroStrain
+  kMicroStrain,
+  kWitMotionBle
 };
 inline constexpr std::array kImuProtocols{Choice{"auto", ImuProtocol::kAuto},
                                           Choice{"witmotion", ImuProtocol::kWitMotion},
@@ -27,7 +28,8 @@ inline constexpr std::array kImuProtocols{Choice{"auto", ImuProtocol::kAuto},
                                           Choice{"xsens", ImuProtocol::kXsens},
                                           Choice{"mavlink", ImuProtocol::kMavlink},
                                           Choice{"vectornav", ImuProtocol::kVectorNav},
-                                          Choice{"microstrain", ImuProtocol::kMicroStrain}};
+                                          Choice{"microstrain", ImuProtocol::kMicroStrain},
+                                          Choice{"witmotion_ble", ImuProtocol::kWitMotionBle}};
 
 /// What makes of a sensor's reading v the true T K (v - b), as imu_tk calibrates it.
 struct TriadConfig {

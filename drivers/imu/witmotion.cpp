@@ -20,7 +20,9 @@ constexpr double kRateUnit = radians(2000.0) / kFullScale;              // rad/s
 
 using Raw = Eigen::Vector3i;
 
-Raw raw_of(Bytes frame) { return vector_at<std::int16_t>(frame, 2).cast<int>(); }
+Raw raw_of(Bytes frame, std::size_t at = 2) {
+  return vector_at<std::int16_t>(frame, at).cast<int>();
+}
 
 bool is_saturated(const Raw& raw) { return raw.minCoeff() == -0x8000 || raw.maxCoeff() == 0x7fff; }
 
@@ -57,6 +59,20 @@ FrameCheck examine_one(Bytes bytes) {
   return {FrameKind::kComplete, kOne};
 }
 
+ImuReading reading_of(const Raw& accel, const Raw& gyro) {
+  const bool saturated = is_saturated(accel) || is_saturated(gyro);
+  return {.verdict = saturated ? ImuVerdict::kSaturated : ImuVerdict::kSample,
+          .gyro_radps = gyro.cast<double>() * kRateUnit,
+          .accel_mps2 = accel.cast<double>() * kAccelerationUnit};
+}
+
+constexpr std::uint8_t kBlePacket = 0x61;
+constexpr std::uint8_t kBleAnswer = 0x71;
+
+bool is_ble_beginning(std::uint8_t first, std::uint8_t second) {
+  return first == kWitMotionHeader && (second == kBlePacket || second == kBleAnswer);
+}
+
 }  // namespace
 
 FrameCheck WitMotion::examine(Bytes bytes) {
@@ -75,12 +91,29 @@ ImuReading WitMotion::read(Bytes frame) {
   const bool is_half = frame[1] == kAccelerationFrame || frame[1] == kRateFrame;
   if (frame.size() < kMaxFrame)
     return {.verdict = is_half ? ImuVerdict::kPartial : ImuVerdict::kOther};
-  const Raw accel = raw_of(frame);
-  const Raw gyro = raw_of(frame.subspan(kOne));
-  const bool saturated = is_saturated(accel) || is_saturated(gyro);
-  return {.verdict = saturated ? ImuVerdict::kSaturated : ImuVerdict::kSample,
-          .gyro_radps = gyro.cast<double>() * kRateUnit,
-          .accel_mps2 = accel.cast<double>() * kAccelerationUnit};
+  return reading_of(raw_of(frame), raw_of(frame.subspan(kOne)));
+}
+
+FrameCheck WitMotionBle::examine(Bytes bytes) {
+  constexpr std::size_t kLength = kMaxFrame - 1;
+  if (bytes[0] != kWitMotionHeader) return {};
+  if (bytes.size() < 2) return {FrameKind::kIncomplete};
+  if (!is_ble_beginning(bytes[0], bytes[1])) return {};
+  // A packet that begins early means that the end of this one is missing.
+  const std::size_t known = std::min(bytes.size(), kMaxFrame);
+  for (std::size_t at = 2; at + 1 < known; ++at) {
+    if (is_ble_beginning(bytes[at], bytes[at + 1])) return {};
+  }
+  if (bytes.size() < kLength) return {FrameKind::kIncomplete};
+  const bool may_begin_another = bytes[kLength - 1] == kWitMotionHeader;
+  if (may_begin_another && bytes.size() == kLength) return {FrameKind::kIncomplete};
+  return {FrameKind::kComplete, kLength};
+}
+
+ImuReading WitMotionBle::read(Bytes frame) {
+  constexpr std::size_t kBleRate = 8;
+  if (frame[1] != kBlePacket) return {};
+  return reading_of(raw_of(frame), raw_of(frame, kBleRate));
 }
 
 std::array<std::uint8_t, 22> encode_witmotion(const Eigen::Vector3d& gyro_radps,

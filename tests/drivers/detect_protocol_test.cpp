@@ -22,6 +22,9 @@ TEST(Recognize, NamesTheProtocolOfEveryRecordedFrameAndNoOther) {
   EXPECT_EQ(detect_protocol(stream_of("imu/hipnuc_hi91_official", 3)), SerialProtocol::kHipnuc);
   EXPECT_EQ(detect_protocol(stream_of("imu/xsens_mtdata2_accgyr", 3)), SerialProtocol::kXsens);
   EXPECT_EQ(detect_protocol(stream_of("imu/xsens_mtdata2_short", 3)), SerialProtocol::kXsens);
+  EXPECT_EQ(detect_protocol(stream_of("imu/xsens_high_rate_built", 3)), SerialProtocol::kXsens);
+  EXPECT_EQ(detect_protocol(stream_of("imu/witmotion_ble_built", 3)),
+            SerialProtocol::kWitMotionBle);
   for (const char* name : {"imu/mavlink_highres_imu_v1", "imu/mavlink_highres_imu_v2",
                            "imu/mavlink_raw_imu_v2", "imu/mavlink_scaled_imu2_v2"})
     EXPECT_EQ(detect_protocol(stream_of(name, 3)), SerialProtocol::kMavlink) << name;

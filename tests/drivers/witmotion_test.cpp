@@ -126,5 +126,58 @@ TEST(WitMotion, EncodesWhatItDecodesToHalfAStep) {
   }));
 }
 
+std::vector<std::uint8_t> ble_packet() { return recorded_file("imu/witmotion_ble_built").bytes; }
+
+TEST(WitMotionBle, ReadsAPacketInSiUnits) {
+  const RecordedFrame file = recorded_file("imu/witmotion_ble_built");
+  ASSERT_EQ(WitMotionBle::examine(file.bytes).length, 20U);
+
+  const ImuReading reading = WitMotionBle::read(file.bytes);
+
+  EXPECT_EQ(reading.verdict, ImuVerdict::kSample);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(reading.accel_mps2[axis],
+                file.decoded["acc_raw"][axis].get<double>() / 2048.0 * kGravityMps2, 1e-12);
+    EXPECT_NEAR(reading.gyro_radps[axis],
+                radians(file.decoded["gyro_raw"][axis].get<double>() * 2000.0 / 32768.0), 1e-12);
+  }
+}
+
+TEST(WitMotionBle, GivesNothingButWholePacketsWhateverIsMissing) {
+  const auto good = ble_packet();
+  for (std::size_t from = 0; from < good.size(); ++from) {
+    for (std::size_t to = from + 1; to <= good.size(); ++to) {
+      auto torn = good;
+      torn.erase(torn.begin() + static_cast<std::ptrdiff_t>(from),
+                 torn.begin() + static_cast<std::ptrdiff_t>(to));
+      const Frames frames = decode<WitMotionBleParser>(good + torn + good + good);
+      ASSERT_EQ(frames, (Frames{good, good, good})) << from << " " << to;
+    }
+  }
+}
+
+TEST(WitMotionBle, IsTheSameInEveryPiece) {
+  auto turned = ble_packet();
+  turned.back() = 0x55;  // as another packet begins
+  for (const auto& packet : {ble_packet(), turned}) {
+    for (std::size_t chunk = 1; chunk <= 21; ++chunk)
+      EXPECT_EQ(decode<WitMotionBleParser>(packet + packet + ble_packet(), chunk),
+                (Frames{packet, packet, ble_packet()}))
+          << chunk;
+  }
+}
+
+TEST(WitMotionBle, PassesByAnswersAndRefusesTheEndOfTheRange) {
+  auto answer = ble_packet();
+  answer[1] = 0x71;
+  EXPECT_EQ(WitMotionBle::examine(answer).kind, FrameKind::kComplete);
+  EXPECT_EQ(WitMotionBle::read(answer).verdict, ImuVerdict::kOther);
+
+  auto full = ble_packet();
+  full[8] = 0xff;
+  full[9] = 0x7f;
+  EXPECT_EQ(WitMotionBle::read(full).verdict, ImuVerdict::kSaturated);
+}
+
 }  // namespace
 }  // namespace crepes

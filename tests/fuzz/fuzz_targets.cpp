@@ -271,7 +271,9 @@ constexpr std::array kTargets{
           return std::vector<FuzzInput>{piece_by_piece(frame)};
         }},
     FuzzTarget{"witmotion", [](Bytes data) { run_stream(data, WitMotionParser()); },
-               [] { return recorded("imu", "witmotion"); }},
+               [] { return recorded("imu", "witmotion_hwt905"); }},
+    FuzzTarget{"witmotion_ble", [](Bytes data) { run_stream(data, WitMotionBleParser()); },
+               [] { return recorded("imu", "witmotion_ble"); }},
     FuzzTarget{"hipnuc", [](Bytes data) { run_stream(data, HipnucParser()); },
                [] { return recorded("imu", "hipnuc"); }},
     FuzzTarget{"xsens", [](Bytes data) { run_stream(data, XsensParser()); },

@@ -63,8 +63,9 @@ class SerialSensors : public testing::Test {
 };
 
 TEST_F(SerialSensors, RecognizeWhichInertialSensorTalks) {
-  for (const char* name : {"imu/witmotion_hwt905_real", "imu/hipnuc_hi91_official",
-                           "imu/xsens_mtdata2_accgyr", "imu/mavlink_highres_imu_v2"}) {
+  for (const char* name :
+       {"imu/witmotion_hwt905_real", "imu/hipnuc_hi91_official", "imu/xsens_mtdata2_accgyr",
+        "imu/mavlink_highres_imu_v2", "imu/witmotion_ble_built"}) {
     SCOPED_TRACE(name);
     samples_.clear();
     const auto device = open_imu();
