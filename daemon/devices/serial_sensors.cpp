@@ -2,16 +2,13 @@
 
 #include <fmt/core.h>
 
-#include <cmath>
-#include <span>
 #include <type_traits>
 #include <utility>
 
+#include "daemon/devices/iio_sensor.hpp"
+#include "daemon/devices/imu_preprocessing.hpp"
 #include "drivers/detect_protocol.hpp"
-#include "drivers/imu/bundle_spacing.hpp"
 #include "drivers/imu/hipnuc.hpp"
-#include "drivers/imu/imu_correction.hpp"
-#include "drivers/imu/imu_health.hpp"
 #include "drivers/imu/mavlink.hpp"
 #include "drivers/imu/microstrain.hpp"
 #include "drivers/imu/vectornav.hpp"
@@ -38,61 +35,12 @@ SensorTotals totals_of(const UwbCounts& counts) {
           .counts = {{"ranges", counts.ranges}, {"without_ranges", counts.without_ranges}}};
 }
 
-/// An autopilot may send numbers without a unit beside samples.
-SensorTotals totals_of(const ImuCounts& counts) {
-  return {.faults = {{"partial", counts.partial},
-                     {"saturated", counts.saturated},
-                     {"implausible", counts.implausible},
-                     {"clock_restarts", counts.clock_restarts}},
-          .counts = {{"samples", counts.samples}, {"unscaled", counts.unscaled}}};
-}
-
 /// Ranges are forwarded unchanged.
 struct UwbPreprocessing {
   void apply(const std::vector<UwbRange>& /*bundle*/) {}
   [[nodiscard]] static Totals faults() { return {}; }
   [[nodiscard]] static Totals counts() { return {}; }
   [[nodiscard]] static std::optional<std::string> diagnosis() { return std::nullopt; }
-};
-
-/// Spacing, health check and correction of samples that were read at once.
-class ImuPreprocessing {
- public:
-  explicit ImuPreprocessing(const ImuSensorSettings& settings)
-      : spacing_(from_seconds(1.0 / settings.rate_hz)),
-        health_(from_seconds(1.0 / settings.rate_hz)),
-        correction_(settings.device) {}
-
-  void apply(std::vector<ImuSample>& bundle) {
-    spacing_.apply(bundle);
-    std::erase_if(bundle, [this](const ImuSample& sample) { return !health_.accept(sample); });
-    for (ImuSample& sample : bundle) {
-      sample = correction_.apply(sample);
-      force_mps2_ += kMemory * (sample.accel_mps2.norm() - force_mps2_);
-      turn_radps_ += kMemory * (sample.gyro_radps.norm() - turn_radps_);
-    }
-  }
-
-  [[nodiscard]] Totals faults() const {
-    return {{"dropped", health_.counts().dropped}, {"stuck", health_.counts().stuck}};
-  }
-  /// How strongly it is pulled and how fast it turns, after the correction: at rest 9.81 m/s^2 and
-  /// nothing.
-  [[nodiscard]] Totals counts() const {
-    constexpr double kMilli = 1e3;
-    return {{"force_mmps2", static_cast<std::uint64_t>(std::lround(kMilli * force_mps2_))},
-            {"turn_mradps", static_cast<std::uint64_t>(std::lround(kMilli * turn_radps_))}};
-  }
-  [[nodiscard]] std::optional<std::string> diagnosis() const { return health_.diagnosis(); }
-
- private:
-  static constexpr double kMemory = 1.0 / 200.0;  // of a sample
-
-  BundleSpacing spacing_;
-  ImuHealth health_;
-  ImuCorrection correction_;
-  double force_mps2_ = 0.0;
-  double turn_radps_ = 0.0;
 };
 
 template <class Parser, class Preprocessing>
@@ -262,12 +210,13 @@ class UnknownDevice final : public Device {
   std::unique_ptr<Device> known_;
 };
 
-/// The names of the protocols of one kind of device, without `auto`.
+/// The names of the protocols that one kind of device may speak on a serial port.
 template <class Choices>
 std::string names_of(const Choices& choices) {
   std::string names;
-  for (const auto& choice : std::span(choices).subspan(1))
-    names += (names.empty() ? "" : ", ") + std::string(choice.name);
+  for (const auto& choice : choices)
+    if (choice.name != "auto" && choice.name != "iio")
+      names += (names.empty() ? "" : ", ") + std::string(choice.name);
   return names;
 }
 
@@ -316,6 +265,7 @@ OpenDevice configured_imu(const ImuSensorSettings& settings, const Clock& clock,
       return imu_device(SerialProtocol::kVectorNav, settings, clock, sink);
     case ImuProtocol::kMicroStrain:
       return imu_device(SerialProtocol::kMicroStrain, settings, clock, sink);
+    case ImuProtocol::kIio:  // on no serial port
     case ImuProtocol::kAuto:
       break;
   }
@@ -367,6 +317,7 @@ Sensor uwb_sensor(const UwbSensorSettings& settings, const Clock& clock, const E
 
 Sensor imu_sensor(const ImuSensorSettings& settings, const Clock& clock, const EventSink& sink,
                   const std::string& by_id) {
+  if (settings.device.protocol == ImuProtocol::kIio) return iio_sensor(settings, clock, sink);
   return serial_sensor("imu", settings.device.port, settings.device.baud,
                        configured_imu(settings, clock, sink), by_id);
 }

@@ -21,7 +21,7 @@ namespace {
 constexpr std::uint32_t kCapture = V4L2_BUF_TYPE_VIDEO_CAPTURE;
 constexpr std::uint32_t kV4l2Buffers = 8;
 constexpr double kExposureUnit = 100.0;  // us, of V4L2_CID_EXPOSURE_ABSOLUTE
-constexpr double kMicroseconds = 1e6;
+constexpr double kMicrosecondsPerSecond = 1e6;
 
 struct GreyFormat {
   std::uint32_t code;
@@ -226,7 +226,7 @@ class V4l2Camera final : public Camera {
         clock_(clock),
         latency_(from_seconds(config.device.latency_ms * 1e-3)),
         rate_hz_(config.calibration.rate_hz),
-        is_exposure_long_(session_->exposure_us() * rate_hz_ > kMicroseconds) {}
+        is_exposure_long_(session_->exposure_us() * rate_hz_ > kMicrosecondsPerSecond) {}
 
   [[nodiscard]] Result<std::optional<Frame>> read_once(std::chrono::milliseconds timeout) override {
     if (!session_->wait(timeout)) return std::optional<Frame>{};
@@ -256,7 +256,7 @@ class V4l2Camera final : public Camera {
 
   [[nodiscard]] Result<void> set_light(const CameraLight& light) override {
     Result<void> set = session_->set_light(light);
-    is_exposure_long_ = session_->exposure_us() * rate_hz_ > kMicroseconds;
+    is_exposure_long_ = session_->exposure_us() * rate_hz_ > kMicrosecondsPerSecond;
     return set;
   }
 

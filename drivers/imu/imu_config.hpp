@@ -20,7 +20,8 @@ enum class ImuProtocol : std::uint8_t {
   kMavlink,
   kVectorNav,
   kMicroStrain,
-  kWitMotionBle
+  kWitMotionBle,
+  kIio
 };
 inline constexpr std::array kImuProtocols{Choice{"auto", ImuProtocol::kAuto},
                                           Choice{"witmotion", ImuProtocol::kWitMotion},
@@ -29,7 +30,8 @@ inline constexpr std::array kImuProtocols{Choice{"auto", ImuProtocol::kAuto},
                                           Choice{"mavlink", ImuProtocol::kMavlink},
                                           Choice{"vectornav", ImuProtocol::kVectorNav},
                                           Choice{"microstrain", ImuProtocol::kMicroStrain},
-                                          Choice{"witmotion_ble", ImuProtocol::kWitMotionBle}};
+                                          Choice{"witmotion_ble", ImuProtocol::kWitMotionBle},
+                                          Choice{"iio", ImuProtocol::kIio}};
 
 /// What makes of a sensor's reading v the true T K (v - b), as imu_tk calibrates it.
 struct TriadConfig {
@@ -47,7 +49,7 @@ struct TriadConfig {
   }
 };
 
-/// The serial line, and how readings become the body's.
+/// The device, and how readings become the body's.
 struct ImuDeviceConfig {
   std::string port;
   int baud = 115200;
@@ -60,9 +62,13 @@ struct ImuDeviceConfig {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("port", port, "serial device, best under /dev/serial/by-id");
+    v.field(
+        "port", port,
+        "serial device, best under /dev/serial/by-id; iio: names of its devices, or omitted: the "
+        "only IMU");
     v.field("baud", baud, Bounds{1200, 4000000}, "bits per second");
-    v.choice("protocol", protocol, kImuProtocols, "protocol of the device; auto: detect it");
+    v.choice("protocol", protocol, kImuProtocols,
+             "protocol of the device; auto: detect it; iio: an IMU that the Linux kernel drives");
     v.field("T_body_imu", T_body_imu,
             "4x4, rotates the sensor's axes to the body's; no translation: the body's origin is "
             "the IMU");

@@ -8,6 +8,7 @@
 #include "config/reading/config_file.hpp"
 #include "drivers/detect_protocol.hpp"
 #include "drivers/device_clock.hpp"
+#include "drivers/iio/scan_format.hpp"
 #include "drivers/imu/hipnuc.hpp"
 #include "drivers/imu/mavlink.hpp"
 #include "drivers/imu/microstrain.hpp"
@@ -86,6 +87,34 @@ void run_uwb(Bytes data) {
 std::vector<FuzzInput> text_seed(std::string_view line) {
   const std::vector<std::uint8_t> bytes(line.begin(), line.end());
   return {piece_by_piece(bytes + bytes)};
+}
+
+/// A line with the type of an element, then scans of three of it and a stamp.
+void run_iio_scan(Bytes data) {
+  const auto end = std::ranges::find(data, std::uint8_t{'\n'});
+  const std::string type(data.begin(), end);
+  const Result<ScanElement> element = parse_scan_element(type);
+  if (!element) return;
+  const ScanElement stamp{std::endian::little, true, 64, 64, 0};
+  const ScanLayout layout({*element, *element, *element, stamp});
+  std::size_t at = type.size() + 1;
+  for (; at + layout.size() <= data.size(); at += layout.size()) {
+    const std::int64_t value = layout.value(data.subspan(at, layout.size()), 2);
+    const unsigned bits = element->bits - (element->is_signed ? 1 : 0);
+    if (bits >= 63) continue;
+    CREPES_EXPECT(value < std::int64_t{1} << bits, "a number has the bits of its type");
+    CREPES_EXPECT(value >= (element->is_signed ? -(std::int64_t{1} << bits) : 0), "and its sign");
+  }
+}
+
+std::vector<FuzzInput> iio_scan_seeds() {
+  std::vector<FuzzInput> seeds;
+  for (const std::string_view type : {"be:s16/16>>0\n", "le:u12/16>>4\n", "le:s24/32>>8\n"}) {
+    FuzzInput seed(type.begin(), type.end());
+    for (std::uint8_t byte = 0; byte < 96; ++byte) seed.push_back(byte * 37U & 0xffU);
+    seeds.push_back(seed);
+  }
+  return seeds;
 }
 
 void run_detect_protocol(Bytes data) {
@@ -284,6 +313,7 @@ constexpr std::array kTargets{
                [] { return recorded("imu", "vectornav"); }},
     FuzzTarget{"microstrain", [](Bytes data) { run_stream(data, MicroStrainParser()); },
                [] { return recorded("imu", "microstrain"); }},
+    FuzzTarget{"iio_scan", &run_iio_scan, &iio_scan_seeds},
     FuzzTarget{"detect_protocol", &run_detect_protocol, &detect_protocol_seeds},
     FuzzTarget{"device_clock", &run_device_clock, &device_clock_seeds},
     FuzzTarget{"peer_message", &run_peer_message, &peer_message_seeds},

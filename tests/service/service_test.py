@@ -68,22 +68,26 @@ def install():
     check("it waits for a configuration", shown("ActiveState") == "inactive" and shown("ConditionResult") == "no")
 
 
-def udev_says(device):
+def udev_says(device, parent="pci0000:00/0000:00:14.0/usb1"):
     """The result of udev for a device of devices.umockdev that is connected."""
-    path = f"/sys/devices/pci0000:00/0000:00:14.0/usb1/{device}"
+    path = f"/sys/devices/{parent}/{device}"
     return run("umockdev-run", "--device=/crepes/devices.umockdev", "--", "udevadm", "test", "--action=add", path)
 
 
 def device_rules():
     module = udev_says("1-3/1-3:1.0/tty/ttyACM0")
     told = module.stdout + module.stderr
-    check("udev finds no fault with the rules", not re.search(r"70-crepes\.rules:\d+ (?!GROUP|MODE|ATTR|LINK)", told))
+    check("udev finds no fault with the rules", not re.search(r"70-crepes\.rules:\d+ (?!GROUP|MODE|ATTR|LINK|RUN)", told))
     check("the UWB module has a name, and is the seat's", "DEVLINKS=/dev/crepes/uwb" in told and ":uaccess:" in told)
     for device, kind in (("1-1", "MindVision"), ("1-2", "USB3 Vision")):
         camera = udev_says(device)
         check(f"a camera ({kind}) has a name, belongs to the group, and stays awake",
               "DEVLINKS=/dev/crepes/camera" in camera.stdout and re.search(r"70-crepes.rules:\d+ GROUP", camera.stderr)
               and "power/control' writing 'on'" in camera.stderr)
+    imu = udev_says("iio:device0", "platform/spi0.0")
+    check("the group may set up an IMU of the kernel, and no converter",
+          re.search(r"70-crepes.rules:\d+ GROUP", imu.stderr) and "chgrp crepes" in imu.stdout
+          and "chgrp" not in udev_says("iio:device1", "platform/adc0").stdout)
     check("an FTDI bridge does not hold bytes back", "latency_timer' writing '1'" in udev_says("1-4/1-4:1.0/ttyUSB0").stderr)
 
 
