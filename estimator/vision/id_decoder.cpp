@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "estimator/core/contract.hpp"
 
@@ -53,6 +54,11 @@ constexpr Duration kShortAbsence = 100ms;
 constexpr Duration kLongestAbsence = 600ms;
 constexpr double kShortDoubt = 0.7;    // of kDoubted, after kShortAbsence
 constexpr double kAbsenceDoubt = 3.3;  // nats beyond kDoubted
+
+// A source that goes dark so many times as often as a board can, of late, is behind a propeller.
+constexpr double kObstructedRuns = 1.25;
+constexpr double kClearRuns = 1.0;
+constexpr double kRunMemory = 0.3;  // s
 
 // Lamps on the mains flash twice a cycle. A camera can hardly distinguish finer steps of duty.
 constexpr std::array kLampRatesHz{100.0, 120.0};
@@ -113,6 +119,23 @@ Duration longest_dark_of(const BlinkCode& code) {
   return longest;
 }
 
+/// The most that BlinkEvidence::dark_runs becomes before a board in the clear.
+double most_dark_runs_of(const BlinkCode& code) {
+  constexpr Duration kStep = 500us;
+  const Duration settled = from_seconds(4.0 * kRunMemory) + code.period();
+  const double fading = std::exp(-to_seconds(kStep) / kRunMemory);
+  double runs = 0.0;
+  double most = 0.0;
+  bool was_lit = true;
+  for (Duration t{}; t < settled; t += kStep) {
+    const bool is_lit = code.is_lit(t);
+    runs = fading * runs + (was_lit && !is_lit ? 1.0 : 0.0);
+    most = std::max(most, runs);
+    was_lit = is_lit;
+  }
+  return most;
+}
+
 }  // namespace
 
 void BlinkEvidence::forget() {
@@ -124,6 +147,8 @@ void BlinkEvidence::forget() {
   confidence = 0.0;
   doubt = 0.0;
   obstructed_doubt = 0.0;
+  dark_runs = 0.0;
+  is_obstructed = false;
   earlier_markov = 0.0;
   expected.reset();
 }
@@ -146,6 +171,7 @@ IdDecoder::IdDecoder(const IdLibrary& library, const VisionConfig& config, doubl
     codes_.back().id = id;
     window_ = std::max({window_, kMinWindow, kWindowPeriods * blink.period()});
     longest_dark_ = std::max(longest_dark_, longest_dark_of(blink));
+    most_dark_runs_ = std::max(most_dark_runs_, most_dark_runs_of(blink));
   }
   darkness_ = longest_dark_ + from_seconds(kMissedFrames / rate_hz);
   longest_dark_ += from_seconds(kDarkFrames / rate_hz);
@@ -253,8 +279,11 @@ void IdDecoder::observe_dark(BlinkEvidence& evidence, Timestamp stamp) const {
 void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp,
                             const PhaseMemory& known) const {
   end_absence(evidence, stamp);
+  count_dark_run(evidence, stamp);
   evidence.last_lit = stamp;
-  for (const Timestamp dark : evidence.pending_dark) add(evidence, {dark, false});
+  const std::size_t unsure = evidence.is_obstructed ? 1 : 0;
+  for (std::size_t i = unsure; i + unsure < evidence.pending_dark.size(); ++i)
+    add(evidence, {evidence.pending_dark[i], false});
   evidence.pending_dark.clear();
   add(evidence, {stamp, true});
   if (evidence.score.empty()) return;
@@ -310,6 +339,8 @@ void IdDecoder::resume(BlinkEvidence& evidence, Timestamp now, double stranger) 
   evidence.assigned.reset();
   evidence.doubt = 0.0;
   evidence.obstructed_doubt = 0.0;
+  evidence.dark_runs = 0.0;
+  evidence.is_obstructed = false;
 }
 
 /// All of the likelihood is with the assigned code, in the phases that its clock may have by now.
@@ -349,6 +380,18 @@ double IdDecoder::log_evidence(const BlinkEvidence& evidence) const {
     top = std::max(top, log_code);
   }
   return top + std::log(sum / (1.0 + kMarkovOdds + kLampOdds));
+}
+
+/// A blade is shorter before the light than two frames are apart. So it hides single frames, or one
+/// at either end of a dark slot.
+void IdDecoder::count_dark_run(BlinkEvidence& evidence, Timestamp stamp) const {
+  if (!evidence.last_lit) return;
+  evidence.dark_runs *= std::exp(-to_seconds(stamp - *evidence.last_lit) / kRunMemory);
+  evidence.dark_runs += evidence.pending_dark.empty() ? 0.0 : 1.0;
+  const double most = (evidence.is_obstructed ? kClearRuns : kObstructedRuns) * most_dark_runs_;
+  const bool was_obstructed = std::exchange(evidence.is_obstructed, evidence.dark_runs > most);
+  if (evidence.is_obstructed == was_obstructed || evidence.assigned) return;
+  forget_old(evidence, stamp + 2 * window_);  // what it showed was read otherwise
 }
 
 void IdDecoder::learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const {

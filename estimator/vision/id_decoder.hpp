@@ -35,6 +35,8 @@ struct BlinkEvidence {
   double doubt = 0.0;  ///< log odds that another board has blinked here since; at least zero
   /// The same if something hides the light in half of the frames, as a propeller does.
   double obstructed_doubt = 0.0;
+  double dark_runs = 0.0;      ///< how often it went dark of late, with fading memory
+  bool is_obstructed = false;  ///< more often than any board: a propeller is in front of it
   /// Earlier sights of the light are in `score`, whose mean over all sources is 1 then, and in this
   /// log likelihood of a two-state Markov chain, relative to that mean.
   double earlier_markov = 0.0;
@@ -83,7 +85,8 @@ class IdDecoder {
   void observe_lit(BlinkEvidence& evidence, Timestamp stamp, const PhaseMemory& known = {}) const;
   /// Nothing was seen where the track is predicted. The frame counts as dark if the track is lit
   /// again within longest_dark(), and no longer in a row than a code is dark: it was hidden then,
-  /// which says nothing.
+  /// which says nothing. Nor do the first and last frame of a row if the track goes dark more often
+  /// than any code: a blade passes in front of it.
   void observe_dark(BlinkEvidence& evidence, Timestamp stamp) const;
   /// The light of `evidence` was hidden, and one is seen at `now` where it is expected. What it
   /// showed becomes the prior: it is the same light in its phase, or, with probability `stranger`,
@@ -132,6 +135,7 @@ class IdDecoder {
   void forget_old(BlinkEvidence& evidence, Timestamp now) const;
   void decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory& known) const;
   void confirm(BlinkEvidence& evidence, BlinkObservation observation) const;
+  void count_dark_run(BlinkEvidence& evidence, Timestamp stamp) const;
   void end_absence(BlinkEvidence& evidence, Timestamp stamp) const;
   [[nodiscard]] static std::int64_t phase_reach(const Code& code, Duration age);
   void expect(BlinkEvidence& evidence, Duration absence) const;
@@ -151,7 +155,8 @@ class IdDecoder {
   std::size_t score_count_ = 0;
   Duration window_{};
   Duration longest_dark_{};
-  Duration darkness_{};  ///< the same with a margin of two frames
+  Duration darkness_{};          ///< the same with a margin of two frames
+  double most_dark_runs_ = 0.0;  ///< of any board in the clear
 };
 
 }  // namespace crepes

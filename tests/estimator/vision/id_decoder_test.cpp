@@ -346,5 +346,52 @@ TEST(IdDecoder, IsSoonSureOfABoardInThePhaseThatItHad) {
   EXPECT_LE(delays[delays.size() / 2], 100ms) << "a pattern is 180 ms";
 }
 
+/// A blade that hides a quarter of each turn.
+Light behind_a_blade(const Light& light, double turns_hz, double phase) {
+  return [light, turns_hz, phase](Duration t) {
+    const double turns = to_seconds(t) * turns_hz + phase;
+    return light(t) && turns - std::floor(turns) >= 0.25;
+  };
+}
+
+TEST(IdDecoder, ReadsBoardsBehindAPropeller) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, VisionConfig{}, 200.0);
+  int named = 0;
+  int trials = 0;
+  for (const double hz : {70.0, 85.0, 100.03, 120.0, 140.0, 170.0}) {
+    for (unsigned trial = 0; trial < 60; ++trial) {
+      const auto& [id, code] = library.entries()[1 + trial % 3];
+      const Light seen = behind_a_blade(board(code, Duration{trial * 3'777'777}, 50.0), hz,
+                                        0.017 * static_cast<double>(trial));
+      const Outcome outcome = watch(decoder, seen, 2s, {.flip_rate = 0.005, .seed = trial});
+      for (const int given : outcome.ids) ASSERT_EQ(given, id.value) << hz << " Hz, " << trial;
+      named += outcome.ids.empty() ? 0 : 1;
+      ++trials;
+    }
+  }
+
+  EXPECT_GT(named, 0.9 * trials);
+}
+
+TEST(IdDecoder, ReadsABoardAgainOnceABladeStopsInFrontOfIt) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, VisionConfig{}, 200.0);
+  const auto& [id, code] = library.entries()[2];
+  const Light clear = board(code, 31ms, 50.0);
+  const Light obstructed = behind_a_blade(clear, 100.03, 0.1);
+  const Light seen = [&](Duration t) { return t < 2s ? obstructed(t) : clear(t); };
+  BlinkEvidence evidence;
+
+  EXPECT_EQ(watch(decoder, seen, 2s, {}, 17s, &evidence).last, id);
+  EXPECT_TRUE(evidence.is_obstructed);
+  const Outcome after = watch(
+      decoder, [&](Duration t) { return seen(t + 2s); }, 2s, {}, 19s, &evidence);
+
+  EXPECT_EQ(after.ids, std::set<int>{id.value});
+  EXPECT_FALSE(evidence.is_obstructed);
+  EXPECT_GT(after.identified_frames, 0.95 * after.lit_frames);
+}
+
 }  // namespace
 }  // namespace crepes
