@@ -103,6 +103,7 @@ TEST(ToolsInJson, ListDevices) {
 
   EXPECT_TRUE(devices["cameras"].is_array());
   EXPECT_TRUE(devices["serial_ports"].is_array());
+  EXPECT_TRUE(devices["kernel_imus"].is_array());
 }
 
 TEST(ToolsInJson, TellWhatASensorWasSetTo) {

@@ -71,6 +71,19 @@ std::string text_of(const SerialDevice& device) {
                      name_of(*device.speaks), section, device.baud);
 }
 
+std::string text_of(const FoundIioImu& imu) {
+  const auto& [gyro, accelerometer] = imu.devices;
+  const std::string names =
+      gyro.id == accelerometer.id ? gyro.title() : gyro.title() + ", " + accelerometer.title();
+  return fmt::format("{}\n    imu: protocol: iio, port: \"{}\"\n", names, imu.port);
+}
+
+Json json_of(const FoundIioImu& imu) {
+  return {{"port", imu.port},
+          {"gyroscope", imu.devices.gyro.name},
+          {"accelerometer", imu.devices.accelerometer.name}};
+}
+
 Json json_of(const CameraDevice& camera) {
   return {{"driver", camera.driver},
           {"device", camera.found.device},
@@ -89,21 +102,27 @@ Json json_of(const SerialDevice& device) {
 }  // namespace
 
 ConnectedDevices find_devices(const DevicesOptions& options) {
-  return {.cameras = find_cameras(options), .serial = find_serial_devices(options)};
+  return {.cameras = find_cameras(options),
+          .serial = find_serial_devices(options),
+          .kernel_imus = find_iio_imus(options.iio)};
 }
 
 Result<std::string> list_devices(const DevicesOptions& options) {
-  const auto [cameras, serial] = find_devices(options);
+  const auto [cameras, serial, kernel_imus] = find_devices(options);
   if (options.json) {
-    Json json{{"cameras", Json::array()}, {"serial_ports", Json::array()}};
+    Json json{{"cameras", Json::array()},
+              {"serial_ports", Json::array()},
+              {"kernel_imus", Json::array()}};
     for (const auto& camera : cameras) json["cameras"].push_back(json_of(camera));
     for (const auto& device : serial) json["serial_ports"].push_back(json_of(device));
+    for (const auto& imu : kernel_imus) json["kernel_imus"].push_back(json_of(imu));
     return json_line(json);
   }
   std::string text = cameras.empty() ? "no camera\n" : "";
   for (const auto& camera : cameras) text += text_of(camera);
   if (serial.empty()) text += "no serial port\n";
   for (const auto& device : serial) text += text_of(device);
+  for (const auto& imu : kernel_imus) text += text_of(imu);
   return text;
 }
 

@@ -9,12 +9,14 @@
 
 #include "drivers/camera/camera.hpp"
 #include "drivers/detect_protocol.hpp"
+#include "drivers/iio/iio_devices.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
 
 struct DevicesOptions {
   std::filesystem::path dev = "/dev";     ///< the folder of serial ports and video devices
+  IioPaths iio{};                         ///< where the kernel shows its IMUs
   std::chrono::milliseconds listen{300};  ///< time to listen to a serial port at each rate
   bool json = false;
 };
@@ -34,9 +36,11 @@ struct CameraDevice {
 struct ConnectedDevices {
   std::vector<CameraDevice> cameras;
   std::vector<SerialDevice> serial;  ///< by port
+  std::vector<FoundIioImu> kernel_imus;
 };
 
-/// Searches cameras on USB and network, and listens to every serial port with a persistent name.
+/// Searches cameras on USB and network and the kernel's IMUs, and listens to every serial port with
+/// a persistent name.
 [[nodiscard]] ConnectedDevices find_devices(const DevicesOptions& options);
 
 /// The same as text, with the lines for the configuration, or as JSON.

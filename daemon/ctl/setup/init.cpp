@@ -230,6 +230,16 @@ class Interview {
     camera.device = device.found.device;
   }
 
+  /// The IMU of the kernel that is named; or the only one, if there is none on a serial port.
+  [[nodiscard]] std::optional<PlannedSerial> kernel_imu(const std::optional<std::string>& given,
+                                                        bool is_alone) const {
+    const std::vector<FoundIioImu>& imus = found_.kernel_imus;
+    const bool is_only = !given && is_alone && imus.size() == 1;
+    const bool is_named = given && std::ranges::count(imus, *given, &FoundIioImu::port) > 0;
+    if (!is_only && !is_named) return std::nullopt;
+    return PlannedSerial{.port = is_named ? *given : imus.front().port, .protocol = "iio"};
+  }
+
   PlannedSerial serial(const std::optional<std::string>& given, bool is_uwb) {
     std::vector<const SerialDevice*> fitting;
     for (const SerialDevice& device : found_.serial)
@@ -241,6 +251,7 @@ class Interview {
         "serial port of the {}{}", is_uwb ? "UWB module" : "IMU",
         fitting.size() > 1 ? "; found:" + others : "; empty if it is not connected yet");
     const auto any = [](const std::string& /*answer*/) { return std::string(); };
+    if (const auto imu = is_uwb ? std::nullopt : kernel_imu(given, fitting.empty())) return *imu;
     PlannedSerial line;
     line.port = given ? *given : fitting.size() == 1 ? proposal : ask(question, proposal, any);
     const auto same = std::ranges::find(fitting, line.port, &SerialDevice::port);

@@ -10,6 +10,7 @@
 #include "drivers/base/sleep.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/sim/pseudo_terminal.hpp"
+#include "tests/support/fake_iio.hpp"
 #include "tests/support/gige_camera.hpp"
 
 namespace crepes {
@@ -30,10 +31,12 @@ class Devices : public testing::Test {
     ASSERT_TRUE(scratch) << scratch.error().message;
     scratch_.emplace(std::move(*scratch));
     options_.dev = scratch_->path();
+    options_.iio = machine_.paths();
     fs::create_directories(options_.dev / "serial/by-id");
   }
 
   std::optional<ScratchDirectory> scratch_;
+  FakeIio machine_;
   DevicesOptions options_;
 };
 
@@ -79,6 +82,21 @@ TEST_F(Devices, ThatCannotBeListenedToAreNamedToo) {
 
   EXPECT_TRUE(told["cameras"].empty());
   EXPECT_NE(told["serial_ports"][0].value("fault", ""), "");
+}
+
+TEST_F(Devices, OfTheKernelAreFoundToo) {
+  add_icm42688(machine_);
+
+  const std::string text = list_devices(options_).value();
+  options_.json = true;
+  const auto told = nlohmann::json::parse(list_devices(options_).value());
+
+  EXPECT_NE(text.find("iio:device0 (icm42688-gyro), iio:device1 (icm42688-accel)\n"
+                      "    imu: protocol: iio, port: \"icm42688\"\n"),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(told["kernel_imus"][0].value("port", ""), "icm42688") << told;
+  EXPECT_EQ(told["kernel_imus"][0].value("accelerometer", ""), "icm42688-accel");
 }
 
 TEST_F(Devices, MayBeNone) { EXPECT_EQ(list_devices(options_), "no camera\nno serial port\n"); }

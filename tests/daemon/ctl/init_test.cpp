@@ -14,6 +14,7 @@
 #include "drivers/sim/pseudo_terminal.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/vision/camera_model.hpp"
+#include "tests/support/fake_iio.hpp"
 
 namespace crepes {
 namespace {
@@ -189,6 +190,7 @@ TEST_F(Init, TakesTheDevicesThatItHears) {
   PseudoTerminal line = PseudoTerminal::open().value();
   options_.search_devices = true;
   options_.devices.dev = folder_.path() / "dev";
+  options_.devices.iio.devices = folder_.path() / "sys";
   options_.camera_driver = "none";
   const fs::path port = options_.devices.dev / "serial/by-id/usb-imu";
   fs::create_directories(port.parent_path());
@@ -208,6 +210,22 @@ TEST_F(Init, TakesTheDevicesThatItHears) {
   EXPECT_EQ(config.imu.device.port, port.string());
   EXPECT_EQ(config.imu.device.protocol, ImuProtocol::kWitMotion);
   EXPECT_EQ(config.uwb.device.port, "");
+}
+
+TEST_F(Init, TakesTheImuOfTheKernel) {
+  FakeIio machine;
+  add_icm42688(machine);
+  options_.search_devices = true;
+  options_.devices.dev = folder_.path() / "dev";
+  options_.devices.iio = machine.paths();
+  options_.camera_driver = "none";
+  options_.id = 1;
+  options_.robots = 2;
+
+  ASSERT_TRUE(run());
+
+  EXPECT_EQ(load().imu.device.port, "icm42688");
+  EXPECT_EQ(load().imu.device.protocol, ImuProtocol::kIio);
 }
 
 TEST_F(Init, PrintsASheetWithTheAxesAndRoomForEveryRobot) {
