@@ -48,9 +48,10 @@ std::vector<std::string> channels_of(std::string_view quantity) {
 
 Result<Channel> enable_channel(const IioDevice& device, const std::string& name) {
   const std::string base = "scan_elements/" + name;
-  if (!device.attributes.has(base + "_en"))
+  if (!device.attributes.has(base + "_en")) {
     return fail(ErrorCode::kFormat,
                 fmt::format("{}: no channel {} in its buffer", device.title(), name));
+  }
   const Result<void> set = device.attributes.set(base + "_en", "1");
   if (!set) return tl::unexpected(set.error());
   const Result<double> index = device.attributes.number(base + "_index");
@@ -199,6 +200,7 @@ Result<void> IioBuffer::choose_elements(IioQuantities wanted) {
   }
   std::ranges::sort(channels, {}, &Channel::index);
   std::vector<ScanElement> elements;
+  elements.reserve(channels.size());
   for (const Channel& channel : channels) elements.push_back(channel.element);
   layout_ = ScanLayout(std::move(elements));
   stamp_index_ = place_of(channels, "in_timestamp");
@@ -247,9 +249,10 @@ void IioBuffer::forward(Bytes scan, Timestamp arrival,
   const auto value = [&](const std::optional<Placed>& placed) -> std::optional<Eigen::Vector3d> {
     if (!placed) return std::nullopt;
     Eigen::Vector3d raw;
-    for (std::size_t i = 0; i < placed->axes.size(); ++i)
+    for (std::size_t i = 0; i < placed->axes.size(); ++i) {
       raw[static_cast<Eigen::Index>(i)] =
           static_cast<double>(layout_.value(scan, placed->axes.at(i)));
+    }
     return placed->conversion.apply(raw);
   };
   sink({.stamp = *stamp, .gyro_radps = value(rate_), .accel_mps2 = value(acceleration_)});

@@ -65,7 +65,7 @@ class IioBuffer {
   }
 
  private:
-  IioBuffer(UniqueFd fd, const IioDevice& device) : fd_(std::move(fd)), device_(device) {}
+  IioBuffer(UniqueFd fd, IioDevice device) : fd_(std::move(fd)), device_(std::move(device)) {}
 
   [[nodiscard]] Result<void> set_up(const IioPaths& paths, IioQuantities wanted, double rate_hz);
   void drop_old_scans() const;

@@ -71,7 +71,7 @@ Result<void> IioImu::read_once(std::chrono::milliseconds timeout,
   std::array<pollfd, 2> waiting{};
   waiting[0] = {.fd = rates_.fd(), .events = POLLIN, .revents = 0};
   if (accelerations_) waiting[1] = {.fd = accelerations_->fd(), .events = POLLIN, .revents = 0};
-  const Result<void> waited = wait_for_data(waiting, accelerations_ ? 2 : 1, timeout);
+  Result<void> waited = wait_for_data(waiting, accelerations_ ? 2 : 1, timeout);
   if (!waited) return waited;
 
   bool has_rates = false;
