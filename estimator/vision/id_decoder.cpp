@@ -363,9 +363,10 @@ void IdDecoder::expect(BlinkEvidence& evidence, Duration absence) const {
 void IdDecoder::summarize(BlinkEvidence& evidence) const {
   const double mean = log_evidence(evidence);
   const int shift = to_units(mean);
+  const int least = to_units(kLeastLikely);
+  constexpr int kMost = std::numeric_limits<std::int16_t>::max();
   for (std::int16_t& score : evidence.score)
-    score = static_cast<std::int16_t>(std::clamp<int>(score - shift, to_units(kLeastLikely),
-                                                      std::numeric_limits<std::int16_t>::max()));
+    score = static_cast<std::int16_t>(std::clamp(score - shift, least, kMost));
   evidence.earlier_markov = log_markov(evidence) - mean;
 }
 
