@@ -3,10 +3,12 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <limits>
 #include <system_error>
 #include <utility>
 
