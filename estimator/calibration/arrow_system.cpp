@@ -4,14 +4,22 @@
 
 namespace crepes {
 
-ArrowSystem::ArrowSystem(std::size_t states, int constants)
+template <int Size>
+BasicArrowSystem<Size>::BasicArrowSystem(std::size_t states, int constants, int size)
     : blocks_(states),
       H_(Eigen::MatrixXd::Zero(constants, constants)),
       g_(Eigen::VectorXd::Zero(constants)) {
-  for (Block& block : blocks_) block.F = Eigen::MatrixXd::Zero(kState, constants);
+  for (Block& block : blocks_) {
+    block.D = StateMatrix::Zero(size, size);
+    block.E = StateMatrix::Zero(size, size);
+    block.F = Eigen::MatrixXd::Zero(size, constants);
+    block.g = StateVector::Zero(size);
+  }
 }
 
-std::optional<ArrowSystem::Step> ArrowSystem::solve(double damping) const {
+template <int Size>
+std::optional<typename BasicArrowSystem<Size>::Step> BasicArrowSystem<Size>::solve(
+    double damping) const {
   std::vector<Block> chain = blocks_;
   Eigen::MatrixXd H = H_;
   Eigen::VectorXd g = g_;
@@ -48,5 +56,8 @@ std::optional<ArrowSystem::Step> ArrowSystem::solve(double damping) const {
   }
   return step;
 }
+
+template class BasicArrowSystem<15>;
+template class BasicArrowSystem<Eigen::Dynamic>;
 
 }  // namespace crepes

@@ -9,11 +9,13 @@ namespace crepes {
 
 /// H x = g.  A state shares measurements with the state after it and with the constants, so H is
 /// block tridiagonal with a dense border. One Cholesky sweep costs a constant time for each state.
-class ArrowSystem {
+/// `Size` is that of a state, or Eigen::Dynamic.
+template <int Size>
+class BasicArrowSystem {
  public:
-  static constexpr int kState = 15;
-  using StateMatrix = Eigen::Matrix<double, kState, kState>;
-  using StateVector = Eigen::Matrix<double, kState, 1>;
+  static constexpr int kState = Size;
+  using StateMatrix = Eigen::Matrix<double, Size, Size>;
+  using StateVector = Eigen::Matrix<double, Size, 1>;
 
   struct Step {
     std::vector<StateVector> states;
@@ -21,7 +23,10 @@ class ArrowSystem {
     Eigen::MatrixXd constants_covariance;  ///< the inverse of H's Schur complement
   };
 
-  ArrowSystem(std::size_t states, int constants);
+  /// `size` is that of a state, which must be said if it is dynamic.
+  BasicArrowSystem(std::size_t states, int constants, int size = Size);
+
+  [[nodiscard]] std::size_t states() const { return blocks_.size(); }
 
   /// The blocks of H and g that a caller adds to.
   StateMatrix& diagonal(std::size_t k) { return blocks_[k].D; }
@@ -37,14 +42,22 @@ class ArrowSystem {
 
  private:
   struct Block {
-    StateMatrix D = StateMatrix::Zero();
-    StateMatrix E = StateMatrix::Zero();
+    StateMatrix D;
+    StateMatrix E;
     Eigen::MatrixXd F;
-    StateVector g = StateVector::Zero();
+    StateVector g;
   };
   std::vector<Block> blocks_;
   Eigen::MatrixXd H_;
   Eigen::VectorXd g_;
 };
+
+extern template class BasicArrowSystem<15>;
+extern template class BasicArrowSystem<Eigen::Dynamic>;
+
+/// One body: attitude, velocity, position and the biases of its IMU.
+using ArrowSystem = BasicArrowSystem<15>;
+/// Several bodies at one instant.
+using TeamArrowSystem = BasicArrowSystem<Eigen::Dynamic>;
 
 }  // namespace crepes

@@ -2,7 +2,6 @@
 
 #include <ceres/jet.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "estimator/calibration/jet_geometry.hpp"
+#include "estimator/calibration/knot_noise.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -19,46 +19,15 @@ namespace at = camera_constants;
 
 constexpr double kKnotSpacing_s = 0.1;
 constexpr double kWorldGravity = 9.81;
-constexpr double kGaugeSigma = 1e-4;     // position and heading of the first knot: free to choose
-constexpr double kVelocitySigma = 3.0;   // of the first knot [m/s]
-constexpr double kInvalidPx = 200.0;     // what a sighting costs that the lens cannot show
-constexpr double kAngleSlack = 1e-5;     // [rad] of integration within a sample, by knot
-constexpr double kVelocitySlack = 2e-4;  // [m/s]
-constexpr double kPositionSlack = 2e-5;  // [m]
-constexpr double kLeastWalk = 1e-7;
+constexpr double kGaugeSigma = 1e-4;    // position and heading of the first knot: free to choose
+constexpr double kVelocitySigma = 3.0;  // of the first knot [m/s]
+constexpr double kInvalidPx = 200.0;    // what a sighting costs that the lens cannot show
 constexpr double kMostLens = 0.95;
 
 constexpr int kState = ArrowSystem::kState;
 constexpr int kLocal = kState + at::kBoards;  // a knot and the constants without boards
 constexpr int kAll = kLocal + 3;              // and one board
 using Jet = ceres::Jet<double, kAll>;
-
-/// `x` as the parameter with this index.
-template <class T>
-T seeded(double x, int index) {
-  if constexpr (std::is_same_v<T, double>) {
-    static_cast<void>(index);
-    return x;
-  } else {
-    return T(x, index);
-  }
-}
-
-template <class T>
-Vector3<T> seeded(const Eigen::Vector3d& x, int index) {
-  return {seeded<T>(x.x(), index), seeded<T>(x.y(), index + 1), seeded<T>(x.z(), index + 2)};
-}
-
-/// R Exp(d) at d = 0.
-template <class T>
-Matrix3<T> seeded_rotation(const Eigen::Quaterniond& q, int index) {
-  const Matrix3<T> R = q.toRotationMatrix().cast<T>();
-  if constexpr (std::is_same_v<T, double>) return R;
-  const Vector3<T> d = seeded<T>(Eigen::Vector3d::Zero(), index);
-  Matrix3<T> turn;
-  turn << T(1.0), -d.z(), d.y(), d.z(), T(1.0), -d.x(), -d.y(), d.x(), T(1.0);
-  return R * turn;
-}
 
 /// A knot and the constants, each number a parameter.
 template <class T>
@@ -89,29 +58,6 @@ struct Local {
       for (int j = i; j < 3; ++j) M_accel(i, j) = seeded<T>(constants.M_accel(i, j), next++);
   }
 };
-
-/// The inverse square root of the covariance from knot to knot: L with  L^T L = P^-1 .
-Eigen::Matrix<double, kState, kState> whitening(const ImuNoise& noise, double dt) {
-  const auto square = [](double x) { return x * x; };
-  const double gyro = square(noise.gyroscope_noise_density) * dt + square(kAngleSlack);
-  const double a2 = square(noise.accelerometer_noise_density);
-  Eigen::Matrix2d vp;
-  vp << a2 * dt + square(kVelocitySlack), a2 * dt * dt / 2.0, a2 * dt * dt / 2.0,
-      a2 * dt * dt * dt / 3.0 + square(kPositionSlack);
-  const Eigen::Matrix2d U = vp.inverse().llt().matrixU();
-  const double gyro_walk = std::max(kLeastWalk, noise.gyroscope_random_walk) * std::sqrt(dt);
-  const double accel_walk = std::max(kLeastWalk, noise.accelerometer_random_walk) * std::sqrt(dt);
-  Eigen::Matrix<double, kState, kState> L = Eigen::Matrix<double, kState, kState>::Zero();
-  for (int i = 0; i < 3; ++i) {
-    L(i, i) = 1.0 / std::sqrt(gyro);
-    L(3 + i, 3 + i) = U(0, 0);
-    L(3 + i, 6 + i) = U(0, 1);
-    L(6 + i, 6 + i) = U(1, 1);
-    L(9 + i, 9 + i) = 1.0 / gyro_walk;
-    L(12 + i, 12 + i) = 1.0 / accel_walk;
-  }
-  return L;
-}
 
 template <class T>
 Eigen::Matrix<T, kState, 1> knot_residual(const Local<T>& end, const CameraKnot& next) {
@@ -306,7 +252,7 @@ void CameraProblem::walk(const CameraState& state, std::size_t knot, Visitor& vi
     now = after;
   }
   const double dt = seconds(imu_[last].stamp) - seconds(imu_[first].stamp);
-  const auto L = whitening(noise_, dt);
+  const auto L = knot_whitening(noise_, dt);
   const CameraKnot& end = state.knots[knot + 1];
   const Eigen::Matrix<T, kState, 1> r = L.template cast<T>() * knot_residual<T>(local, end);
   if constexpr (std::is_same_v<T, double>) {

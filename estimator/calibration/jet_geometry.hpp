@@ -2,8 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 
 namespace crepes {
 
@@ -11,6 +13,33 @@ template <class T>
 using Vector3 = Eigen::Matrix<T, 3, 1>;
 template <class T>
 using Matrix3 = Eigen::Matrix<T, 3, 3>;
+
+/// `x` as the parameter with this index; a plain number is none.
+template <class T>
+T seeded(double x, int index) {
+  if constexpr (std::is_same_v<T, double>) {
+    static_cast<void>(index);
+    return x;
+  } else {
+    return T(x, index);
+  }
+}
+
+template <class T>
+Vector3<T> seeded(const Eigen::Vector3d& x, int index) {
+  return {seeded<T>(x.x(), index), seeded<T>(x.y(), index + 1), seeded<T>(x.z(), index + 2)};
+}
+
+/// R Exp(d) at d = 0.
+template <class T>
+Matrix3<T> seeded_rotation(const Eigen::Quaterniond& q, int index) {
+  const Matrix3<T> R = q.toRotationMatrix().cast<T>();
+  if constexpr (std::is_same_v<T, double>) return R;
+  const Vector3<T> d = seeded<T>(Eigen::Vector3d::Zero(), index);
+  Matrix3<T> turn;
+  turn << T(1.0), -d.z(), d.y(), d.z(), T(1.0), -d.x(), -d.y(), d.x(), T(1.0);
+  return R * turn;
+}
 
 /// Exp(phi) x by the series of Rodrigues' formula: exact to 1e-9 up to 0.5 rad, smooth at zero.
 template <class T>

@@ -66,6 +66,25 @@ TEST(ArrowSystem, KnowsTheCovarianceOfTheConstants) {
             1e-9);
 }
 
+TEST(ArrowSystem, OfDynamicSizeSolvesTheSame) {
+  Twin problem = twin(4, 7);
+  TeamArrowSystem team(4, 7, kState);
+  for (std::size_t k = 0; k < 4; ++k) {
+    team.diagonal(k) = problem.arrow.diagonal(k);
+    team.to_next(k) = problem.arrow.to_next(k);
+    team.to_constants(k) = problem.arrow.to_constants(k);
+    team.gradient(k) = problem.arrow.gradient(k);
+  }
+  team.constants() = problem.arrow.constants();
+  team.constants_gradient() = problem.arrow.constants_gradient();
+  const auto step = problem.arrow.solve(1e-3);
+  const auto same = team.solve(1e-3);
+
+  ASSERT_TRUE(step && same);
+  EXPECT_LT((step->constants - same->constants).norm(), 1e-9);
+  EXPECT_LT((step->states[2] - same->states[2]).norm(), 1e-9);
+}
+
 TEST(ArrowSystem, RefusesWhatIsNotPositiveDefinite) {
   Twin problem = twin(3, 5);
   problem.arrow.diagonal(1)(0, 0) = -1.0;
