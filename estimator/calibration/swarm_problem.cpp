@@ -268,17 +268,23 @@ double knot_spacing(std::size_t robots) {
                     kLongestSpacing_s);
 }
 
-std::vector<std::size_t> knot_samples(const std::vector<double>& imu_s, double to_s,
-                                      double spacing_s) {
-  std::vector<std::size_t> first;
-  const auto knots = static_cast<std::size_t>(to_s / spacing_s) + 1;
-  for (std::size_t k = 0; k < knots; ++k) {
-    const auto found = std::ranges::lower_bound(imu_s, spacing_s * static_cast<double>(k) - 1e-9);
-    if (found == imu_s.end()) break;
-    const auto i = static_cast<std::size_t>(found - imu_s.begin());
-    if (first.empty() || i > first.back()) first.push_back(i);
+/// The samples at which knots stand, by robot. An instant for which a robot has no new sample has
+/// no knot at all, so that knots of one number are of one time.
+std::vector<std::vector<std::size_t>> knot_samples(const std::vector<std::vector<double>>& imu_s,
+                                                   double to_s, double spacing_s) {
+  std::vector<std::vector<std::size_t>> samples(imu_s.size());
+  for (int k = 0; k * spacing_s <= to_s; ++k) {
+    std::vector<std::size_t> now;
+    for (std::size_t r = 0; r < imu_s.size(); ++r) {
+      const auto found = std::ranges::lower_bound(imu_s[r], k * spacing_s - 1e-9);
+      const auto i = static_cast<std::size_t>(found - imu_s[r].begin());
+      const bool is_new = samples[r].empty() || i > samples[r].back();
+      if (found != imu_s[r].end() && is_new) now.push_back(i);
+    }
+    if (now.size() < imu_s.size()) continue;
+    for (std::size_t r = 0; r < imu_s.size(); ++r) samples[r].push_back(now[r]);
   }
-  return first;
+  return samples;
 }
 
 }  // namespace
@@ -317,16 +323,13 @@ class SwarmWalk {
 
 SwarmProblem::SwarmProblem(std::vector<RobotRecord> records, Timestamp from, Timestamp to)
     : records_(std::move(records)), from_(from), sigma_px_(records_.size(), 1.0) {
-  std::size_t least = std::numeric_limits<std::size_t>::max();
   for (const RobotRecord& record : records_) {
     std::vector<double>& times = imu_s_.emplace_back();
     for (const ImuSample& sample : record.imu) times.push_back(seconds(sample.stamp));
-    first_sample_.push_back(knot_samples(times, seconds(to), knot_spacing(records_.size())));
-    least = std::min(least, first_sample_.back().size());
     weights_.sightings.emplace_back(record.sightings.size(), 1.0);
     weights_.ranges.emplace_back(record.ranges.size(), 1.0);
   }
-  for (auto& samples : first_sample_) samples.resize(least);
+  first_sample_ = knot_samples(imu_s_, seconds(to), knot_spacing(robots()));
 }
 
 std::optional<SwarmProblem::Place> SwarmProblem::place_of(std::size_t robot, double time_s) const {
