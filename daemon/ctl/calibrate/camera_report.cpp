@@ -77,10 +77,11 @@ std::string map_text(const ResidualMap& map) {
 }
 
 std::string camchain_text(const CameraConstants& constants, const std::array<int, 2>& resolution,
-                          const std::optional<KannalaBrandtFit>& kb) {
+                          const std::optional<KannalaBrandtFit>& kb, std::string_view command) {
   const Pose T_C_B = constants.T_C_B();
   const Eigen::Matrix3d R = T_C_B.R();
-  std::string text = "# Written by crepesctl calibrate camera\ncam0:\n" + lens_text(constants, kb);
+  std::string text = fmt::format("# Written by crepesctl calibrate {}\ncam0:\n", command) +
+                     lens_text(constants, kb);
   text += fmt::format("  resolution: {}\n  T_cam_imu:\n", to_yaml(resolution));
   for (int i = 0; i < 3; ++i)
     text += fmt::format("  - {}\n",

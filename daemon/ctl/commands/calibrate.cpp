@@ -3,6 +3,7 @@
 #include "daemon/ctl/calibrate/calibrate_camera.hpp"
 #include "daemon/ctl/calibrate/calibrate_imu.hpp"
 #include "daemon/ctl/calibrate/calibrate_range.hpp"
+#include "daemon/ctl/calibrate/calibrate_swarm.hpp"
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
 
@@ -88,6 +89,27 @@ void add_camera(CommandLine& line, CLI::App* calibrate) {
   line.run(sub, [&options] { return finish(calibrate_camera_with_progress(options)); });
 }
 
+Result<CalibrationReport> calibrate_swarm_with_progress(CalibrateSwarmOptions options) {
+  const TerminalProgress progress;
+  options.on_progress = progress.sink();
+  return calibrate_swarm(options);
+}
+
+void add_swarm(CommandLine& line, CLI::App* calibrate) {
+  auto& options = line.make<CalibrateSwarmOptions>();
+  CLI::App* sub = calibrate->add_subcommand(
+      "swarm",
+      "Cameras, lever arms, antenna delays and IMUs of two to six robots at once, from half a "
+      "minute in which they move in view of each other");
+  sub->add_option("SWARM_DIR", options.swarm_dir, "the recording of all robots")->required();
+  sub->add_option("--out", options.out,
+                  "directory for <robot>.yaml; a fragment of crepesd.yaml for crepesd.d/ of each "
+                  "robot is written beside it as <robot>.fragment.yaml")
+      ->required();
+  add_json_flag(sub, options.json);
+  line.run(sub, [&options] { return finish(calibrate_swarm_with_progress(options)); });
+}
+
 }  // namespace
 
 void add_calibrate(CommandLine& line) {
@@ -96,6 +118,7 @@ void add_calibrate(CommandLine& line) {
   add_camera(line, sub);
   add_imu(line, sub);
   add_range(line, sub);
+  add_swarm(line, sub);
 }
 
 }  // namespace crepes
