@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "drivers/sim/motion.hpp"
@@ -28,6 +29,9 @@ class SimWorld {
  public:
   /// Uses `scenario`, `seed` and `track` only.
   explicit SimWorld(const SimConfig& config);
+  /// Other robots than those of a scenario, for studies.
+  SimWorld(int seed, std::map<RobotId, Motion> motions)
+      : seed_(seed), motions_(std::move(motions)) {}
 
   [[nodiscard]] std::vector<RobotId> robots() const;
   [[nodiscard]] bool contains(RobotId robot) const { return motions_.contains(robot); }

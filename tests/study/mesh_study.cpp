@@ -96,7 +96,8 @@ class MadeUpRobot {
     history_.estimates.clear();
     for (std::size_t n = 0; n < members_.size(); ++n) {
       if (n == index_) continue;
-      NeighborEstimate estimate{stamp_at(t), members_[n], {{}, Matrix6d::Identity() * 1e-4}, {}};
+      NeighborEstimate estimate{
+          stamp_at(t), members_[n], {{}, Matrix6d::Identity() * 1e-4}, Eigen::Vector3d::Zero()};
       estimate.T_B_N.pose.p = 5.0 * direction(n, t);
       history_.estimates.push_back(estimate);
     }

@@ -47,6 +47,7 @@ std::vector<Spot> SimulatedSpots::at(double t_s) {
   for (const RingRenderer::View& view : views) {
     if (is_hidden(view.robot, t_s)) continue;
     const double distance = world_.T_B_N(self_, view.robot, t_s).p.norm();
+    if (distance > disturbance_.sight_m) continue;
     if (noise_.uniform(drawn_++) < kDropOut) continue;
     add(view.spot, std::hypot(kNearNoise, kNoiseByMeter * distance), spots);
   }

@@ -17,6 +17,7 @@ struct Disturbance {
   ObstacleField obstacles{Obstacles::kNone, 0};
   double dark_from_s = 0.0;  ///< no spot from here
   double dark_to_s = 0.0;    ///< to here
+  double sight_m = 1e3;      ///< no spot of boards beyond
 };
 
 /// One robot's first camera: noise that grows with distance, drop-outs, spots that merge; with

@@ -4,8 +4,8 @@
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
-#include "daemon/ctl/demo/demo_swarm.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/sim/sim_imu.hpp"
 #include "tests/study/simulated_spots.hpp"
@@ -81,10 +81,18 @@ Swarm simulate_swarm(const Scenario& scenario, int seed, double duration_s) {
   sim.scenario = scenario.world;
   sim.seed = seed;
   const SimWorld world(sim);
+  return simulate_swarm(scenario, world, demo_swarm(sim, world.robots(), 0.0, 40000, 40100),
+                        duration_s);
+}
+
+Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vector<DemoRobot> robots,
+                     double duration_s) {
+  const int seed = world.seed();
   const Disturbance disturbance{.interference = scenario.interference,
                                 .obstacles = ObstacleField(scenario.obstacles, seed),
                                 .dark_from_s = scenario.dark_from_s,
-                                .dark_to_s = scenario.dark_to_s};
+                                .dark_to_s = scenario.dark_to_s,
+                                .sight_m = scenario.sight_m};
   SwarmDataset dataset;
   dataset.manifest = {.scenario = std::string(scenario.name),
                       .duration_s = duration_s,
@@ -92,7 +100,7 @@ Swarm simulate_swarm(const Scenario& scenario, int seed, double duration_s) {
                       .robots = {}};
   dataset.manifest.network.seed = static_cast<std::uint64_t>(seed);
   std::map<RobotId, SwarmTruth::Robot> paths;
-  for (DemoRobot& robot : demo_swarm(sim, world.robots(), 0.0, 40000, 40100)) {
+  for (DemoRobot& robot : robots) {
     const RobotId id = robot.config.robot.id;
     const std::string name = "r" + std::to_string(id.value);
     const SwarmRobot entry{.id = id, .name = name, .dir = name, .clock = robot.clock};

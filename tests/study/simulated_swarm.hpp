@@ -4,8 +4,11 @@
 
 #include <array>
 #include <string_view>
+#include <vector>
 
 #include "config/schema/config.hpp"
+#include "daemon/ctl/demo/demo_swarm.hpp"
+#include "drivers/sim/world.hpp"
 #include "tests/study/obstacles.hpp"
 #include "tests/study/pair_bound.hpp"
 #include "tests/study/pair_sightings.hpp"
@@ -23,6 +26,7 @@ struct Scenario {
   double dark_from_s = 0.0;  ///< no camera sees anything from here
   double dark_to_s = 0.0;    ///< to here
   RangeModel ranges = RangeModel::kSimulated;
+  double sight_m = 1e3;  ///< no camera sees further
 };
 
 inline constexpr std::array kScenarios{
@@ -50,5 +54,9 @@ inline constexpr std::array kScenarios{
 /// principal point of each camera, range bias of each pair, noise, outliers, drop-outs, the
 /// network. Magnitudes are those that SensorPriors says; spots come from projections, not pictures.
 [[nodiscard]] Swarm simulate_swarm(const Scenario& scenario, int seed, double duration_s);
+
+/// The same of other robots in another world.
+[[nodiscard]] Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world,
+                                   std::vector<DemoRobot> robots, double duration_s);
 
 }  // namespace crepes::study
