@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -54,11 +55,13 @@ std::string key_warning(const NetSettings& settings) {
 }
 
 AirTotals air_totals(const PeerLink& link, Timestamp now) {
-  AirTotals totals{.at = now,
-                   .sent = link.counters()[MeshCounter::kSent],
-                   .sent_bytes = link.counters()[MeshCounter::kSentBytes],
-                   .received = link.counters()[MeshCounter::kReceived],
-                   .received_bytes = link.counters()[MeshCounter::kReceivedBytes]};
+  AirTotals totals{
+      .at = now,
+      .sent = link.counters()[MeshCounter::kSent] + link.counters()[MeshCounter::kForwarded],
+      .sent_bytes =
+          link.counters()[MeshCounter::kSentBytes] + link.counters()[MeshCounter::kForwardedBytes],
+      .received = link.counters()[MeshCounter::kReceived],
+      .received_bytes = link.counters()[MeshCounter::kReceivedBytes]};
   for (const PeerTraffic& traffic : link.traffic(now)) totals.lost += traffic.lost;
   return totals;
 }
@@ -101,6 +104,7 @@ class NetLoop {
   void run_once() {
     wait();
     receive();
+    forward(clock_.now());
     stage_.inbox.clear_wakeup();
     while (auto input = stage_.inbox.try_pop()) {
       std::visit([this](auto& what) { handle(what); }, *input);
@@ -148,7 +152,16 @@ class NetLoop {
     watch(stage_.inbox.descriptor());
     watch(mesh_.descriptor());  // poll ignores -1
     for (const int fd : server_->descriptors()) watch(fd);
-    ::poll(watched.data(), watched.size(), kPollTimeoutMs);
+    ::poll(watched.data(), watched.size(), timeout_ms());
+  }
+
+  /// Until there is something to forward.
+  [[nodiscard]] int timeout_ms() const {
+    using std::chrono::milliseconds;
+    const auto next = link_.next_forward();
+    if (!next) return kPollTimeoutMs;
+    const auto wait = std::chrono::ceil<milliseconds>(*next - clock_.now()).count();
+    return static_cast<int>(std::clamp<milliseconds::rep>(wait, 0, kPollTimeoutMs));
   }
 
   void receive() {
@@ -173,12 +186,20 @@ class NetLoop {
   void handle(EstimatorStatus& status) { estimator_ = std::move(status); }
   void handle(SensorStatus& status) { sensors_[status.name] = std::move(status); }
 
+  void forward(Timestamp now) {
+    for (const auto& datagram : link_.forwards(now)) send(datagram, now);
+  }
+
   void broadcast(const Report& report, Timestamp now) {
-    if (!link_.is_due(now)) return;
+    // The keys are read when the socket is opened.
+    if (link_.is_due(now) && mesh_.get(now) != nullptr)
+      send(link_.compose(report, now, mesh_.seal(), mesh_.signer()), now);
+  }
+
+  void send(std::span<const std::uint8_t> datagram, Timestamp now) {
     UdpSocket* socket = mesh_.get(now);
     if (socket == nullptr) return;
-    const Result<void> sent =
-        socket->broadcast(link_.compose(report, now, mesh_.seal(), mesh_.signer()));
+    const Result<void> sent = socket->broadcast(datagram);
     if (sent) return;
     ++unsent_;
     // A congested mesh is no reason to close the socket, which may hold datagrams to be read.

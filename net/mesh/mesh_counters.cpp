@@ -7,11 +7,14 @@ namespace {
 
 using enum MeshCounter;
 
-constexpr auto kNames = std::to_array<std::string_view>({"held_clock_unknown",
+constexpr auto kNames = std::to_array<std::string_view>({"forwarded",
+                                                         "forwarded_bytes",
+                                                         "held_clock_unknown",
                                                          "left_out_copies",
                                                          "left_out_of_datagrams",
                                                          "left_out_samples",
                                                          "received",
+                                                         "received_again",
                                                          "received_bytes",
                                                          "refused_bad_covariance",
                                                          "refused_bad_id",

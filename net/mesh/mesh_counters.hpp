@@ -15,12 +15,15 @@ namespace crepes {
 
 /// What is counted, in the order of the names.
 enum class MeshCounter : std::uint8_t {
+  kForwarded,             ///< datagrams of others to robots that do not hear them
+  kForwardedBytes,        ///< of those
   kHeldClockUnknown,      ///< reports of a peer whose clock is not known yet
   kLeftOutCopies,         ///< bearings and ranges that were to be repeated and had no room
   kLeftOutOfDatagrams,    ///< neighbors whose newest measurements had no room
   kLeftOutSamples,        ///< inertial samples that were to be repeated and had no room
   kReceived,              ///< datagrams of other robots
-  kReceivedBytes,         ///< of those
+  kReceivedAgain,         ///< forwarded ones that we had already
+  kReceivedBytes,         ///< of all received
   kRefusedBadCovariance,  ///< this and the following: datagrams, by the reason for the refusal
   kRefusedBadId,
   kRefusedBadIndex,
@@ -55,7 +58,7 @@ enum class MeshCounter : std::uint8_t {
   kSent,       ///< datagrams
   kSentBytes,  ///< of those
 };
-inline constexpr std::size_t kMeshCounterCount = 39;
+inline constexpr std::size_t kMeshCounterCount = 42;
 
 /// As STATUS and report.json call it.
 [[nodiscard]] std::string_view name_of(MeshCounter counter);

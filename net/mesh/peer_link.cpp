@@ -13,7 +13,9 @@ constexpr Duration kEchoAge = std::chrono::seconds{1};      // older packets are
 constexpr Duration kMaxEchoAge = std::chrono::seconds{10};  // older echoes are refused
 constexpr Duration kSilence = std::chrono::seconds{1};  // after which a replaced session may return
 constexpr std::size_t kMaxEnded = 16;                   // sessions of a peer that are remembered
-constexpr double kMaxRateHz = 250.0;                    // of a peer's datagrams
+constexpr Duration kForwardedAge = std::chrono::seconds{1};
+constexpr std::size_t kMarkedCopies = 2;
+constexpr double kMaxRateHz = 250.0;  // of a peer's datagrams
 
 Report to_local(const PeerReport& theirs, const ClockOffset& clock) {
   Report ours;
@@ -55,6 +57,16 @@ std::optional<MeshCounter> refusal_of(SequenceWindow::Verdict verdict) {
   return std::nullopt;
 }
 
+/// Marked datagrams are half as long again as the mean, the others shorter by as much in all.
+std::size_t bytes_of(const Pace& pace, bool is_marked, bool are_some_marked) {
+  constexpr double kMarked = 1.5;
+  const double spacing = mark_spacing(pace.reports);
+  const double share = !are_some_marked ? 1.0
+                       : is_marked      ? kMarked
+                                        : (spacing - kMarked) / (spacing - 1);
+  return static_cast<std::size_t>(share * static_cast<double>(pace.bytes));
+}
+
 /// The datagram without its seal, or the counter of the reason why it cannot be opened.
 tl::expected<std::vector<std::uint8_t>, MeshCounter> unsealed(
     std::span<const std::uint8_t> datagram, const std::optional<PacketSeal>& seal) {
@@ -66,7 +78,7 @@ tl::expected<std::vector<std::uint8_t>, MeshCounter> unsealed(
 }  // namespace
 
 PeerLink::PeerLink(RobotId self, const std::vector<RobotId>& members, const SendSettings& settings)
-    : self_(self), settings_(settings) {
+    : self_(self), settings_(settings), relay_(self) {
   set_members(members);
 }
 
@@ -92,13 +104,17 @@ std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> da
   if (!message) return std::nullopt;
   const RobotId sender = message->report.sender;
   Peer& peer = peers_.at(sender);
-  Session* const session = accept(peer, *message, arrival);
+  Session* const session = accept(peer, *message, arrival, from);
   if (trust_.keys.contains(sender)) {
     const bool is_of_use = session != nullptr && peer.live && session == &*peer.live;
     is_of_use ? limiter_.count_accepted(from, sender, arrival)
               : limiter_.count_in_vain(from, sender, arrival);
   }
   if (session == nullptr) return std::nullopt;
+  const bool is_live = peer.live && session == &*peer.live;
+  if (is_live || !peer.live) note_who_hears_whom(*message, arrival, from);
+  if (is_live && message->mark > 0)
+    relay_.offer({sender, message->session, message->sequence}, datagram, from, arrival);
   if (!session->clock.is_usable()) {
     counters_.add(MeshCounter::kHeldClockUnknown);
     return std::nullopt;
@@ -164,7 +180,8 @@ std::optional<MeshCounter> PeerLink::refusal_of(std::span<const std::uint8_t> pl
       const Session& session = **known;
       const auto refusal = crepes::refusal_of(
           session.sequence.judge(header.sequence, max_ahead(arrival - session.last_arrival)));
-      if (refusal) return refusal;
+      if (refusal)
+        return counted_copy(*refusal, {header.sender, header.session, header.sequence}, from);
     }
   }
   if (!limiter_.allows(from, header.sender, arrival))
@@ -174,14 +191,29 @@ std::optional<MeshCounter> PeerLink::refusal_of(std::span<const std::uint8_t> pl
   return MeshCounter::kRefusedSignatureWrong;
 }
 
+/// The counter of a datagram that was refused by its number.
+MeshCounter PeerLink::counted_copy(MeshCounter refusal, const DatagramId& id,
+                                   const Endpoint& from) {
+  if (refusal != MeshCounter::kRefusedDuplicate || !relay_.note_copy(id, from)) return refusal;
+  return MeshCounter::kReceivedAgain;
+}
+
+void PeerLink::note_who_hears_whom(const PeerMessage& message, Timestamp arrival,
+                                   const Endpoint& from) {
+  if (message.mark == 0) relay_.note_heard(message.report.sender, from, arrival);
+  for (const ClockEcho& echo : message.echoes)
+    if (echo.is_direct) relay_.note_hears(message.report.sender, echo.peer, arrival);
+}
+
 bool PeerLink::is_our_own(const PeerHeader& header) const {
   return header.sender == self_ && first_sent_ && header.session == own_session();
 }
 
 /// The session of the message, if the message is new in it and its stamps agree with it. A session
 /// that has echoed us is the live one now.
-PeerLink::Session* PeerLink::accept(Peer& peer, const PeerMessage& message, Timestamp arrival) {
-  Session* const session = admit(peer, message, arrival);
+PeerLink::Session* PeerLink::accept(Peer& peer, const PeerMessage& message, Timestamp arrival,
+                                    const Endpoint& from) {
+  Session* const session = admit(peer, message, arrival, from);
   if (session == nullptr) return nullptr;
   session->last_arrival = arrival;
   if (!update_clock(*session, message, arrival)) return nullptr;
@@ -196,7 +228,8 @@ void PeerLink::count_doubled(MeshCounter counter, RobotId robot, Timestamp now) 
 }
 
 /// The session of the message, if the message is new in it.
-PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message, Timestamp arrival) {
+PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message, Timestamp arrival,
+                                   const Endpoint& from) {
   if (!readmit(peer, message, arrival)) return nullptr;
   const auto is_it = [&](const std::optional<Session>& session) {
     return session && session->id == message.session;
@@ -212,10 +245,11 @@ PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message, Times
   const auto refusal = crepes::refusal_of(
       session.sequence.accept(message.sequence, max_ahead(arrival - session.last_arrival)));
   if (refusal) {
-    counters_.add(*refusal);
+    counters_.add(
+        counted_copy(*refusal, {message.report.sender, message.session, message.sequence}, from));
     return nullptr;
   }
-  update_loss(session);
+  update_loss(session, message, arrival);
   return &session;
 }
 
@@ -256,7 +290,7 @@ bool PeerLink::update_clock(Session& session, const PeerMessage& message, Timest
       continue;
     }
     session.has_echoed_us = true;
-    session.loss.of_ours = echo.loss;
+    session.loss_of_ours = echo.loss;
     const PeerTimestamp reached{Duration{echo.received_ns}};
     switch (session.clock.add_echo(*sent, reached, arrival)) {
       case ClockOffset::Verdict::kUsed:
@@ -279,7 +313,7 @@ void PeerLink::replace_session(Peer& peer, Timestamp now) {
   if (peer.live) {
     const PeerTraffic& before = peer.live->traffic;
     next.traffic.received += before.received + peer.live->sequence.received();
-    next.traffic.lost += before.lost + peer.live->sequence.lost();
+    next.traffic.lost += before.lost + peer.live->loss.lost();
     next.traffic.restarts += before.restarts + 1;
     peer.ended.push_back({peer.live->id, now});
     if (peer.ended.size() > kMaxEnded) peer.ended.pop_front();
@@ -288,16 +322,12 @@ void PeerLink::replace_session(Peer& peer, Timestamp now) {
 }
 
 /// Updates the share of the peer's datagrams that do not arrive.
-void PeerLink::update_loss(Session& session) {
-  constexpr double kMemory = 0.98;  // two seconds of 25 datagrams each
-  Loss& loss = session.loss;
-  const std::uint64_t lost = session.sequence.lost();
-  loss.received = kMemory * loss.received + 1;
-  // One that arrives late is no longer lost.
-  loss.lost = std::max(
-      0.0, kMemory * loss.lost + static_cast<double>(lost) - static_cast<double>(loss.lost_before));
-  loss.lost_before = lost;
-  loss.of_theirs = loss.lost / (loss.lost + loss.received);
+void PeerLink::update_loss(Session& session, const PeerMessage& message, Timestamp arrival) const {
+  if (message.mark == 0 || relay_.is_heard(message.report.sender, arrival)) {
+    session.loss.update(session.sequence.lost());
+  } else {
+    session.loss.update_forwarded(session.sequence.lost(), message.sequence, message.mark);
+  }
 }
 
 /// When we sent the datagram that an echo names, if that was a moment ago.
@@ -314,13 +344,42 @@ std::uint64_t PeerLink::own_session() const {
   return settings_.session_salt ^ static_cast<std::uint64_t>(to_ns(*first_sent_));
 }
 
-/// With a part of the air for each that is heard.
-Pace PeerLink::pace(Timestamp now) const {
-  const auto heard = std::ranges::count_if(peers_, [&](const auto& known) {
+/// Peers that are heard directly, and new ones.
+std::size_t PeerLink::heard_directly(Timestamp now) const {
+  const auto count = std::ranges::count_if(peers_, [&](const auto& known) {
     const std::optional<Session>& session = known.second.heard();
-    return session && now - session->last_arrival <= kEchoAge;
+    return session && now - session->last_arrival <= kEchoAge &&
+           (!known.second.live || relay_.is_heard(known.first, now));
   });
-  return pace_of(settings_, static_cast<std::size_t>(heard));
+  return static_cast<std::size_t>(count);
+}
+
+Pace PeerLink::pace(Timestamp now) const {
+  return pace_of(settings_, heard_directly(now), forwarded_air(now));
+}
+
+/// Share of the channel's time that forwarding took in the last second.
+double PeerLink::forwarded_air(Timestamp now) const {
+  double air_s = 0.0;
+  for (const auto& [at, bytes] : forwarded_)
+    if (now - at < kForwardedAge)
+      air_s += airtime(1.0, static_cast<double>(bytes), settings_.broadcasts);
+  return air_s / to_seconds(kForwardedAge);
+}
+
+std::vector<std::vector<std::uint8_t>> PeerLink::forwards(Timestamp now) {
+  while (!forwarded_.empty() && now - forwarded_.front().first >= kForwardedAge)
+    forwarded_.pop_front();
+  const double most = forwarding_part(settings_, heard_directly(now));
+  std::vector<std::vector<std::uint8_t>> due = relay_.take_due(now);
+  std::erase_if(due, [&](const auto& bytes) {
+    if (forwarded_air(now) >= most) return true;
+    forwarded_.emplace_back(now, bytes.size());
+    counters_.add(MeshCounter::kForwarded);
+    counters_.add(MeshCounter::kForwardedBytes, bytes.size());
+    return false;
+  });
+  return due;
 }
 
 bool PeerLink::is_due(Timestamp now) const {
@@ -330,23 +389,27 @@ bool PeerLink::is_due(Timestamp now) const {
   return now - sent_.back() >= from_seconds(reports / settings_.rate_hz);
 }
 
-/// Of the peer that loses the most.
-double PeerLink::worst_loss_of_ours(Timestamp now) const {
+/// Of the peer that loses the most, of those that hear us directly or of all.
+double PeerLink::worst_loss_of_ours(Timestamp now, bool everywhere) const {
   constexpr double kUnknownLoss = 0.2;
   std::optional<double> worst;
   for (const auto& [id, peer] : peers_) {
     if (!peer.live || now - peer.live->last_arrival > kEchoAge) continue;
-    worst = std::max(worst.value_or(0.0), peer.live->loss.of_ours.value_or(kUnknownLoss));
+    if (!everywhere && !relay_.is_heard(id, now)) continue;
+    worst = std::max(worst.value_or(0.0), peer.live->loss_of_ours.value_or(kUnknownLoss));
   }
   return worst.value_or(kUnknownLoss);
 }
 
-WireLimits PeerLink::limits(Timestamp now, std::size_t overhead) const {
+/// A marked datagram stands for all since the last marked one. With `mark` 0: without the mark.
+WireLimits PeerLink::limits(Timestamp now, std::size_t overhead, std::uint32_t mark) const {
   const Pace pace = this->pace(now);
-  return {.bytes = std::max(pace.bytes, kMinPeerMessage + overhead) - overhead,
-          .copies = copies_for(worst_loss_of_ours(now)),
-          .period = from_seconds(static_cast<double>(pace.reports) / settings_.rate_hz),
-          .reports = pace.reports,
+  const std::size_t reports = pace.reports * std::max<std::size_t>(mark, 1);
+  const std::size_t most = bytes_of(pace, mark > 0, relay_.is_needed(now));
+  return {.bytes = std::clamp(most, kMinPeerMessage + overhead, kMaxPeerMessage) - overhead,
+          .copies = mark > 0 ? kMarkedCopies : copies_for(worst_loss_of_ours(now, false)),
+          .period = from_seconds(static_cast<double>(reports) / settings_.rate_hz),
+          .reports = reports,
           .gyro_step_radps = settings_.gyro_step_radps,
           .accel_step_mps2 = settings_.accel_step_mps2};
 }
@@ -356,24 +419,32 @@ std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,
                                             const std::optional<PacketSigner>& signer) {
   CREPES_EXPECT(report.sender == self_, "a robot reports for itself");
   if (!first_sent_) first_sent_ = now;
+  const std::size_t reports = pace(now).reports;
+  const std::uint32_t spacing = mark_spacing(reports);
+  relay_.set_period(from_seconds(static_cast<double>(reports) / settings_.rate_hz));
+  const bool is_marked = relay_.is_needed(now) && next_sequence_ % spacing == 0;
   sent_.push_back(now);
   while (sent_.front() <= now - kMaxEchoAge) sent_.pop_front();
   OutgoingPeerMessage message{.report = report,
                               .sent = now,
                               .session = own_session(),
                               .sequence = next_sequence_++,
+                              .mark = is_marked ? spacing : 0,
                               .echoes = {}};
   for (const auto& [id, peer] : peers_) {
     for (const std::optional<Session>* known : {&peer.live, &peer.candidate}) {
       const auto packet = *known ? (*known)->clock.fastest_recent_packet() : std::nullopt;
       if (!packet || packet->arrival > now || packet->arrival <= now - kEchoAge) continue;
-      message.echoes.push_back(
-          {id, echo_code(to_ns(packet->sent)), to_ns(packet->arrival), (*known)->loss.of_theirs});
+      message.echoes.push_back({.peer = id,
+                                .sent_code = echo_code(to_ns(packet->sent)),
+                                .received_ns = to_ns(packet->arrival),
+                                .loss = (*known)->loss.share(),
+                                .is_direct = relay_.is_heard(id, now)});
     }
   }
   const std::size_t overhead =
       (seal ? PacketSeal::kOverhead : 0) + (signer ? PacketSigner::kOverhead : 0);
-  EncodedPeerMessage encoded = encode_peer_message(message, limits(now, overhead));
+  EncodedPeerMessage encoded = encode_peer_message(message, limits(now, overhead, message.mark));
   if (signer) encoded.bytes = signer->sign(encoded.bytes);
   if (seal) encoded.bytes = seal->seal(encoded.bytes);
   const auto count = [&](MeshCounter counter, std::size_t n) {
@@ -405,9 +476,9 @@ std::vector<PeerTraffic> PeerLink::traffic(Timestamp now) const {
     if (!session) continue;
     heard.push_back(session->traffic);
     heard.back().received += session->sequence.received();
-    heard.back().lost += session->sequence.lost();
+    heard.back().lost += session->loss.lost();
     heard.back().age_s = to_seconds(now - session->last_arrival);
-    heard.back().loss = session->loss.of_theirs;
+    heard.back().loss = session->loss.share();
   }
   return heard;
 }

@@ -5,6 +5,9 @@
 /// that was replaced returns if it echoes what we sent after that, and the other one is silent:
 /// then a second robot with the peer's id was there for a while.
 ///
+/// Some datagrams are marked: they are forwarded to robots that do not hear their sender
+/// (`mesh_relay.hpp`), as they came, and are the only ones that these robots have of it.
+///
 /// What a member with a key sends must be signed. A signature is verified last, when the seal, the
 /// sender and the sequence number are right, and nothing that it protects is used before.
 #pragma once
@@ -14,12 +17,15 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "estimator/core/outputs.hpp"
 #include "net/endpoint.hpp"
 #include "net/mesh/clock_offset.hpp"
+#include "net/mesh/loss_meter.hpp"
 #include "net/mesh/mesh_counters.hpp"
+#include "net/mesh/mesh_relay.hpp"
 #include "net/mesh/mesh_trust.hpp"
 #include "net/mesh/packet_seal.hpp"
 #include "net/mesh/packet_signature.hpp"
@@ -58,6 +64,10 @@ class PeerLink {
   [[nodiscard]] std::vector<std::uint8_t> compose(
       const Report& report, Timestamp now, const std::optional<PacketSeal>& seal = std::nullopt,
       const std::optional<PacketSigner>& signer = std::nullopt);
+  /// Datagrams of others to broadcast immediately, as they came.
+  [[nodiscard]] std::vector<std::vector<std::uint8_t>> forwards(Timestamp now);
+  /// When to call `forwards`; empty if nothing waits.
+  [[nodiscard]] std::optional<Timestamp> next_forward() const { return relay_.next_due(); }
 
   /// Peers whose clock is known, ordered by id.
   [[nodiscard]] std::vector<ClockStatus> clocks() const;
@@ -69,17 +79,10 @@ class PeerLink {
   [[nodiscard]] const MeshCounters& counters() const { return counters_; }
 
  private:
-  /// Shares of lost datagrams, the recent ones with the greater weight.
-  struct Loss {
-    double of_theirs = 0.0;           ///< of the peer's, at us
-    std::optional<double> of_ours{};  ///< of ours, at the peer
-    double received = 0.0;            ///< weights
-    double lost = 0.0;
-    std::uint64_t lost_before = 0;
-  };
   struct Session {
     std::uint64_t id = 0;
-    Loss loss;
+    LossMeter loss;                        ///< of the peer's datagrams, at us
+    std::optional<double> loss_of_ours{};  ///< at the peer
     ClockOffset clock;
     SequenceWindow sequence;
     RedundancyFilter redundancy;
@@ -110,24 +113,33 @@ class PeerLink {
                                                       const PeerHeader& header, Timestamp arrival,
                                                       const Endpoint& from);
   [[nodiscard]] bool is_our_own(const PeerHeader& header) const;
-  [[nodiscard]] Session* accept(Peer& peer, const PeerMessage& message, Timestamp arrival);
-  [[nodiscard]] Session* admit(Peer& peer, const PeerMessage& message, Timestamp arrival);
+  [[nodiscard]] Session* accept(Peer& peer, const PeerMessage& message, Timestamp arrival,
+                                const Endpoint& from);
+  [[nodiscard]] Session* admit(Peer& peer, const PeerMessage& message, Timestamp arrival,
+                               const Endpoint& from);
   [[nodiscard]] bool readmit(Peer& peer, const PeerMessage& message, Timestamp arrival);
   [[nodiscard]] bool update_clock(Session& session, const PeerMessage& message, Timestamp arrival);
   void count_doubled(MeshCounter counter, RobotId robot, Timestamp now);
   static void replace_session(Peer& peer, Timestamp now);
-  static void update_loss(Session& session);
+  void update_loss(Session& session, const PeerMessage& message, Timestamp arrival) const;
+  void note_who_hears_whom(const PeerMessage& message, Timestamp arrival, const Endpoint& from);
+  [[nodiscard]] MeshCounter counted_copy(MeshCounter refusal, const DatagramId& id,
+                                         const Endpoint& from);
   [[nodiscard]] std::optional<Timestamp> sent_by_us(std::uint32_t code, Timestamp now) const;
   [[nodiscard]] std::uint64_t own_session() const;
+  [[nodiscard]] std::size_t heard_directly(Timestamp now) const;
   [[nodiscard]] Pace pace(Timestamp now) const;
-  [[nodiscard]] double worst_loss_of_ours(Timestamp now) const;
-  [[nodiscard]] WireLimits limits(Timestamp now, std::size_t overhead) const;
+  [[nodiscard]] double worst_loss_of_ours(Timestamp now, bool everywhere) const;
+  [[nodiscard]] double forwarded_air(Timestamp now) const;
+  [[nodiscard]] WireLimits limits(Timestamp now, std::size_t overhead, std::uint32_t mark) const;
 
   RobotId self_;
   SendSettings settings_;
   std::map<RobotId, Peer> peers_;  ///< all members except us
   MeshTrust trust_;
   SignatureLimiter limiter_;
+  MeshRelay relay_;
+  std::deque<std::pair<Timestamp, std::size_t>> forwarded_;  ///< bytes, in the last second
   MeshCounters counters_;
   std::optional<DoubledId> doubled_;
   std::optional<Timestamp> first_sent_;

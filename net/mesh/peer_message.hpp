@@ -32,6 +32,7 @@ struct ClockEcho {
   std::uint32_t sent_code = 0;   ///< `echo_code` of the datagram
   std::int64_t received_ns = 0;  ///< clock of the echo's sender
   double loss = 0.0;             ///< recent share of the peer's datagrams that did not arrive
+  bool is_direct = true;         ///< not only what others forward arrives
   bool operator==(const ClockEcho&) const = default;
 };
 
@@ -48,6 +49,7 @@ struct BasicPeerMessage {
   Time sent{};                 ///< when the datagram left
   std::uint64_t session = 0;   ///< changes when the sender restarts
   std::uint32_t sequence = 0;  ///< counts the session's datagrams
+  std::uint32_t mark = 0;      ///< to be forwarded, as each so manieth of the session; 0: it is not
   std::vector<ClockEcho> echoes;
 };
 

@@ -31,6 +31,7 @@ struct CodedEcho {
   std::uint32_t sent_code = 0;
   std::uint64_t age_us = 0;
   unsigned loss = 0;
+  bool is_direct = false;
 };
 
 /// How the values of three axes are predicted, and the order of their code.
@@ -85,6 +86,7 @@ struct CodedEstimate {
 
 struct CodedBody {
   std::uint64_t sent_ns = 0;  ///< two's complement
+  unsigned mark = 0;
   std::int64_t report_age = 0;
   std::optional<CodedTilt> tilt;
   std::vector<CodedEcho> echoes;
@@ -212,6 +214,7 @@ void code_echo(Stream& stream, CodedEcho& echo) {
   stream.number(echo.age_us, kAge);
   stream.expect(echo.age_us <= kMaxEchoAgeUs, PeerMessageError::kBadStamp);
   stream.bits(echo.loss, kLossBits);
+  stream.bits(echo.is_direct, 1);
 }
 
 /// Prediction of the value of `axis` in sample `i` from the newer ones.
@@ -365,6 +368,7 @@ void code_body(Stream& stream, CodedBody& body) {
   stream.bits(body.sent_ns, 64);
   const auto sent_ns = static_cast<std::int64_t>(body.sent_ns);
   stream.expect(sent_ns >= -kMaxStamp && sent_ns <= kMaxStamp, PeerMessageError::kBadStamp);
+  stream.bits(body.mark, kMarkBits);
   stream.delta(body.report_age, 0, kStamp, {-kMaxAhead, kMaxReportAge},
                PeerMessageError::kBadStamp);
   stream.presence(body.tilt);

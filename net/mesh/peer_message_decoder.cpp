@@ -21,6 +21,7 @@ class Dequantizer {
   /// Empty for a covariance that is not positive definite or a quaternion that is none.
   [[nodiscard]] tl::expected<PeerMessage, PeerMessageError> message() const {
     PeerMessage message;
+    message.mark = body_.mark;
     PeerReport& report = message.report;
     message.sent = PeerTimestamp{Duration{static_cast<std::int64_t>(body_.sent_ns)}};
     report.stamp = time(body_.report_age);
@@ -63,7 +64,8 @@ class Dequantizer {
             .sent_code = code.sent_code,
             .received_ns = static_cast<std::int64_t>(body_.sent_ns) -
                            static_cast<std::int64_t>(code.age_us) * 1000,
-            .loss = code.loss / kLossSteps};
+            .loss = code.loss / kLossSteps,
+            .is_direct = code.is_direct};
   }
 
   [[nodiscard]] BasicImuSample<PeerTimestamp> sample(const CodedImuSample& code) const {

@@ -24,6 +24,11 @@ std::int64_t rounded(double value, double step) {
   return static_cast<std::int64_t>(std::llround(value / step));
 }
 
+/// Counts the datagrams of this kind. Those that are forwarded have turns of their own.
+std::uint32_t turn_of(const OutgoingPeerMessage& message) {
+  return message.mark > 0 ? message.sequence / message.mark : message.sequence;
+}
+
 bool is_unit(const Eigen::Vector3d& u) { return std::abs(u.norm() - 1) < 1e-3; }
 
 bool is_coordinate(const Eigen::Vector3d& p) {
@@ -138,6 +143,7 @@ class Quantizer {
       : limits_(limits), base_tick_(floor_to_ticks(to_ns(message.sent))) {
     const Report& report = message.report;
     body_.sent_ns = static_cast<std::uint64_t>(to_ns(message.sent));
+    body_.mark = message.mark;
     body_.report_age = age_of(report.stamp);
     CREPES_EXPECT(std::abs(body_.report_age) <= kMaxTiltAge,
                   "a report leaves within hours of its stamp");
@@ -147,7 +153,7 @@ class Quantizer {
     for (const Bearing* bearing : newest_first(report.bearings)) add(*bearing);
     for (const UwbRange* range : newest_first(report.ranges)) add(*range);
     std::ranges::sort(body_.sources, {}, &CodedSource::neighbor);
-    add_estimate(report.estimates, message.sequence);
+    add_estimate(report.estimates, turn_of(message));
   }
 
   [[nodiscard]] CodedBody body() && { return std::move(body_); }
@@ -184,14 +190,14 @@ class Quantizer {
     const std::size_t most = std::min(kEchoesPerReport * limits_.reports, kMaxEchoes);
     const std::size_t count = std::min(message.echoes.size(), most);
     for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t turn = std::size_t{message.sequence} * most + i;
+      const std::size_t turn = std::size_t{turn_of(message)} * most + i;
       const ClockEcho& echo = message.echoes[turn % message.echoes.size()];
       const std::int64_t age_us = (to_ns(message.sent) - echo.received_ns + 500) / 1000;
       CREPES_EXPECT(std::in_range<std::uint32_t>(age_us), "an echo is of the recent past");
       constexpr auto kMaxLoss = static_cast<double>((1U << kLossBits) - 1);
       const double loss = std::clamp(std::round(echo.loss * kLossSteps), 0.0, kMaxLoss);
       body_.echoes.push_back({echo.peer.value, echo.sent_code, static_cast<std::uint64_t>(age_us),
-                              static_cast<unsigned>(loss)});
+                              static_cast<unsigned>(loss), echo.is_direct});
     }
   }
 
@@ -257,11 +263,11 @@ class Quantizer {
            (age_of(item.stamp) - codes.front().age) * kTick >= window.count();
   }
 
-  void add_estimate(const std::vector<NeighborEstimate>& all, std::uint32_t sequence) {
+  void add_estimate(const std::vector<NeighborEstimate>& all, std::uint32_t turn) {
     std::vector<const NeighborEstimate*> estimates = newest_first(all);
     if (estimates.empty()) return;
     std::ranges::sort(estimates, {}, [](const auto* estimate) { return estimate->neighbor; });
-    const NeighborEstimate& next = *estimates[sequence % estimates.size()];
+    const NeighborEstimate& next = *estimates[turn % estimates.size()];
     body_.estimates.push_back(coded(next, age_of(next.stamp)));
   }
 
@@ -325,15 +331,15 @@ void thin_out(std::vector<Item>& items, std::int64_t spacing) {
   });
 }
 
-CodedBody without(CodedBody body, const Omission& omission, std::uint32_t sequence) {
+CodedBody without(CodedBody body, const Omission& omission, std::uint32_t turn_of_datagram) {
   const auto shorten = [](auto& items, std::size_t n) { items.resize(std::min(items.size(), n)); };
   shorten(body.imu.samples, omission.samples);
-  if (omission.fewer_estimates && sequence % 4 != 0) body.estimates.clear();
+  if (omission.fewer_estimates && turn_of_datagram % 4 != 0) body.estimates.clear();
   std::vector<CodedSource> remaining;
   const std::size_t count = body.sources.size();
   for (std::size_t i = 0; i < count; ++i) {
     // Each datagram continues where the last one of this size ended.
-    const std::size_t turn = (i + count - sequence * omission.neighbors % count) % count;
+    const std::size_t turn = (i + count - turn_of_datagram * omission.neighbors % count) % count;
     if (turn >= omission.neighbors) continue;
     CodedSource& source = remaining.emplace_back(std::move(body.sources[i]));
     thin_out(source.ranges, omission.spacing);
@@ -388,6 +394,7 @@ EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
                 "what a datagram cannot do without has room");
   CREPES_EXPECT(limits.copies > 0 && limits.reports > 0, "every measurement is sent");
   CREPES_EXPECT(wire::is_robot(message.report.sender), "a sender has an id");
+  CREPES_EXPECT(message.mark >> wire::kMarkBits == 0, "marks are of a few datagrams");
   CREPES_EXPECT(std::abs(to_ns(message.sent)) <= wire::kMaxStamp, "a clock counts from its epoch");
   wire::Quantizer quantizer(message, limits);
   const std::size_t refused = quantizer.refused();
@@ -396,7 +403,7 @@ EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
   encoded.refused = refused;
   std::optional<wire::CodedBody> wanted;  // the first that is tried
   for (const wire::Omission& omission : wire::omissions(whole, limits)) {
-    wire::CodedBody body = wire::without(whole, omission, message.sequence);
+    wire::CodedBody body = wire::without(whole, omission, wire::turn_of(message));
     encoded.bytes = wire::written(message, body);
     if (!wanted) wanted = body;
     encoded.left_out = whole.sources.size() - body.sources.size();

@@ -47,6 +47,7 @@ inline constexpr std::int64_t kQuaternionUnit = 16383;  // of 1/sqrt(2)
 inline constexpr unsigned kSigmaBits = 12;
 inline constexpr unsigned kFactorBits = 12;
 inline constexpr std::uint64_t kMaxEchoAgeUs = 0xFFFF'FFFF;
+inline constexpr unsigned kMarkBits = 3;
 inline constexpr unsigned kLossBits = 4;
 inline constexpr double kLossSteps = 30.0;  // of a loss of 1
 inline constexpr std::uint64_t kMaxId = 65534;

@@ -32,14 +32,15 @@ std::size_t copies_for(double loss) {
       std::clamp(std::ceil(std::log(kAllLost) / std::log(p)), kLeast, kMost));
 }
 
-Pace pace_of(const SendSettings& settings, std::size_t neighbors) {
+Pace pace_of(const SendSettings& settings, std::size_t neighbors, double forwarded_air) {
   constexpr double kMostOfOwn = 9500.0;        // B/s
   constexpr double kMostPerNeighbor = 100.0;   // B/s
   constexpr double kWantedOfOwn = 280.0;       // B: header, echoes, inertial samples, signature
   constexpr double kWantedPerNeighbor = 13.0;  // B: a bearing and a range
   constexpr double kSlowest = 4.0;             // Hz
   const auto n = static_cast<double>(neighbors);
-  const double share = settings.airtime_of_all / (n + 1);
+  const double part = settings.airtime_of_all / (n + 1);
+  const double share = part - std::min(forwarded_air, forwarding_part(settings, neighbors));
   Pace pace;
   for (;; ++pace.reports) {
     const double rate_hz = settings.rate_hz / static_cast<double>(pace.reports);
@@ -50,6 +51,11 @@ Pace pace_of(const SendSettings& settings, std::size_t neighbors) {
     const bool is_slowest = settings.rate_hz < kSlowest * static_cast<double>(pace.reports + 1);
     if (is_slowest || bytes >= std::min(kWantedOfOwn + kWantedPerNeighbor * n, most)) return pace;
   }
+}
+
+double forwarding_part(const SendSettings& settings, std::size_t neighbors) {
+  constexpr double kMost = 0.75;
+  return kMost * settings.airtime_of_all / static_cast<double>(neighbors + 1);
 }
 
 double airtime(double datagrams_per_s, double bytes_per_datagram, const Broadcasts& broadcasts) {

@@ -43,7 +43,12 @@ struct Pace {
 /// a datagram a report would be too short, it sends fewer and fuller ones, because most of a short
 /// one is headers and waiting; but at least four a second, because others predict its motion from
 /// one to the next. Below kMinPeerMessage no datagram is shortened.
-[[nodiscard]] Pace pace_of(const SendSettings& settings, std::size_t neighbors);
+/// What it forwards, `forwarded_air`, comes out of its part.
+[[nodiscard]] Pace pace_of(const SendSettings& settings, std::size_t neighbors,
+                           double forwarded_air = 0.0);
+
+/// The share of the channel's time that a robot may take to forward: three quarters of its part.
+[[nodiscard]] double forwarding_part(const SendSettings& settings, std::size_t neighbors);
 
 /// Seconds of air that a robot takes per second with broadcasts (IEEE 802.11a/g, 20 MHz): preamble
 /// and symbols, mean backoff, and all repeats. Headers of UDP, IP, batman-adv, LLC and MAC are

@@ -188,7 +188,8 @@ std::vector<FuzzInput> peer_message_seeds() {
   report.stamp = message.sent;
   report.tilt = {message.sent, Eigen::Vector3d::UnitZ(), 0.01};
   const FuzzInput empty = encode_peer_message(message).bytes;
-  message.echoes.push_back({RobotId{2}, 1'000'000, 2'000'000, 0.1});
+  message.echoes.push_back({RobotId{2}, 1'000'000, 2'000'000, 0.1, false});
+  message.mark = 6;
   report.imu.push_back({message.sent, {0.1, 0.2, 0.3}, {0.0, 0.0, 9.8}});
   report.bearings.push_back(
       {message.sent, RobotId{2}, Eigen::Vector3d::UnitX(), {0.06, 0.0, 0.04}, 0.001});

@@ -67,6 +67,11 @@ void add_replay(CommandLine& line) {
                   "seconds for which a link loses everything; without it, datagrams are lost one "
                   "by one")
       ->check(CLI::Range(0.0, 60.0));
+  sub->add_option("--reach", options.reach_m,
+                  "robots further apart do not hear each other, by truth/ [m]; 0: all do")
+      ->check(CLI::Range(0.0, 1e6));
+  sub->add_flag("--no-forwarding{false},--forwarding{true}", options.forwards,
+                "with --reach: nobody forwards what it hears, as batman-adv does");
   sub->add_flag("--sealed", options.sealed,
                 "seal and sign the datagrams, with keys made for the replay");
   sub->add_flag(

@@ -1,12 +1,15 @@
 /// The mesh of a replay: datagrams are delayed, reordered and lost.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <random>
 #include <utility>
+#include <vector>
 
 #include "daemon/ctl/dataset/swarm_manifest.hpp"
 #include "estimator/core/measurements.hpp"
@@ -26,6 +29,32 @@ class SimulatedNetwork {
         burst_s_ > 0 ? is_in_burst(bursts_[{from, to}], sent_s) : uniform() < model_.loss;
     const double delay_ms = model_.latency_ms + uniform() * model_.jitter_ms;
     return lost ? std::nullopt : std::optional(delay_ms * 1e-3);
+  }
+
+  /// The delays of one datagram to those that it reaches [s]. Robots that do not hear the sender
+  /// get it from those that do, who forward it once, if `forwards`.
+  [[nodiscard]] std::map<RobotId, double> delays_s(
+      RobotId from, const std::vector<RobotId>& robots, double sent_s, bool forwards,
+      const std::function<bool(RobotId, RobotId)>& hears) {
+    std::map<RobotId, double> reached{{from, 0.0}};
+    std::vector<RobotId> due{from};
+    while (!due.empty()) {
+      const auto earlier = [&](RobotId a, RobotId b) { return reached.at(a) < reached.at(b); };
+      const auto next = std::ranges::min_element(due, earlier);
+      const RobotId hop = *next;
+      due.erase(next);
+      for (const RobotId to : robots) {
+        if (to == hop || to == from || (hop != from && hears(to, from)) || !hears(to, hop))
+          continue;
+        const auto delay = delay_s(hop, to, sent_s);
+        if (!delay) continue;
+        const auto [known, is_new] = reached.try_emplace(to, reached.at(hop) + *delay);
+        known->second = std::min(known->second, reached.at(hop) + *delay);
+        if (is_new && forwards) due.push_back(to);
+      }
+    }
+    reached.erase(from);
+    return reached;
   }
 
  private:

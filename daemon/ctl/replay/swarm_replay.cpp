@@ -39,8 +39,9 @@ struct PendingImage {
   std::uint8_t camera = 0;
   RecordedImage image;
 };
+struct Forward {};  ///< what waits for it
 struct Restart {};
-using Input = std::variant<Event, Datagram, PendingImage, Restart>;
+using Input = std::variant<Event, Datagram, PendingImage, Forward, Restart>;
 
 /// An input that reaches a robot at an instant of true time.
 struct Arrival {
@@ -158,7 +159,9 @@ class SwarmReplay {
         faults_(std::move(dataset.faults)),
         network_(network_model(manifest_.network, options),
                  options.seed.value_or(manifest_.network.seed), options.burst_s),
-        outages_(options.outages) {
+        outages_(options.outages),
+        reach_m_(options.reach_m),
+        forwards_(options.forwards) {
     for (RobotRecording& recording : dataset.robots) {
       recording.config.graph.enabled &= options.graph;
       if (options.profile) recording.config.estimator.profile = *options.profile;
@@ -188,6 +191,8 @@ class SwarmReplay {
   void step(const Arrival& arrival, const Event& event);
   void handle_outputs(const Arrival& arrival, const Outputs& outputs);
   void broadcast(const Arrival& arrival, const Report& report);
+  void send(const Arrival& arrival, const std::vector<std::uint8_t>& datagram);
+  [[nodiscard]] bool are_in_reach(RobotId a, RobotId b, double true_s) const;
   void count_id_mistakes(Robot& robot, const std::vector<Bearing>& bearings);
   void sample_clocks(Robot& robot, double true_s);
 
@@ -197,6 +202,8 @@ class SwarmReplay {
   DatasetFaults faults_;
   SimulatedNetwork network_;
   std::vector<Outage> outages_;
+  double reach_m_;
+  bool forwards_;
   std::deque<Robot> robots_;
   std::priority_queue<Arrival, std::vector<Arrival>, Later> queue_;
   std::uint64_t next_order_ = 0;
@@ -258,6 +265,11 @@ Result<void> SwarmReplay::deliver(const Arrival& arrival) {
     robot.restart();
     return {};
   }
+  if (std::holds_alternative<Forward>(arrival.what)) {
+    for (const auto& datagram : robot.link.forwards(robot.clock().local(arrival.true_s)))
+      send(arrival, datagram);
+    return {};
+  }
   if (const auto* event = std::get_if<Event>(&arrival.what)) {
     step(arrival, *event);
   } else if (const auto* datagram = std::get_if<Datagram>(&arrival.what)) {
@@ -267,6 +279,8 @@ Result<void> SwarmReplay::deliver(const Arrival& arrival) {
       received = robot.link.receive(datagram->bytes, robot.clock().local(arrival.true_s),
                                     robot.seal, datagram->from);
     }
+    if (const auto next = robot.link.next_forward())
+      schedule_at(*next + std::chrono::microseconds{1}, arrival.robot, Forward{});
     if (received) step(arrival, Event(std::move(*received)));
   } else {
     const auto& due = std::get<PendingImage>(arrival.what);
@@ -324,19 +338,37 @@ void SwarmReplay::broadcast(const Arrival& arrival, const Report& report) {
     const CpuTimer timer(robot.cpu.net_s);
     datagram = robot.link.compose(report, now, robot.seal, robot.signer);
   }
+  send(arrival, datagram);
+}
+
+void SwarmReplay::send(const Arrival& arrival, const std::vector<std::uint8_t>& datagram) {
+  Robot& robot = robots_[arrival.robot];
   ++robot.datagrams_sent;
   robot.bytes_sent += datagram.size();
+  std::vector<RobotId> all;
+  for (const Robot& each : robots_) all.push_back(each.id());
+  const auto delays_s =
+      network_.delays_s(robot.id(), all, arrival.true_s, forwards_,
+                        [&](RobotId a, RobotId b) { return are_in_reach(a, b, arrival.true_s); });
   for (std::size_t i = 0; i < robots_.size(); ++i) {
     if (i == arrival.robot) continue;
     std::vector<Delivery> deliveries;
-    if (const auto delay_s = network_.delay_s(robot.id(), robots_[i].id(), arrival.true_s))
-      deliveries.push_back({arrival.true_s + *delay_s, datagram, replay_address(robot.id())});
+    if (const auto delay_s = delays_s.find(robots_[i].id()); delay_s != delays_s.end())
+      deliveries.push_back(
+          {arrival.true_s + delay_s->second, datagram, replay_address(robot.id())});
     if (sinks_.on_delivery)
       sinks_.on_delivery(robot.id(), robots_[i].id(), arrival.true_s, deliveries);
     for (Delivery& delivery : deliveries)
       schedule(std::max(arrival.true_s, delivery.arrives_s), i,
                Datagram{std::move(delivery.bytes), delivery.from});
   }
+}
+
+bool SwarmReplay::are_in_reach(RobotId a, RobotId b, double true_s) const {
+  if (reach_m_ <= 0 || !truth_) return true;
+  const auto T_W_A = truth_->pose(a, true_s);
+  const auto T_W_B = truth_->pose(b, true_s);
+  return T_W_A && T_W_B && (T_W_A->p - T_W_B->p).norm() < reach_m_;
 }
 
 void SwarmReplay::count_id_mistakes(Robot& robot, const std::vector<Bearing>& bearings) {
@@ -425,6 +457,8 @@ Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
     if (!loaded) return tl::unexpected(loaded.error());
     truth = std::move(*loaded);
   }
+  if (options.reach_m > 0 && !truth)
+    return fail(ErrorCode::kConfig, "who is in reach of whom is known by truth/, which is missing");
   auto output = ReplayOutput::create(
       options.out_dir, std::move(names),
       options.records ? ReplayOutput::Detail::kRecords : ReplayOutput::Detail::kPoses);

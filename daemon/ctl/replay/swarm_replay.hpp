@@ -36,7 +36,10 @@ struct ReplayOptions {
   std::optional<std::uint64_t> seed;  ///< seed of the network; overrides swarm.yaml
   std::optional<double> loss;         ///< share of lost datagrams; overrides swarm.yaml
   double burst_s = 0.0;               ///< losses of a link come together for so long; 0: one by one
-  bool sealed = false;                ///< datagrams are sealed and signed, with keys for the replay
+  double reach_m = 0.0;  ///< robots further apart do not hear each other, by truth/; 0: all do
+  bool forwards =
+      true;  ///< what a robot hears, it forwards to those that do not, as batman-adv does
+  bool sealed = false;  ///< datagrams are sealed and signed, with keys for the replay
   std::vector<Outage> outages;
   std::function<void(double)> on_progress;  ///< progress, 0..1, called regularly
 };

@@ -48,6 +48,22 @@ TEST(SimulatedNetwork, LosesTheSameShareInBursts) {
   EXPECT_NE(losses(network, RobotId{3}), lost);  // each link by itself
 }
 
+TEST(SimulatedNetwork, ForwardsToThoseWhoDoNotHearTheSender) {
+  SimulatedNetwork network({.latency_ms = 3, .jitter_ms = 0, .loss = 0, .seed = 0}, 1);
+  const std::vector<RobotId> line{RobotId{1}, RobotId{2}, RobotId{3}, RobotId{4}};
+  const auto hears = [](RobotId a, RobotId b) {
+    return a.value + 1 == b.value || b.value + 1 == a.value;
+  };
+
+  const auto forwarded = network.delays_s(RobotId{1}, line, 0.0, true, hears);
+  const auto once = network.delays_s(RobotId{1}, line, 0.0, false, hears);
+
+  ASSERT_EQ(forwarded.size(), 3U);
+  EXPECT_NEAR(forwarded.at(RobotId{4}), 0.009, 1e-9);
+  ASSERT_EQ(once.size(), 1U);
+  EXPECT_NEAR(once.at(RobotId{2}), 0.003, 1e-9);
+}
+
 TEST(SimulatedNetwork, LosesNothingWithoutLoss) {
   SimulatedNetwork network({.latency_ms = 3, .jitter_ms = 3, .loss = 0, .seed = 0}, 1, 0.5);
 

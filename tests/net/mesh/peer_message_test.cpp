@@ -231,6 +231,29 @@ TEST(PeerMessage, KeepsToItsLimitWithFiftyNeighborsAndReportsThemInTurn) {
   }
 }
 
+TEST(PeerMessage, MarkedDatagramsEchoAllPeersByTurnsOfTheirOwn) {
+  constexpr std::uint32_t kMark = 6;
+  constexpr int kNeighbors = 12;
+  std::set<RobotId> echoed;
+  for (std::uint32_t sequence = 0; sequence < 4 * kMark; sequence += kMark) {
+    OutgoingPeerMessage message = full_message(kNeighbors);
+    message.sequence = sequence;
+    message.mark = kMark;
+    message.echoes.front().is_direct = false;
+
+    const auto decoded =
+        decode_peer_message(encode_peer_message(message, {.reports = kMark}).bytes);
+
+    ASSERT_TRUE(decoded.has_value());
+    EXPECT_EQ(decoded->mark, kMark);
+    for (const auto& echo : decoded->echoes) {
+      echoed.insert(echo.peer);
+      EXPECT_EQ(echo.is_direct, echo.peer != RobotId{2});
+    }
+  }
+  EXPECT_EQ(echoed.size(), std::size_t{kNeighbors});
+}
+
 TEST(PeerMessage, HasAFewHundredBytesForSmoothMotion) {
   OutgoingPeerMessage message = full_message(4);
   std::mt19937 random(5);
