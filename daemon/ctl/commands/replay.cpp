@@ -71,7 +71,8 @@ void add_replay(CommandLine& line) {
                   "robots further apart do not hear each other, by truth/ [m]; 0: all do")
       ->check(CLI::Range(0.0, 1e6));
   sub->add_flag("--no-forwarding{false},--forwarding{true}", options.forwards,
-                "with --reach: nobody forwards what it hears, as batman-adv does");
+                "with --reach: no flooding, as by batman-adv; robots still forward "
+                "what is marked");
   sub->add_flag("--sealed", options.sealed,
                 "seal and sign the datagrams, with keys made for the replay");
   sub->add_flag(
