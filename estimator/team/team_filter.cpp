@@ -87,7 +87,7 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
   if (belief_.robots.empty() || interval.self != belief_.self || interval.from != belief_.stamp)
     belief_ = TeamBelief::beginning(interval);
   remove_members(interval);
-  end_probations(belief_);
+  trust_.end_probations(belief_);
   append_cameras(interval);
   belief_.append_range_biases(interval);
   if (!correct(interval)) belief_ = TeamBelief::beginning(interval);
@@ -99,6 +99,7 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
 }
 
 /// A turned camera of a trusted robot has strained everybody's calibration, so that all start anew.
+/// So have robots with false ranges.
 void TeamFilter::remove_members(const TeamInterval& interval) {
   for (const RobotId id : trust_.lost(interval, belief_)) belief_.remove(id);
   bool has_strained = false;
@@ -106,7 +107,7 @@ void TeamFilter::remove_members(const TeamInterval& interval) {
     has_strained = has_strained || belief_.robots.at(id).is_trusted;
     if (id != belief_.self) belief_.remove(id);
   }
-  if (has_strained) belief_ = TeamBelief::beginning(interval);
+  if (has_strained || trust_.is_misled(belief_)) belief_ = TeamBelief::beginning(interval);
 }
 
 /// For cameras that measure for the first time.

@@ -12,6 +12,7 @@ namespace {
 constexpr double kMaxPosition = 3.0;                     // m; a robot known worse is dropped
 constexpr Duration kRefusal = std::chrono::seconds{20};  // of a camera; then it is tried again
 constexpr Duration kProbation = std::chrono::seconds{1};
+constexpr Duration kLateProbation = std::chrono::seconds{3};
 constexpr Duration kLossMemory = std::chrono::seconds{10};
 constexpr double kDoubtPerLoss = 4.0;
 // A misalignment is a fault beyond so many sigmas of its prior and of its estimate.
@@ -23,6 +24,7 @@ constexpr double kTurnedChi2 = 25.0;                 // exceeded by one right ca
 constexpr double kTurn = radians(20.0);       // rad
 constexpr double kTurnAcross = radians(2.0);  // rad
 constexpr double kWrongClock = 8e-3;          // s
+constexpr int kLeastRefused = 3;              // pairs
 
 /// How many cameras agree with each robot's place, and how many contradict it.
 using Witnesses = std::map<RobotId, Agreement>;
@@ -257,7 +259,39 @@ int TeamTrust::recent_losses(RobotId robot, Timestamp now) const {
   return is_recent ? found->second.count : 0;
 }
 
-void end_probations(TeamBelief& belief) {
+bool TeamTrust::is_misled(const TeamBelief& belief) {
+  int refused = 0;
+  int fitting = 0;
+  std::map<RobotId, int> fitting_of;
+  for (const auto& [pair, range] : belief.ranges) {
+    const auto has = [&](auto holds) {
+      return std::ranges::any_of(range.agreement,
+                                 [&](const auto& entry) { return holds(entry.second); });
+    };
+    if (has([](const Agreement& a) { return a.is_contradiction(); })) {
+      ++refused;
+    } else if (has([](const Agreement& a) { return a.fused > 1.0; })) {
+      ++fitting;
+      ++fitting_of[pair.first];
+      ++fitting_of[pair.second];
+    }
+  }
+  if (refused < kLeastRefused || refused < fitting) return false;
+  bool is_misled = false;
+  for (const auto& [id, pairs] : fitting_of) {
+    if (id == belief.self || pairs < fitting || has_misled(id, belief.stamp)) continue;
+    misled_by_[id] = belief.stamp;
+    is_misled = true;
+  }
+  return is_misled;
+}
+
+bool TeamTrust::has_misled(RobotId robot, Timestamp now) const {
+  const auto found = misled_by_.find(robot);
+  return found != misled_by_.end() && now - found->second < kLossMemory;
+}
+
+void TeamTrust::end_probations(TeamBelief& belief) const {
   std::map<RobotId, Agreement> all;
   for (const auto& [id, robot] : belief.robots) {
     for (const TeamCamera& camera : robot.cameras) {
@@ -271,7 +305,8 @@ void end_probations(TeamBelief& belief) {
   }
   for (auto& [id, robot] : belief.robots) {
     const Agreement& agreement = all[id];
-    const bool is_long_enough = belief.stamp - robot.since >= kProbation;
+    const Duration probation = has_misled(id, belief.stamp) ? kLateProbation : kProbation;
+    const bool is_long_enough = belief.stamp - robot.since >= probation;
     if (is_long_enough && agreement.fused > 4.0 * agreement.gated + 2.0 &&
         !is_placed_by_its_own_ranges(belief, id))
       robot.is_trusted = true;

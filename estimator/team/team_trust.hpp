@@ -22,6 +22,12 @@ class TeamTrust {
   /// that camera contradicts them again, it is refused.
   [[nodiscard]] std::vector<RobotId> turned(const TeamInterval& interval, const TeamBelief& belief);
 
+  /// At least half of the pairs' ranges are refused, and one robot has a part in all others, newly:
+  /// trusted too early, it has set a wrong scale. All must start anew, and it is trusted last.
+  [[nodiscard]] bool is_misled(const TeamBelief& belief);
+  /// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.
+  void end_probations(TeamBelief& belief) const;
+
   /// How uncertain the misalignment of its cameras is, and likewise its attitude, in its body's
   /// axes [rad^2]. None if its cameras are as they were calibrated.
   [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot, Timestamp now) const;
@@ -44,14 +50,13 @@ class TeamTrust {
   };
   void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
   [[nodiscard]] bool is_realigned(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] int recent_losses(RobotId robot, Timestamp now) const;
 
   std::map<RobotId, Losses> losses_;
   std::map<RobotId, Verdict> verdicts_;
+  std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
 };
-
-/// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.
-void end_probations(TeamBelief& belief);
 
 /// Cameras that are turned or refused, robots most of whose ranges are refused, and clocks that are
 /// off.

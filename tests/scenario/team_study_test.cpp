@@ -243,6 +243,7 @@ TEST(TeamStudy, ComparesTheHonestWithAndWithoutALiar) {
     ASSERT_TRUE(trial) << trial.error().message;
     SCOPED_TRACE(table_of(std::vector{*trial}));
     EXPECT_NEAR(static_cast<double>(trial->without.gross_errors.all.poses), 6.0 * 150.0, 60.0);
+    EXPECT_NEAR(static_cast<double>(trial->alone.gross_errors.all.poses), 6.0 * 150.0, 60.0);
     const double ratio = trial->with.position_rmse_m / trial->without.position_rmse_m;
     if (method == TeamMethod::kPoseGraph) {
       EXPECT_GT(ratio, 2.0);

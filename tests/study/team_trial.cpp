@@ -122,6 +122,21 @@ PairScores without_robot(PairScores scores, RobotId robot) {
   return scores;
 }
 
+/// As if it had never been there.
+Swarm removed(Swarm swarm, RobotId robot) {
+  const auto is_it = [robot](const auto& recording) { return recording.robot.id == robot; };
+  std::erase_if(swarm.dataset.robots, is_it);
+  std::erase_if(swarm.dataset.manifest.robots,
+                [robot](const SwarmRobot& entry) { return entry.id == robot; });
+  for (RobotRecording& recording : swarm.dataset.robots) {
+    std::erase_if(recording.config.swarm.members,
+                  [robot](const MemberConfig& member) { return member.id == robot; });
+    std::erase_if(recording.ranges,
+                  [robot](const UwbRange& range) { return range.neighbor == robot; });
+  }
+  return swarm;
+}
+
 Swarm with_method(Swarm swarm, std::optional<TeamMethod> method) {
   for (RobotRecording& robot : swarm.dataset.robots)
     robot.config.graph.method = method.value_or(robot.config.graph.method);
@@ -178,9 +193,12 @@ Result<LiarTrial> run_liar_trial(const Swarm& swarm, const Liar& liar,
   const auto with =
       replay_scores(corrupted, options.replay, options.after_s, corrupted_reports(liar.lie, robot));
   if (!with) return tl::unexpected(with.error());
+  const auto alone = replay_scores(removed(honest, robot), options.replay, options.after_s);
+  if (!alone) return tl::unexpected(alone.error());
   return LiarTrial{.name = swarm.dataset.manifest.scenario,
                    .without = quality_of(without_robot(*without, robot)),
-                   .with = quality_of(without_robot(*with, robot))};
+                   .with = quality_of(without_robot(*with, robot)),
+                   .alone = quality_of(*alone)};
 }
 
 std::string table_of(const std::vector<TeamTrial>& trials) {
@@ -219,6 +237,10 @@ std::string table_of(const std::vector<LiarTrial>& trials) {
       {"ratio m", 2, [](T t) { return t.with.position_rmse_m / t.without.position_rmse_m; },
        Pool::kRootMeanSquare},
       {"deg", 2, [](T t) { return t.with.rotation_rmse_rad / t.without.rotation_rmse_rad; },
+       Pool::kRootMeanSquare},
+      {"of alone m", 2, [](T t) { return t.with.position_rmse_m / t.alone.position_rmse_m; },
+       Pool::kRootMeanSquare},
+      {"deg", 2, [](T t) { return t.with.rotation_rmse_rad / t.alone.rotation_rmse_rad; },
        Pool::kRootMeanSquare},
       {"nees", 2, [](T t) { return t.with.median_nees; }, Pool::kMedian},
       {"avail %", 1, [](T t) { return 100.0 * t.with.worst_availability; }, Pool::kLowest}};

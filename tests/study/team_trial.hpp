@@ -40,11 +40,12 @@ struct TeamTrialOptions {
 
 [[nodiscard]] Result<TeamTrial> run_team_trial(const Swarm& swarm, const TeamTrialOptions& options);
 
-/// The honest pairs of one swarm with and without a liar among them.
+/// The honest pairs of one swarm with a liar among them, with the same robot honest, and alone.
 struct LiarTrial {
   std::string name;
   TeamQuality without;
   TeamQuality with;
+  TeamQuality alone;
 };
 
 /// The robot of the highest id lies; poses of it and by it do not count.
