@@ -202,7 +202,8 @@ void PeerLink::note_who_hears_whom(const PeerMessage& message, Timestamp arrival
                                    const Endpoint& from) {
   if (message.mark == 0) relay_.note_heard(message.report.sender, from, arrival);
   for (const ClockEcho& echo : message.echoes)
-    if (echo.is_direct) relay_.note_hears(message.report.sender, echo.peer, arrival);
+    if (echo.is_direct && (echo.peer == self_ || peers_.contains(echo.peer)))
+      relay_.note_hears(message.report.sender, echo.peer, arrival);
 }
 
 bool PeerLink::is_our_own(const PeerHeader& header) const {
