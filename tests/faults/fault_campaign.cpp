@@ -2,27 +2,95 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <fstream>
+#include <string>
+#include <vector>
 
+#include "tests/faults/fault_table.hpp"
 #include "tests/faults/trial.hpp"
+
+namespace crepes::faults {
+namespace {
+
+struct Options {
+  std::uint64_t first = 1;
+  std::uint64_t count = 100;
+  std::uint64_t part = 0;  ///< of the worlds
+  std::uint64_t parts = 1;
+  bool takes_long = false;
+  std::string log;
+  std::string trial;
+  std::vector<std::string> tables;
+};
+
+void print(const Verdict& verdict) {
+  fmt::print("open {}\n", to_string(verdict.trial));  // as a line of kept.txt
+  fmt::print("  smallest: {}\n", to_string(Trial{verdict.trial.world, verdict.smallest}));
+  for (const std::string& line : verdict.broken) fmt::print("    {}\n", line);
+  std::fflush(stdout);
+}
+
+/// One schedule, as it is printed or kept.
+std::uint64_t run_one(const std::string& line) {
+  const auto trial = parse_trial(line);
+  if (!trial) {
+    fmt::print(stderr, "no schedule: {}\n", line);
+    return 1;
+  }
+  std::uint64_t failed = 0;
+  try_all({*trial}, [&](const Verdict& verdict) {
+    failed += verdict.broken.empty() ? 0 : 1;
+    print(verdict);
+    fmt::print("    recovery {:.1f} s, heap {:.1f} MB\n", verdict.recovery_s,
+               static_cast<double>(verdict.heap_growth) * 1e-6);
+  });
+  return failed;
+}
+
+/// Whole worlds, every `parts`-th.
+std::uint64_t run(const Options& options) {
+  const FaultTimes& times = options.takes_long ? kLong : kShort;
+  if (!options.trial.empty()) return run_one(options.trial);
+  std::ofstream log(options.log);
+  std::uint64_t failed = 0;
+  const std::uint64_t end = options.first + options.count;
+  std::vector<Trial> trials;
+  for (std::uint64_t seed = options.first; seed < end; ++seed) {
+    trials.push_back(trial_of(seed, times));
+    if (seed + 1 < end && world_of(seed + 1) == world_of(seed)) continue;
+    const std::uint64_t world = (seed - 1) / kSeedsPerWorld;
+    if (world % options.parts == options.part) {
+      try_all(trials, [&](const Verdict& verdict) {
+        log << log_line(verdict) << std::endl;  // NOLINT(performance-avoid-endl): a night's work
+        failed += verdict.broken.empty() ? 0 : 1;
+        if (!verdict.broken.empty()) print(verdict);
+      });
+    }
+    trials.clear();
+  }
+  return failed;
+}
+
+}  // namespace
+}  // namespace crepes::faults
 
 int main(int argc, char** argv) {
   CLI::App app{"Swarms with faults on virtual time, by seed", "fault_campaign"};
-  std::uint64_t first = 1;
-  std::uint64_t count = 100;
-  app.add_option("--first", first, "the first seed")->capture_default_str();
-  app.add_option("--seeds", count, "how many")->capture_default_str();
+  crepes::faults::Options options;
+  app.add_option("--first", options.first, "the first seed")->capture_default_str();
+  app.add_option("--seeds", options.count, "how many")->capture_default_str();
+  app.add_option("--part", options.part, "of the worlds, from 0")->capture_default_str();
+  app.add_option("--parts", options.parts, "in how many parts")->capture_default_str();
+  app.add_flag("--long", options.takes_long, "faults of up to half a minute");
+  app.add_option("--log", options.log, "a line for every trial goes to this file");
+  app.add_option("--trial", options.trial, "only flies this schedule, as kept.txt has it");
+  app.add_option("--table", options.tables, "only prints the table of these logs");
   CLI11_PARSE(app, argc, argv);
-
-  std::uint64_t failed = 0;
-  for (std::uint64_t seed = first; seed < first + count; ++seed) {
-    const auto verdict = crepes::faults::try_seed(seed);
-    if (verdict.broken.empty()) continue;
-    ++failed;
-    fmt::print("seed {}\n", seed);
-    for (const auto& fault : verdict.faults) fmt::print("  {}\n", to_string(fault));
-    for (const std::string& line : verdict.broken) fmt::print("    {}\n", line);
-    std::fflush(stdout);
+  if (!options.tables.empty()) {
+    fmt::print("{}", crepes::faults::table_of(options.tables));
+    return 0;
   }
-  fmt::print("{} of {} seeds broke a promise\n", failed, count);
+  const std::uint64_t failed = crepes::faults::run(options);
   return failed == 0 ? 0 : 1;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "net/mesh/crc32.hpp"
@@ -9,14 +10,18 @@
 namespace crepes::faults {
 namespace {
 
+using Bytes = FaultyNetwork::Bytes;
+
 constexpr std::size_t kRecorded = 200;  // datagrams of a sender that an adversary keeps
+constexpr double kFlood = 20.0;         // datagrams for each true one
+constexpr double kReplays = 10.0;
 
 bool concerns(const Fault& fault, RobotId from, RobotId to) {
   return from == fault.robot || to == fault.robot;
 }
 
 /// As a second daemon with the robot's id would send it.
-void change_session(std::vector<std::uint8_t>& bytes) {
+void change_session(Bytes& bytes) {
   constexpr std::size_t kSession = 6;  // after mark, version and sender
   constexpr std::size_t kChecksum = 4;
   if (bytes.size() < kSession + kChecksum) return;
@@ -27,10 +32,83 @@ void change_session(std::vector<std::uint8_t>& bytes) {
     bytes[body + i] = static_cast<std::uint8_t>(crc >> (8 * i));
 }
 
-/// Of every two seconds the first 0.8 s.
-bool is_burst(const Fault& fault, double t_s) { return std::fmod(t_s - fault.from_s, 2.0) < 0.8; }
+bool is_burst(const Fault& fault, double t_s) {
+  constexpr double kPeriod_s = 2.0;
+  return std::fmod(t_s - fault.from_s, kPeriod_s) < 0.4 * fault.rate * kPeriod_s;
+}
+
+/// A number that nobody expects.
+double extreme(Dice& dice) {
+  constexpr std::array kValues{0.0,    -1.0,  1e9,
+                               -1e9,   1e300, std::numeric_limits<double>::infinity(),
+                               1e-300, 199.0, std::numeric_limits<double>::quiet_NaN()};
+  return kValues.at(dice.below(kValues.size()));
+}
+
+template <class Items, class Change>
+void change_each(Items& items, const Change& change) {
+  for (auto& item : items) change(item);
+}
+
+/// One kind of a report's fields becomes extreme.
+void exaggerate(Report& report, Dice& dice) {
+  const auto stamp = [&](Timestamp& t) { t += from_seconds(dice.between(-2.0, 2.0)); };
+  switch (dice.below(8)) {
+    case 0:
+      return change_each(report.imu, [&](auto& s) { s.gyro_radps(0) = extreme(dice); });
+    case 1:
+      return change_each(report.imu, [&](auto& s) { s.accel_mps2(2) = extreme(dice); });
+    case 2:
+      return change_each(report.imu, [&](auto& s) { stamp(s.stamp); });
+    case 3:
+      return change_each(report.ranges, [&](auto& r) { r.range_m = extreme(dice); });
+    case 4:
+      return change_each(report.bearings, [&](auto& b) { b.sigma_rad = extreme(dice); });
+    case 5:
+      return change_each(report.bearings, [&](auto& b) { b.p_B_C(1) = extreme(dice); });
+    case 6:
+      return change_each(report.estimates, [&](auto& e) {
+        e.T_B_N.pose.p(0) = extreme(dice);
+        e.T_B_N.covariance *= extreme(dice);
+      });
+    default:
+      report.tilt.sigma_rad = extreme(dice);
+      return stamp(report.tilt.stamp);
+  }
+}
+
+void lie(const Fault& fault, Dice& dice, Report& report) {
+  switch (fault.kind) {
+    case Kind::kLiarEstimates:
+      return change_each(report.estimates, [&](NeighborEstimate& e) {
+        e.T_B_N.pose.p(e.neighbor.value % 3) += 2.0 * fault.rate;
+        e.T_B_N.covariance = 1e-6 * Matrix6d::Identity();
+      });
+    case Kind::kLiarTilt:
+      report.tilt.up_B = -report.tilt.up_B;
+      report.tilt.sigma_rad = 1e-4;
+      return;
+    case Kind::kLiarRanges:
+      return change_each(report.ranges, [&](auto& r) { r.range_m *= 1.0 + 0.5 * fault.rate; });
+    case Kind::kLiarBearings: {
+      const Eigen::AngleAxisd turn(0.3 * fault.rate, Eigen::Vector3d::UnitZ());
+      return change_each(report.bearings, [&](auto& b) { b.u_B = turn * b.u_B; });
+    }
+    case Kind::kLiarImu:
+      return change_each(report.imu, [&](auto& s) { s.gyro_radps *= 1.0 + fault.rate; });
+    case Kind::kLiarExtremes:
+      return exaggerate(report, dice);
+    default:
+      return;
+  }
+}
 
 }  // namespace
+
+void FaultyNetwork::strike(const std::vector<Fault>& faults) {
+  faults_ = faults;
+  if (!faults.empty()) dice_ = Dice(faults.front().seed);
+}
 
 void FaultyNetwork::operator()(RobotId from, RobotId to, double sent_s,
                                std::vector<Delivery>& deliveries) {
@@ -50,16 +128,18 @@ void FaultyNetwork::apply(const Fault& fault, RobotId from, RobotId to, double s
   };
   switch (fault.kind) {
     case Kind::kLoss:
-      return drop(0.6);
+      return drop(0.6 * fault.rate);
     case Kind::kBurstLoss:
       return drop(is_burst(fault, sent_s) ? 1.0 : 0.0);
     case Kind::kDelay:
-      return from == fault.robot ? delay(0.15, 0.15) : void();
+      return from == fault.robot ? delay(0.25 * fault.rate, 0.25 * fault.rate) : void();
     case Kind::kJitter:
-      return delay(0.0, 0.2);
+      return delay(0.0, 0.25 * fault.rate);
     case Kind::kDuplication:
       for (std::size_t i = 0, n = deliveries.size(); i < n; ++i)
-        deliveries.push_back({deliveries[i].arrives_s + 0.05, deliveries[i].bytes});
+        for (int copy = 1; copy <= 5 * fault.rate; ++copy)
+          deliveries.push_back(
+              {deliveries[i].arrives_s + 0.03 * copy, deliveries[i].bytes, deliveries[i].from});
       return;
     case Kind::kPartition:
       return drop((from <= fault.robot) != (to <= fault.robot) ? 1.0 : 0.0);
@@ -67,61 +147,85 @@ void FaultyNetwork::apply(const Fault& fault, RobotId from, RobotId to, double s
       return drop(from == fault.robot ? 1.0 : 0.0);
     case Kind::kDamage:
       for (Delivery& delivery : deliveries)
-        if (dice_.happens(0.3)) damage(delivery.bytes);
+        if (dice_.happens(0.6 * fault.rate)) damage(delivery.bytes);
       return;
     case Kind::kTruncation:
       for (Delivery& delivery : deliveries)
         if (concerns(fault, from, to))
-          delivery.bytes.resize(std::min<std::size_t>(delivery.bytes.size(), 500));
+          delivery.bytes.resize(std::min<std::size_t>(delivery.bytes.size(),
+                                                      static_cast<std::size_t>(800 * fault.rate)));
       return;
+    case Kind::kGarbageFlood:
+    case Kind::kForgedFlood:
+      return to == fault.robot ? flood(fault, sent_s, deliveries) : void();
     case Kind::kReplay:
-      if (from != fault.robot || recorded_[from].empty()) return;
-      for (int i = 0; i < 3; ++i) {
-        const std::vector<Delivery>& all = recorded_[from];
-        deliveries.push_back({sent_s + 0.01, all[dice_.below(all.size())].bytes});
-      }
-      return;
+    case Kind::kReplayedSession:
+      return from == fault.robot ? replay(fault, from, sent_s, deliveries) : void();
     case Kind::kDoubledId:
       if (from != fault.robot || deliveries.empty()) return;
-      deliveries.push_back(deliveries.front());
-      return change_session(deliveries.back().bytes);
+      deliveries.push_back({deliveries.front().arrives_s,
+                            of_second_robot(deliveries.front().bytes, from),
+                            replay_address(RobotId{99})});
+      return;
     default:
       return;
   }
 }
 
-void FaultyNetwork::damage(std::vector<std::uint8_t>& bytes) {
+/// Noise, or copies of a true datagram with other contents in the name of its sender.
+void FaultyNetwork::flood(const Fault& fault, double sent_s, std::vector<Delivery>& deliveries) {
+  if (deliveries.empty()) return;
+  const Delivery model = deliveries.front();
+  for (int i = 0; i < kFlood * fault.rate; ++i) {
+    Bytes bytes = model.bytes;
+    if (fault.kind == Kind::kGarbageFlood) {
+      bytes.resize(dice_.below(1500));
+      for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(dice_.next());
+    } else {
+      constexpr std::size_t kHeader = 18;
+      damage(bytes);
+      std::copy_n(model.bytes.begin(), std::min(kHeader, bytes.size()), bytes.begin());
+    }
+    deliveries.push_back({sent_s + dice_.between(0.001, 0.03), std::move(bytes),
+                          replay_address(RobotId{static_cast<std::uint16_t>(99 + i)})});
+  }
+}
+
+void FaultyNetwork::replay(const Fault& fault, RobotId from, double sent_s,
+                           std::vector<Delivery>& deliveries) {
+  const std::vector<Delivery>& all = recorded_[from];
+  for (int i = 0; i < kReplays * fault.rate && !all.empty(); ++i)
+    deliveries.push_back(
+        {sent_s + 0.01, all[dice_.below(all.size())].bytes, replay_address(RobotId{98})});
+}
+
+void FaultyNetwork::damage(Bytes& bytes) {
   for (int i = 0; i < 4 && !bytes.empty(); ++i)
     bytes[dice_.below(bytes.size())] ^= static_cast<std::uint8_t>(1U << dice_.below(8));
 }
 
-void corrupt_report(const std::vector<Fault>& faults, double true_s, Report& report) {
-  for (const Fault& fault : faults) {
-    if (!fault.lasts_at(true_s) || fault.robot != report.sender) continue;
-    if (fault.kind == Kind::kLiarEstimates) {
-      for (NeighborEstimate& estimate : report.estimates) {
-        estimate.T_B_N.pose.p(estimate.neighbor.value % 3) += 2.0;
-        estimate.T_B_N.covariance = 1e-6 * Matrix6d::Identity();
-      }
-    } else if (fault.kind == Kind::kLiarTilt) {
-      report.tilt.up_B = -report.tilt.up_B;
-      report.tilt.sigma_rad = 1e-4;
-    } else if (fault.kind == Kind::kLiarRanges) {
-      for (UwbRange& range : report.ranges) range.range_m *= 1.5;
-    }
+/// With all of the robot's keys: a copy of its memory card.
+Bytes FaultyNetwork::of_second_robot(const Bytes& bytes, RobotId from) const {
+  if (!seal_) {
+    Bytes plain = bytes;
+    change_session(plain);
+    return plain;
   }
+  const auto opened = seal_->open(bytes);
+  if (!opened) return bytes;
+  Bytes plain = without_signature(*opened);
+  change_session(plain);
+  return seal_->seal(PacketSigner(replay_robot_key(from)).sign(plain));
 }
 
-std::vector<Outage> outages_of(const std::vector<Fault>& faults) {
-  std::vector<Outage> outages;
-  for (const Fault& fault : faults) {
-    if (fault.kind == Kind::kReboot || fault.kind == Kind::kFreeze)
-      outages.push_back({.robot = fault.robot,
-                         .from_s = fault.from_s,
-                         .to_s = fault.to_s,
-                         .restarts = fault.kind == Kind::kReboot});
-  }
-  return outages;
+Liars::Liars(const std::vector<Fault>& faults) {
+  for (const Fault& fault : faults) liars_.push_back({fault, Dice(fault.seed)});
+}
+
+void Liars::operator()(double true_s, Report& report) {
+  for (Liar& liar : liars_)
+    if (liar.fault.lasts_at(true_s) && liar.fault.robot == report.sender)
+      lie(liar.fault, liar.dice, report);
 }
 
 }  // namespace crepes::faults

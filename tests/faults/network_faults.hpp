@@ -2,9 +2,11 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "daemon/ctl/replay/swarm_replay.hpp"
+#include "net/mesh/packet_seal.hpp"
 #include "tests/faults/dice.hpp"
 #include "tests/faults/fault.hpp"
 
@@ -13,25 +15,42 @@ namespace crepes::faults {
 /// Changes the deliveries of every datagram by the faults that last when it is sent.
 class FaultyNetwork {
  public:
-  FaultyNetwork(std::vector<Fault> faults, std::uint64_t seed)
-      : faults_(std::move(faults)), dice_(seed) {}
+  using Bytes = std::vector<std::uint8_t>;
+
+  /// `sealed`: the datagrams are, with the keys of the replay.
+  explicit FaultyNetwork(bool sealed) {
+    if (sealed) seal_.emplace(replay_swarm_key());
+  }
+  void strike(const std::vector<Fault>& faults);
 
   void operator()(RobotId from, RobotId to, double sent_s, std::vector<Delivery>& deliveries);
 
  private:
   void apply(const Fault& fault, RobotId from, RobotId to, double sent_s,
              std::vector<Delivery>& deliveries);
-  void damage(std::vector<std::uint8_t>& bytes);
+  void flood(const Fault& fault, double sent_s, std::vector<Delivery>& deliveries);
+  void replay(const Fault& fault, RobotId from, double sent_s, std::vector<Delivery>& deliveries);
+  void damage(Bytes& bytes);
+  [[nodiscard]] Bytes of_second_robot(const Bytes& bytes, RobotId from) const;
 
   std::vector<Fault> faults_;
-  Dice dice_;
+  Dice dice_{0};
+  std::optional<PacketSeal> seal_;
   std::map<RobotId, std::vector<Delivery>> recorded_;  ///< by sender: the first seconds
 };
 
 /// What lying robots change in the reports that they send at `true_s`.
-void corrupt_report(const std::vector<Fault>& faults, double true_s, Report& report);
+class Liars {
+ public:
+  explicit Liars(const std::vector<Fault>& faults);
+  void operator()(double true_s, Report& report);
 
-/// Robots that are switched off or frozen.
-[[nodiscard]] std::vector<Outage> outages_of(const std::vector<Fault>& faults);
+ private:
+  struct Liar {
+    Fault fault;
+    Dice dice;
+  };
+  std::vector<Liar> liars_;
+};
 
 }  // namespace crepes::faults

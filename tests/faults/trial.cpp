@@ -4,183 +4,277 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cmath>
-#include <cstdlib>
+#include <sstream>
 
-#include "daemon/ctl/replay/swarm_replay.hpp"
-#include "tests/faults/network_faults.hpp"
-#include "tests/faults/sensor_faults.hpp"
+#include "estimator/core/contract.hpp"
+#include "tests/faults/in_child.hpp"
 #include "tests/study/simulated_swarm.hpp"
 
 namespace crepes::faults {
 namespace {
 
-constexpr int kRobots = 4;
 constexpr std::array<std::string_view, 3> kScenarioNames{"four", "occluded", "cluttered"};
-constexpr double kBeyond5Sigma = 35.0;  // Mahalanobis^2 of the position
 constexpr double kLongestBeyond_s = 0.5;
-constexpr double kLongestGap_s = 0.1;  // between poses that follow each other
 constexpr double kLongestAbsence_s = 0.5;
+constexpr double kGone_s = 2.0;
 
-/// The poses of one pair as they are published.
-class Judge {
- public:
-  Judge(const study::Swarm& swarm, Pair pair, double recovered_s)
-      : swarm_(swarm), pair_(pair), recovered_s_(recovered_s), last_s_(recovered_s) {}
+double first_s(const std::vector<Fault>& faults) {
+  return std::ranges::min_element(faults, {}, &Fault::from_s)->from_s;
+}
 
-  void add(const NeighborPose& pose) {
-    const Vector7 numbers = numbers_of(pose);
-    outcome_.not_finite += numbers.allFinite() && pose.T_B_N.covariance.allFinite() ? 0 : 1;
-    for (const double number : numbers)
-      outcome_.hash = outcome_.hash * 1099511628211U ^ std::bit_cast<std::uint64_t>(number);
-    const auto truth = swarm_.truth.relative(pair_.first, pair_.second, pose.stamp);
-    if (!truth) return;
-    const RobotClock& clock = study::recording_of(swarm_.dataset, pair_.first).robot.clock;
-    const double true_s = clock.true_s(pose.published);
-    const Eigen::Vector3d error = pose_difference(pose.T_B_N.pose, *truth).head<3>();
-    const Eigen::Matrix3d P = pose.T_B_N.covariance.topLeftCorner<3, 3>();
-    judge_honesty(true_s, error, P);
-    if (true_s < recovered_s_) return;
-    outcome_.longest_absence_s = std::max(outcome_.longest_absence_s, true_s - last_s_);
-    last_s_ = true_s;
-    square_ += error.squaredNorm();
-    ++count_;
-  }
+double end_s(const std::vector<Fault>& faults) { return recovered_s(faults) + kJudged_s; }
 
-  [[nodiscard]] PairOutcome outcome() const {
-    PairOutcome outcome = outcome_;
-    outcome.longest_absence_s = std::max(outcome.longest_absence_s, kDuration_s - 0.5 - last_s_);
-    outcome.rmse_m = count_ == 0 ? 0.0 : std::sqrt(square_ / static_cast<double>(count_));
-    return outcome;
-  }
-
- private:
-  using Vector7 = Eigen::Matrix<double, 7, 1>;
-  static Vector7 numbers_of(const NeighborPose& pose) {
-    Vector7 numbers;
-    numbers << pose.T_B_N.pose.p, pose.T_B_N.pose.q.coeffs();
-    return numbers;
-  }
-
-  void judge_honesty(double true_s, const Eigen::Vector3d& error, const Eigen::Matrix3d& P) {
-    const bool is_beyond = !(error.dot(P.llt().solve(error)) <= kBeyond5Sigma);
-    const bool goes_on = is_beyond && beyond_since_ && true_s - latest_s_ < kLongestGap_s;
-    if (!goes_on) beyond_since_ = is_beyond ? std::optional(true_s) : std::nullopt;
-    latest_s_ = true_s;
-    if (!beyond_since_) return;
-    outcome_.longest_beyond_s = std::max(outcome_.longest_beyond_s, true_s - *beyond_since_);
-    outcome_.worst_beyond_m = std::max(outcome_.worst_beyond_m, error.norm());
-  }
-
-  const study::Swarm& swarm_;
-  Pair pair_;
-  double recovered_s_;
-  double last_s_;
-  double latest_s_ = 0.0;
-  std::optional<double> beyond_since_;
-  double square_ = 0.0;
-  std::size_t count_ = 0;
-  PairOutcome outcome_;
-};
+bool is_of(const Fault& fault, const Pair& pair) {
+  return fault.robot == pair.first || fault.robot == pair.second;
+}
 
 /// Whether a fault makes this pair's poses wrong: one of the two is faulty.
 bool is_excused(const std::vector<Fault>& faults, const Pair& pair) {
   return std::ranges::any_of(faults, [&](const Fault& fault) {
-    return about(fault.kind).scope == Scope::kRobot &&
-           (fault.robot == pair.first || fault.robot == pair.second);
+    return about(fault.kind).scope == Scope::kRobot && is_of(fault, pair);
   });
 }
 
-std::string text_of(const Pair& pair) {
-  return fmt::format("r{} -> r{}", pair.first.value, pair.second.value);
+/// Learned calibration may have to be learned anew.
+double allowed_rmse_m(double reference_m) { return 2.0 * reference_m + 0.03; }
+
+/// Poses of a robot that is switched off or frozen: while they are published, they are honest.
+bool is_ghost(const std::vector<Fault>& faults, RobotId robot, const PoseError& pose) {
+  constexpr double kBeyond5Sigma = 35.0;
+  return !(pose.mahalanobis2 <= kBeyond5Sigma) &&
+         std::ranges::any_of(faults, [&](const Fault& fault) {
+           const bool is_gone = fault.kind == Kind::kReboot || fault.kind == Kind::kFreeze;
+           return is_gone && fault.robot == robot && pose.true_s > fault.from_s + kGone_s &&
+                  pose.true_s < fault.to_s;
+         });
+}
+
+class PairJudge {
+ public:
+  PairJudge(const std::vector<Fault>& faults, const Pair& pair, const PoseTrace& found,
+            const PoseTrace& reference)
+      : faults_(faults),
+        pair_(pair),
+        found_(found),
+        reference_(reference),
+        all_{first_s(faults), end_s(faults)},
+        after_{recovered_s(faults), end_s(faults)} {}
+
+  [[nodiscard]] std::vector<std::string> broken() {
+    if (found_.not_finite() > 0) add(fmt::format("{} poses not finite", found_.not_finite()));
+    judge_honesty();
+    if (reference_.rmse_m(after_) > 0.0) judge_recovery();
+    return std::move(broken_);
+  }
+
+ private:
+  void judge_honesty() {
+    const bool excused = is_excused(faults_, pair_);
+    const Beyond beyond = found_.beyond(excused ? after_ : all_);
+    if (beyond.longest_s > kLongestBeyond_s)
+      add(fmt::format("beyond 5 sigma for {:.2f} s, up to {:.2f} m", beyond.longest_s,
+                      beyond.worst_m));
+    const auto ghosts = std::ranges::count_if(found_.errors(), [&](const PoseError& pose) {
+      return is_ghost(faults_, pair_.second, pose);
+    });
+    if (!excused && ghosts > 0)
+      add(fmt::format("{} dishonest poses of a robot that is gone", ghosts));
+  }
+
+  void judge_recovery() {
+    const double absence_s = found_.longest_absence_s(after_);
+    const double allowed_s =
+        std::max(kLongestAbsence_s, reference_.longest_absence_s(after_) + 0.1);
+    if (absence_s > allowed_s)
+      add(fmt::format("no pose for {:.2f} s after the recovery", absence_s));
+    const double without_m = reference_.rmse_m(after_);
+    const double rmse_m = found_.rmse_m(after_);
+    if (rmse_m > allowed_rmse_m(without_m))
+      add(fmt::format("error {:.3f} m after the recovery, {:.3f} m without faults", rmse_m,
+                      without_m));
+  }
+
+  void add(const std::string& what) {
+    broken_.push_back(fmt::format("r{} -> r{}: {}", pair_.first.value, pair_.second.value, what));
+  }
+
+  const std::vector<Fault>& faults_;
+  Pair pair_;
+  const PoseTrace& found_;
+  const PoseTrace& reference_;
+  Span all_;
+  Span after_;
+  std::vector<std::string> broken_;
+};
+
+void measure(const std::vector<Fault>& faults, const Traces& traces, const Traces& reference,
+             Verdict& verdict) {
+  const double last_s = recovered_s(faults) - kRecovery_s;
+  const Span during{first_s(faults), recovered_s(faults)};
+  const Span after{last_s, end_s(faults)};
+  for (const auto& [pair, trace] : traces) {
+    verdict.hash = verdict.hash * 31 + trace.hash();
+    if (!is_excused(faults, pair)) {
+      verdict.worst_m = std::max(verdict.worst_m, trace.worst_m(during));
+      verdict.beyond_s = std::max(verdict.beyond_s, trace.beyond(during).longest_s);
+    }
+    const double without_m = reference.at(pair).rmse_m(after);
+    if (without_m == 0.0) continue;
+    const double recovered_s = trace.recovered_at_s(after, allowed_rmse_m(without_m));
+    verdict.recovery_s = std::max(verdict.recovery_s, recovered_s - last_s);
+  }
+}
+
+/// What a copy of the process tells.
+std::string to_text(const Verdict& verdict) {
+  std::string text = fmt::format("{} {} {} {} {}\n", verdict.worst_m, verdict.beyond_s,
+                                 verdict.recovery_s, verdict.heap_growth, verdict.hash);
+  for (const std::string& line : verdict.broken) text += line + "\n";
+  return text;
+}
+
+Verdict read_verdict(const ChildResult& child) {
+  Verdict verdict;
+  std::istringstream text(child.text);
+  text >> verdict.worst_m >> verdict.beyond_s >> verdict.recovery_s >> verdict.heap_growth >>
+      verdict.hash;
+  std::string line;
+  std::getline(text, line);
+  while (std::getline(text, line)) verdict.broken.push_back(line);
+  if (!child.crash.empty()) verdict.broken.push_back(child.crash);
+  return verdict;
+}
+
+/// A world's flight without faults, off which trials branch.
+class Branches {
+ public:
+  Branches(const study::Swarm& swarm, bool sealed, const Traces& reference)
+      : flight_(swarm, sealed), reference_(reference) {}
+
+  [[nodiscard]] Verdict judge(const Trial& trial) {
+    flight_.fly_until(first_s(trial.faults) - 1e-3);
+    Verdict verdict = fly(trial.faults);
+    verdict.trial = trial;
+    verdict.smallest = trial.faults;
+    shrink(verdict);
+    return verdict;
+  }
+
+ private:
+  [[nodiscard]] Verdict fly(const std::vector<Fault>& faults) {
+    return read_verdict(in_child([&] {
+      Verdict verdict;
+      flight_.strike(faults);
+      flight_.fly_until(end_s(faults));
+      verdict.heap_growth = flight_.heap_growth();
+      measure(faults, flight_.traces(), reference_, verdict);
+      verdict.broken = flight_.complaints();
+      for (std::string& line : broken_promises(faults, flight_.traces(), reference_))
+        verdict.broken.push_back(std::move(line));
+      return to_text(verdict);
+    }));
+  }
+
+  /// Leaves out faults as long as a promise is still broken.
+  void shrink(Verdict& verdict) {
+    std::vector<Fault>& faults = verdict.smallest;
+    for (std::size_t i = 0; !verdict.broken.empty() && faults.size() > 1 && i < faults.size();) {
+      std::vector<Fault> fewer = faults;
+      fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
+      if (Verdict still = fly(fewer); still.broken.empty()) {
+        ++i;
+      } else {
+        faults = std::move(fewer);
+        verdict.broken = std::move(still.broken);
+      }
+    }
+  }
+
+  Flight flight_;
+  const Traces& reference_;
+};
+
+study::Swarm simulate(const World& world, double duration_s) {
+  const study::Scenario& scenario =
+      *std::ranges::find(study::kScenarios, world.scenario, &study::Scenario::name);
+  return study::simulate_swarm(scenario, world.seed, duration_s);
 }
 
 }  // namespace
 
+World world_of(std::uint64_t seed) {
+  const std::uint64_t index = (seed - 1) / kSeedsPerWorld;
+  return {.scenario = std::string(kScenarioNames.at(index % kScenarioNames.size())),
+          .seed = static_cast<int>(index + 1),
+          .sealed = index / kScenarioNames.size() % 2 == 0};
+}
+
+int robots_of(const World& world) { return world.scenario == "occluded" ? 5 : 4; }
+
+std::string to_string(const World& world) {
+  return fmt::format("{} {} {}", world.scenario, world.seed, world.sealed ? "sealed" : "open");
+}
+
+Trial trial_of(std::uint64_t seed, const FaultTimes& times) {
+  World world = world_of(seed);
+  std::vector<Fault> faults = draw_faults(seed, robots_of(world), times);
+  return {std::move(world), std::move(faults)};
+}
+
+std::string to_string(const Trial& trial) {
+  std::string text = to_string(trial.world) + ":";
+  for (const Fault& fault : trial.faults)
+    text += (text.back() == ':' ? " " : "; ") + to_string(fault);
+  return text;
+}
+
+std::optional<Trial> parse_trial(const std::string& line) {
+  const std::string text = line.substr(0, line.find('#'));
+  const auto colon = text.find(':');
+  if (colon == std::string::npos) return std::nullopt;
+  Trial trial;
+  std::string sealed;
+  std::istringstream(text.substr(0, colon)) >> trial.world.scenario >> trial.world.seed >> sealed;
+  trial.world.sealed = sealed == "sealed";
+  std::istringstream faults(text.substr(colon + 1));
+  for (std::string one; std::getline(faults, one, ';');) {
+    const auto fault = parse_fault(one);
+    if (!fault) return std::nullopt;
+    trial.faults.push_back(*fault);
+  }
+  return trial.faults.empty() ? std::nullopt : std::optional(trial);
+}
+
 double recovered_s(const std::vector<Fault>& faults) {
-  double last_s = kFirstFault_s;
-  for (const Fault& fault : faults) last_s = std::max(last_s, fault.to_s);
-  return last_s + kRecovery_s;
+  return std::ranges::max_element(faults, {}, &Fault::to_s)->to_s + kRecovery_s;
 }
 
-Outcome run(const study::Swarm& swarm, const std::vector<Fault>& faults, double recovered_s) {
-  SwarmDataset dataset = swarm.dataset;
-  for (const Fault& fault : faults) apply_to_sensors(fault, dataset);
-  std::map<Pair, Judge> judges;
-  for (const RobotRecording& from : dataset.robots) {
-    for (const RobotRecording& to : dataset.robots) {
-      const Pair pair{from.robot.id, to.robot.id};
-      if (pair.first != pair.second) judges.try_emplace(pair, swarm, pair, recovered_s);
-    }
-  }
-  ReplaySinks sinks;
-  sinks.on_pose = [&](RobotId observer, const NeighborPose& pose) {
-    judges.at({observer, pose.neighbor}).add(pose);
-  };
-  sinks.on_report = [&](Report& report) {
-    const RobotClock& clock = study::recording_of(swarm.dataset, report.sender).robot.clock;
-    corrupt_report(faults, clock.true_s(report.stamp), report);
-  };
-  sinks.on_delivery = FaultyNetwork(faults, faults.empty() ? 0 : faults.front().seed);
-  ReplayOptions options;
-  options.outages = outages_of(faults);
-  const auto report = replay_dataset(std::move(dataset), std::nullopt, options, sinks);
-  if (!report) {
-    fmt::print(stderr, "{}\n", report.error().message);
-    std::abort();
-  }
-  Outcome outcome;
-  for (const auto& [pair, judge] : judges) outcome[pair] = judge.outcome();
-  return outcome;
-}
-
-std::vector<std::string> broken_promises(const std::vector<Fault>& faults, const Outcome& outcome,
-                                         const Outcome& reference) {
+std::vector<std::string> broken_promises(const std::vector<Fault>& faults, const Traces& traces,
+                                         const Traces& reference) {
   std::vector<std::string> broken;
-  for (const auto& [pair, found] : outcome) {
-    const PairOutcome& without = reference.at(pair);
-    if (found.not_finite > 0)
-      broken.push_back(fmt::format("{}: {} poses not finite", text_of(pair), found.not_finite));
-    if (found.longest_beyond_s > kLongestBeyond_s && !is_excused(faults, pair)) {
-      broken.push_back(fmt::format("{}: beyond 5 sigma for {:.2f} s, up to {:.2f} m", text_of(pair),
-                                   found.longest_beyond_s, found.worst_beyond_m));
-    }
-    if (found.longest_absence_s > std::max(kLongestAbsence_s, without.longest_absence_s + 0.1)) {
-      broken.push_back(fmt::format("{}: no pose for {:.2f} s after the recovery", text_of(pair),
-                                   found.longest_absence_s));
-    }
-    // Calibration that was learned before the fault may have to be learned anew.
-    const double allowed = 2.0 * without.rmse_m + 0.03;
-    if (found.rmse_m > allowed) {
-      broken.push_back(fmt::format("{}: error {:.3f} m after the recovery, {:.3f} m without faults",
-                                   text_of(pair), found.rmse_m, without.rmse_m));
-    }
-  }
+  for (const auto& [pair, trace] : traces)
+    for (std::string& line : PairJudge(faults, pair, trace, reference.at(pair)).broken())
+      broken.push_back(std::move(line));
   return broken;
 }
 
-Verdict try_seed(std::uint64_t seed) {
-  const study::Scenario& scenario = *std::ranges::find(
-      study::kScenarios, kScenarioNames.at(seed % kScenarioNames.size()), &study::Scenario::name);
-  const study::Swarm swarm = study::simulate_swarm(scenario, static_cast<int>(seed), kDuration_s);
-  std::vector<Fault> faults = draw_faults(seed, kRobots, kFirstFault_s, kLastFault_s);
-  const auto broken_by = [&](const std::vector<Fault>& some) {
-    const double from_s = recovered_s(some);
-    return broken_promises(some, run(swarm, some, from_s), run(swarm, {}, from_s));
-  };
-  std::vector<std::string> broken = broken_by(faults);
-  for (std::size_t i = 0; !broken.empty() && faults.size() > 1 && i < faults.size();) {
-    std::vector<Fault> fewer = faults;
-    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
-    if (auto still = broken_by(fewer); still.empty()) {
-      ++i;
-    } else {
-      faults = std::move(fewer);
-      broken = std::move(still);
-    }
+void try_all(const std::vector<Trial>& trials,
+             const std::function<void(const Verdict&)>& on_verdict) {
+  if (trials.empty()) return;
+  const World& world = trials.front().world;
+  double last_s = 0.0;
+  for (const Trial& trial : trials) last_s = std::max(last_s, end_s(trial.faults));
+  constexpr double kMargin_s = 0.5;
+  const study::Swarm swarm = simulate(world, last_s + kMargin_s);
+  Flight healthy(swarm, world.sealed);
+  healthy.fly_until(last_s);
+  Branches branches(swarm, world.sealed, healthy.traces());
+  std::vector<Trial> sorted = trials;
+  std::ranges::stable_sort(sorted, {}, [](const Trial& trial) { return first_s(trial.faults); });
+  for (const Trial& trial : sorted) {
+    CREPES_EXPECT(trial.world == world, "all trials are of one world");
+    on_verdict(branches.judge(trial));
   }
-  return {std::move(faults), std::move(broken)};
 }
 
 }  // namespace crepes::faults

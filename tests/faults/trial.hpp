@@ -1,55 +1,68 @@
-/// One swarm with faults, and what must hold nevertheless.
+/// Swarms with faults against the same swarm without, and what must hold nevertheless.
 #pragma once
 
-#include <map>
+#include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "tests/faults/fault.hpp"
-#include "tests/study/pair_sightings.hpp"
+#include "tests/faults/flight.hpp"
 
 namespace crepes::faults {
 
-/// When faults happen, and how long the swarm flies [s].
-inline constexpr double kFirstFault_s = 5.0;
-inline constexpr double kLastFault_s = 11.0;
-inline constexpr double kDuration_s = 17.0;
 inline constexpr double kRecovery_s = 2.0;  ///< after the last fault
+inline constexpr double kJudged_s = 3.0;    ///< after the recovery
+/// Faults of seconds; and of up to half a minute.
+inline constexpr FaultTimes kShort{.from_s = 5.0, .to_s = 9.0, .longest_s = 4.0};
+inline constexpr FaultTimes kLong{.from_s = 5.0, .to_s = 40.0, .longest_s = 30.0};
 
-using Pair = std::pair<RobotId, RobotId>;  ///< observer and neighbor
+/// A simulated swarm. Many trials share one: to simulate and to fly it without faults takes longer
+/// than a trial.
+struct World {
+  std::string scenario;
+  int seed = 0;
+  bool sealed = false;  ///< its datagrams are sealed and signed
 
-/// What one pair's poses were like.
-struct PairOutcome {
-  std::size_t not_finite = 0;
-  double longest_beyond_s = 0.0;   ///< poses off by more than 5 sigma (Mahalanobis^2 > 35), on end
-  double worst_beyond_m = 0.0;     ///< of those
-  double longest_absence_s = 0.0;  ///< without a pose, after the recovery
-  double rmse_m = 0.0;             ///< after the recovery
-  std::uint64_t hash = 0;          ///< of all poses
+  [[nodiscard]] bool operator==(const World&) const = default;
+};
+inline constexpr std::uint64_t kSeedsPerWorld = 20;
+[[nodiscard]] World world_of(std::uint64_t seed);
+[[nodiscard]] std::string to_string(const World& world);
+[[nodiscard]] int robots_of(const World& world);
+
+/// A schedule in a world.
+struct Trial {
+  World world;
+  std::vector<Fault> faults;
+};
+[[nodiscard]] Trial trial_of(std::uint64_t seed, const FaultTimes& times);
+/// "four 7 sealed: loss r2 5.10 7.25 0.60 123; freeze r1 ...". What follows a # is a comment.
+[[nodiscard]] std::string to_string(const Trial& trial);
+[[nodiscard]] std::optional<Trial> parse_trial(const std::string& line);
+
+struct Verdict {
+  Trial trial;
+  std::vector<Fault> smallest;      ///< part of the schedule that still breaks a promise
+  std::vector<std::string> broken;  ///< what it breaks, a line each; empty if all holds
+  double worst_m = 0.0;             ///< error while faults last, of pairs without a fault
+  double beyond_s = 0.0;            ///< the longest that one of these was off by more than 5 sigma
+  double recovery_s = 0.0;          ///< after the last fault, of all pairs
+  std::uint64_t heap_growth = 0;    ///< of the whole swarm [bytes]
+  std::uint64_t hash = 0;           ///< of all poses
 };
 
-using Outcome = std::map<Pair, PairOutcome>;
-
-/// Replays the swarm with these faults. `recovered_s`: from when on the poses count for absence and
-/// error. An error of the replay ends the program.
-[[nodiscard]] Outcome run(const study::Swarm& swarm, const std::vector<Fault>& faults,
-                          double recovered_s);
+/// Trials of one world, which is simulated once. They are flown in the order of their first faults:
+/// each in a copy of the process that branches off the flight without faults.
+void try_all(const std::vector<Trial>& trials,
+             const std::function<void(const Verdict&)>& on_verdict);
 
 /// When the swarm must have recovered from the faults.
 [[nodiscard]] double recovered_s(const std::vector<Fault>& faults);
-
-/// What went wrong, one line each; empty if all that is promised held. `reference` is the outcome
-/// without faults.
+/// What of a flight with faults was not as promised, a line each. `reference`: without faults.
 [[nodiscard]] std::vector<std::string> broken_promises(const std::vector<Fault>& faults,
-                                                       const Outcome& outcome,
-                                                       const Outcome& reference);
-
-/// A swarm of a seed and its faults; the smallest part of them that still breaks a promise.
-struct Verdict {
-  std::vector<Fault> faults;
-  std::vector<std::string> broken;
-};
-[[nodiscard]] Verdict try_seed(std::uint64_t seed);
+                                                       const Traces& traces,
+                                                       const Traces& reference);
 
 }  // namespace crepes::faults

@@ -12,20 +12,13 @@
 #include "daemon/ctl/dataset/truth.hpp"
 #include "daemon/ctl/replay/replay_output.hpp"
 #include "drivers/dataset/dataset_faults.hpp"
+#include "estimator/core/event.hpp"
 #include "estimator/core/result.hpp"
 #include "net/endpoint.hpp"
 #include "net/mesh/packet_seal.hpp"
 #include "net/mesh/packet_signature.hpp"
 
 namespace crepes {
-
-/// A robot that stands still: between these instants it neither measures, sends nor receives.
-struct Outage {
-  RobotId robot{};
-  double from_s = 0.0;  ///< true time
-  double to_s = 0.0;
-  bool restarts = false;  ///< then it begins anew; otherwise it gets what has waited
-};
 
 struct ReplayOptions {
   std::filesystem::path swarm_dir;
@@ -40,7 +33,6 @@ struct ReplayOptions {
   bool forwards =
       true;  ///< what a robot hears, it forwards to those that do not, as batman-adv does
   bool sealed = false;  ///< datagrams are sealed and signed, with keys for the replay
-  std::vector<Outage> outages;
   std::function<void(double)> on_progress;  ///< progress, 0..1, called regularly
 };
 
@@ -74,6 +66,9 @@ struct ReplaySinks {
   std::function<void(RobotId observer, const Records&)> on_records;  ///< empty: none are kept
   /// May change, add or remove deliveries of a datagram, for studies of bad networks; may be empty.
   std::function<void(RobotId from, RobotId to, double sent_s, std::vector<Delivery>&)> on_delivery;
+  /// May change a reading of a robot's own sensor before it is used, and false removes it. Its
+  /// stamp is that of the recording. May be empty.
+  std::function<bool(RobotId robot, double true_s, Event&)> on_reading;
   /// May change a report before it is sent, for studies of faulty members; may be empty.
   std::function<void(Report&)> on_report;
 };

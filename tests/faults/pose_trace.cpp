@@ -1,0 +1,83 @@
+#include "tests/faults/pose_trace.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace crepes::faults {
+namespace {
+
+constexpr double kBeyond5Sigma = 35.0;  // Mahalanobis^2 of the position
+constexpr double kLongestGap_s = 0.1;   // between poses that follow each other
+constexpr double kWindow_s = 0.3;
+
+}  // namespace
+
+void PoseTrace::add(const NeighborPose& pose, const Pose& truth, double true_s) {
+  Eigen::Matrix<double, 7, 1> numbers;
+  numbers << pose.T_B_N.pose.p, pose.T_B_N.pose.q.coeffs();
+  not_finite_ += numbers.allFinite() && pose.T_B_N.covariance.allFinite() ? 0 : 1;
+  for (const double number : numbers)
+    hash_ = hash_ * 1099511628211U ^ std::bit_cast<std::uint64_t>(number);
+  const Eigen::Vector3d error = pose_difference(pose.T_B_N.pose, truth).head<3>();
+  const Eigen::Matrix3d P = pose.T_B_N.covariance.topLeftCorner<3, 3>();
+  errors_.push_back({true_s, error.norm(), error.dot(P.llt().solve(error))});
+}
+
+Beyond PoseTrace::beyond(const Span& span) const {
+  Beyond beyond;
+  std::optional<double> since_s;
+  double latest_s = 0.0;
+  for (const auto& [true_s, error_m, mahalanobis2] : errors_) {
+    if (!span.contains(true_s)) continue;
+    const bool is_beyond = !(mahalanobis2 <= kBeyond5Sigma);
+    const bool goes_on = is_beyond && since_s && true_s - latest_s < kLongestGap_s;
+    if (!goes_on) since_s = is_beyond ? std::optional(true_s) : std::nullopt;
+    latest_s = true_s;
+    if (!since_s) continue;
+    beyond.longest_s = std::max(beyond.longest_s, true_s - *since_s);
+    beyond.worst_m = std::max(beyond.worst_m, error_m);
+  }
+  return beyond;
+}
+
+double PoseTrace::rmse_m(const Span& span) const {
+  double square = 0.0;
+  double count = 0.0;
+  for (const PoseError& pose : errors_) {
+    if (!span.contains(pose.true_s)) continue;
+    square += pose.error_m * pose.error_m;
+    ++count;
+  }
+  return count == 0.0 ? 0.0 : std::sqrt(square / count);
+}
+
+double PoseTrace::worst_m(const Span& span) const {
+  double worst = 0.0;
+  for (const PoseError& pose : errors_)
+    if (span.contains(pose.true_s)) worst = std::max(worst, pose.error_m);
+  return worst;
+}
+
+double PoseTrace::longest_absence_s(const Span& span) const {
+  double longest = 0.0;
+  double last_s = span.from_s;
+  for (const PoseError& pose : errors_) {
+    if (!span.contains(pose.true_s)) continue;
+    longest = std::max(longest, pose.true_s - last_s);
+    last_s = pose.true_s;
+  }
+  return std::max(longest, span.to_s - last_s);
+}
+
+double PoseTrace::recovered_at_s(const Span& span, double rmse_m) const {
+  double recovered_s = span.from_s;
+  for (double t = span.from_s; t + kWindow_s <= span.to_s; t += kWindow_s / 3) {
+    const Span window{t, t + kWindow_s};
+    const bool is_well = longest_absence_s(window) < kWindow_s && this->rmse_m(window) <= rmse_m;
+    if (!is_well) recovered_s = window.to_s;
+  }
+  return recovered_s;
+}
+
+}  // namespace crepes::faults
