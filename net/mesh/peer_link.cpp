@@ -12,7 +12,9 @@ namespace {
 constexpr Duration kEchoAge = std::chrono::seconds{1};      // older packets are not echoed
 constexpr Duration kMaxEchoAge = std::chrono::seconds{10};  // older echoes are refused
 constexpr Duration kSilence = std::chrono::seconds{1};  // after which a replaced session may return
-constexpr std::size_t kMaxEnded = 16;                   // sessions of a peer that are remembered
+constexpr Duration kTakeover = std::chrono::milliseconds{500};  // silence before a new one is live
+constexpr Duration kLatest = std::chrono::milliseconds{300};    // datagrams of one that has ended
+constexpr std::size_t kMaxEnded = 16;  // sessions of a peer that are remembered
 constexpr Duration kForwardedAge = std::chrono::seconds{1};
 constexpr std::size_t kMarkedCopies = 2;
 constexpr double kMaxRateHz = 250.0;  // of a peer's datagrams
@@ -211,14 +213,21 @@ bool PeerLink::is_our_own(const PeerHeader& header) const {
 }
 
 /// The session of the message, if the message is new in it and its stamps agree with it. A session
-/// that has echoed us is the live one now.
+/// that has echoed us is the live one now, if the former one is silent.
 PeerLink::Session* PeerLink::accept(Peer& peer, const PeerMessage& message, Timestamp arrival,
                                     const Endpoint& from) {
   Session* const session = admit(peer, message, arrival, from);
   if (session == nullptr) return nullptr;
   session->last_arrival = arrival;
   if (!update_clock(*session, message, arrival)) return nullptr;
-  if (!peer.candidate || !peer.candidate->has_echoed_us) return session;
+  const bool is_candidate = peer.candidate && session == &*peer.candidate;
+  if (!is_candidate || !session->has_echoed_us) return session;
+  if (peer.live && arrival - peer.live->last_arrival < kTakeover) {
+    const bool are_two = peer.live->last_arrival - session->first_arrival > kLatest;
+    are_two ? count_doubled(MeshCounter::kRefusedDoubledId, message.report.sender, arrival)
+            : counters_.add(MeshCounter::kHeldClockUnknown);
+    return nullptr;
+  }
   replace_session(peer, arrival);
   return &*peer.live;
 }
@@ -239,6 +248,7 @@ PeerLink::Session* PeerLink::admit(Peer& peer, const PeerMessage& message, Times
     Session fresh;
     fresh.id = message.session;
     fresh.traffic.peer = message.report.sender;
+    fresh.first_arrival = arrival;
     fresh.last_arrival = arrival;
     peer.candidate = std::move(fresh);
   }

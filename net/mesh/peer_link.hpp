@@ -1,9 +1,10 @@
 /// The protocol of the mesh without its socket: datagrams in, reports on our timeline out.
 ///
 /// A peer that restarts opens a new session. The new session replaces the old one when it has
-/// echoed a recent datagram of ours. Recorded datagrams that are replayed cannot do so. A session
-/// that was replaced returns if it echoes what we sent after that, and the other one is silent:
-/// then a second robot with the peer's id was there for a while.
+/// echoed a recent datagram of ours and the old one is silent. Recorded datagrams that are replayed
+/// cannot do the former, and a second robot with the peer's id does not displace the first. A
+/// session that was replaced returns if it echoes what we sent after that, and the other one is
+/// silent.
 ///
 /// Some datagrams are marked: they are forwarded to robots that do not hear their sender
 /// (`mesh_relay.hpp`), as they came, and are the only ones that these robots have of it.
@@ -87,6 +88,7 @@ class PeerLink {
     SequenceWindow sequence;
     RedundancyFilter redundancy;
     PeerTraffic traffic;  ///< includes the earlier sessions
+    Timestamp first_arrival{};
     Timestamp last_arrival{};
     bool has_echoed_us = false;  ///< a recent datagram of ours
   };

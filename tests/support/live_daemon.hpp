@@ -88,6 +88,13 @@ class Client {
     return std::nullopt;
   }
 
+  /// The next answer, if there is one within that time.
+  std::optional<Json> next(std::chrono::milliseconds patience) {
+    const auto datagram = socket_.receive(patience);
+    if (!datagram || !*datagram) return std::nullopt;
+    return Json::parse((*datagram)->bytes);
+  }
+
   std::optional<Json> await_status(const std::function<bool(const Json&)>& wanted) {
     return await(R"({"class":"POLL"})", "STATUS", wanted);
   }

@@ -84,7 +84,8 @@ void VirtualSwarm::schedule_recording(std::size_t index) {
       const Timestamp stamp = frame.stamp;
       schedule_at(stamp, index, Event(std::move(frame)));
     }
-    if (!camera.spots.empty()) continue;  // if a camera has both, the spots are the smaller input
+    // If a camera has both, the spots are the smaller input.
+    if (!std::exchange(camera.spots, {}).empty()) continue;
     for (const RecordedImage& image : camera.images) {
       schedule_at(image.stamp, index, PendingImage{static_cast<std::uint8_t>(k), image});
     }
@@ -95,6 +96,8 @@ void VirtualSwarm::schedule_recording(std::size_t index) {
   for (Timestamp t = recording.imu.front().stamp; t <= end; t += period) {
     schedule_at(t, index, Event(Tick{t}));
   }
+  recording.imu = {};
+  recording.ranges = {};
 }
 
 Result<void> VirtualSwarm::run_until(double true_s) {
@@ -145,6 +148,7 @@ Result<void> VirtualSwarm::deliver_next() {
   std::ranges::pop_heap(queue_, Later{});
   Arrival arrival = std::move(queue_.back());
   queue_.pop_back();
+  if (queue_.size() < queue_.capacity() / 4) queue_.shrink_to_fit();
   now_s_ = arrival.true_s;
   VirtualRobot& robot = robots_[arrival.robot];
   if (robot.state == VirtualRobot::State::kOn) return deliver(arrival);

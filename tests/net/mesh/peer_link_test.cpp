@@ -366,6 +366,31 @@ TEST(PeerLink, KnowsAPeerAgainWhenASecondRobotWithItsIdHasLeft) {
   EXPECT_NEAR(mesh.one.clocks().at(0).offset_s, 7200.0, 1e-3);
 }
 
+TEST(PeerLink, KeepsToThePeerThatWasThereFirst) {
+  Mesh mesh;
+  mesh.run_until(103.0);
+  mesh.twin.emplace(RobotId{2}, std::vector{RobotId{1}, RobotId{2}});
+  mesh.received.clear();
+
+  mesh.run_until(106.0);
+
+  EXPECT_GT(mesh.received.size(), 140U);
+  EXPECT_EQ(mesh.one.traffic(Timestamp{}).at(0).restarts, 0U);
+  EXPECT_GT(mesh.count_of_one("refused_doubled_id"), 100U);
+}
+
+TEST(PeerLink, DoesNotTakeAQuickRestartForASecondRobot) {
+  Mesh mesh;
+  mesh.run_until(103.0);
+  mesh.two = PeerLink(RobotId{2}, {RobotId{1}, RobotId{2}});
+  mesh.received.clear();
+
+  mesh.run_until(104.0);
+
+  EXPECT_GT(mesh.received.size(), 15U);
+  EXPECT_FALSE(mesh.one.doubled_id());
+}
+
 TEST(PeerLink, IsNotSilencedByOneForgedNumber) {
   Mesh mesh;
   mesh.run_until(103.0);
