@@ -69,15 +69,14 @@ std::uint64_t state_after(double duration_s) {
 }  // namespace crepes::faults
 
 int main() {
-  constexpr std::array kDurations_s{60.0, 300.0, 900.0};
+  constexpr std::array kDurations_s{30.0, 90.0, 300.0};
   std::vector<double> states;
   for (const double duration_s : kDurations_s) {
     states.push_back(static_cast<double>(crepes::faults::state_after(duration_s)));
     fmt::print("{:4.0f} s: {:.3f} MB\n", duration_s, 1e-6 * states.back());
     std::fflush(stdout);
   }
-  constexpr double kDay_s = 86400.0;
   const double per_s = (states[2] - states[1]) / (kDurations_s[2] - kDurations_s[1]);
-  fmt::print("from the last two, in a day: {:+.1f} MB\n", 1e-6 * per_s * kDay_s);
+  fmt::print("from the last two: {:+.3f} MB an hour\n", 1e-6 * per_s * 3600.0);
   return 0;
 }

@@ -26,6 +26,7 @@
 #include "net/mesh/crc32.hpp"
 #include "net/mesh/peer_message.hpp"
 #include "net/subscription/subscription_service.hpp"
+#include "tests/fuzz/mesh_target.hpp"
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/places.hpp"
 #include "tests/support/recorded_files.hpp"
@@ -318,6 +319,7 @@ constexpr std::array kTargets{
     FuzzTarget{"detect_protocol", &run_detect_protocol, &detect_protocol_seeds},
     FuzzTarget{"device_clock", &run_device_clock, &device_clock_seeds},
     FuzzTarget{"peer_message", &run_peer_message, &peer_message_seeds},
+    FuzzTarget{"mesh", &run_mesh, &mesh_seeds, 40},
     FuzzTarget{"subscription", &run_subscription, &subscription_seeds},
     FuzzTarget{"config", &run_config, &config_seeds},
     FuzzTarget{"led", &run_led, &led_seeds}};

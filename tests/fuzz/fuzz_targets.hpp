@@ -15,6 +15,7 @@ struct FuzzTarget {
   std::string_view name;
   void (*run)(std::span<const std::uint8_t>);  ///< aborts when something does not hold
   std::vector<FuzzInput> (*seeds)();           ///< valid inputs to begin with
+  std::size_t cost = 1;                        ///< the quick suite runs so many times fewer inputs
 };
 
 [[nodiscard]] std::span<const FuzzTarget> fuzz_targets();

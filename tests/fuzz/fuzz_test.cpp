@@ -67,7 +67,7 @@ TEST_P(Fuzz, HoldsForDamagedInputs) {
       damage(input, inputs[below(random, inputs.size())], random);
     input.resize(std::min(input.size(), kLongest));
     GetParam().run(input);
-    bytes += input.size() + 64;
+    bytes += GetParam().cost * (input.size() + 64);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <set>
 #include <string>
 #include <tuple>
@@ -88,13 +89,20 @@ INSTANTIATE_TEST_SUITE_P(Worlds, Faults, testing::Range(std::uint64_t{0}, kWorld
 
 /// Those that are no seeds of the worlds above.
 TEST(KeptFaults, AreStillMended) {
+  if (kIsSanitized) GTEST_SKIP() << "the worlds above reach the same code";
   std::set<std::string> flown;
   for (std::uint64_t seed = 1; seed <= kWorlds * faults::kSeedsPerWorld; ++seed)
     flown.insert(to_string(faults::trial_of(seed, faults::kShort)));
+  std::map<std::string, std::vector<Trial>> by_world;
+  std::set<std::string> open;
   for (const KeptTrial& kept : kept_trials()) {
-    if (flown.contains(kept.text)) continue;
-    faults::try_all({kept.trial}, [&](const Verdict& verdict) { expect(verdict, kept.is_open); });
+    if (kept.is_open) open.insert(kept.text);
+    if (!flown.contains(kept.text)) by_world[to_string(kept.trial.world)].push_back(kept.trial);
   }
+  for (const auto& [world, trials] : by_world)
+    faults::try_all(trials, [&](const Verdict& verdict) {
+      expect(verdict, open.contains(to_string(verdict.trial)));
+    });
 }
 
 TEST(FaultTrial, IsTheSameToTheBitWhenRepeated) {

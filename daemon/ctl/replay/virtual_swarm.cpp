@@ -96,8 +96,8 @@ void VirtualSwarm::schedule_recording(std::size_t index) {
   for (Timestamp t = recording.imu.front().stamp; t <= end; t += period) {
     schedule_at(t, index, Event(Tick{t}));
   }
-  recording.imu = {};
-  recording.ranges = {};
+  std::vector<ImuSample>().swap(recording.imu);  // what is scheduled is not kept twice
+  std::vector<UwbRange>().swap(recording.ranges);
 }
 
 Result<void> VirtualSwarm::run_until(double true_s) {
