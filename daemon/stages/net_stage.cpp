@@ -61,8 +61,13 @@ AirTotals air_totals(const PeerLink& link, Timestamp now) {
       .sent_bytes =
           link.counters()[MeshCounter::kSentBytes] + link.counters()[MeshCounter::kForwardedBytes],
       .received = link.counters()[MeshCounter::kReceived],
-      .received_bytes = link.counters()[MeshCounter::kReceivedBytes]};
-  for (const PeerTraffic& traffic : link.traffic(now)) totals.lost += traffic.lost;
+      .received_bytes = link.counters()[MeshCounter::kReceivedBytes],
+      .lost = 0,
+      .of_peers = {}};
+  for (const PeerTraffic& traffic : link.traffic(now)) {
+    totals.lost += traffic.lost;
+    totals.of_peers[traffic.peer] = traffic.received + traffic.lost;
+  }
   return totals;
 }
 

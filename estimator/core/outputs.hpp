@@ -194,6 +194,9 @@ struct NeighborStatus {
   std::array<VerdictCounts, kMeasurementKindCount> measurements{};  ///< [kind][verdict]
   /// When the newest of a kind was taken, whatever its outcome.
   std::array<std::optional<Timestamp>, kMeasurementKindCount> newest{};
+  /// Measured minus expected, own and the neighbor's ranges: the mean of about the last sixteen
+  /// [m].
+  std::optional<double> range_residual_m;
   std::optional<Timestamp> newest_imu;  ///< of its IMU's samples
   ImuFaultCounts refused_imu{};         ///< its IMU's samples, by reason
   std::uint64_t id_decodes = 0;         ///< tracks decoded to this robot's ID

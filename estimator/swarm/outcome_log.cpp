@@ -3,11 +3,23 @@
 #include <algorithm>
 
 namespace crepes {
+namespace {
+
+bool is_range(MeasurementKind kind) {
+  return kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange;
+}
+
+}  // namespace
 
 void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion) {
   ++counts_[static_cast<std::size_t>(kind)][static_cast<std::size_t>(fusion.verdict)];
   std::optional<Timestamp>& newest = newest_[static_cast<std::size_t>(kind)];
   newest = std::max(newest.value_or(stamp), stamp);
+  if (is_range(kind) && fusion.dimension > 0) {
+    constexpr double kMemory = 16.0;  // measurements
+    const double mean = range_residual_m_.value_or(fusion.residual[0]);
+    range_residual_m_ = mean + (fusion.residual[0] - mean) / kMemory;
+  }
   if (keeps_records_) records_.measurements.push_back({neighbor_, stamp, kind, fusion});
 }
 
@@ -20,6 +32,7 @@ void OutcomeLog::add(std::optional<CalibrationRecord> calibration) {
 void OutcomeLog::write_to(NeighborStatus& status) const {
   status.measurements = counts_;
   status.newest = newest_;
+  status.range_residual_m = range_residual_m_;
 }
 
 }  // namespace crepes

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 
 #include "estimator/core/measurements.hpp"
@@ -36,6 +37,7 @@ struct PeerTraffic {
 struct AirShare {
   double own = 0.0;  ///< what this robot sends
   double all = 0.0;  ///< that, and what the robots send that it hears; without what they forward
+  std::map<RobotId, double> of_peers;  ///< what each of them sends
 };
 
 /// How this robot's datagrams are protected, and what they cost.

@@ -79,7 +79,15 @@ AirShare air_share(const AirTotals& before, const AirTotals& after, const Broadc
   const double theirs = share(difference(before.received, after.received),
                               difference(before.received_bytes, after.received_bytes),
                               difference(before.lost, after.lost));
-  return {own, own + theirs};
+  AirShare shares{.own = own, .all = own + theirs, .of_peers = {}};
+  const double heard = difference(before.received, after.received);
+  const double bytes = difference(before.received_bytes, after.received_bytes);
+  for (const auto& [peer, total] : after.of_peers) {
+    const auto earlier = before.of_peers.find(peer);
+    const double sent = difference(earlier == before.of_peers.end() ? 0 : earlier->second, total);
+    shares.of_peers[peer] = heard > 0 ? share(sent, bytes * sent / heard, 0.0) : 0.0;
+  }
+  return shares;
 }
 
 }  // namespace crepes

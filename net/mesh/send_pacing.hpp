@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 
 #include "net/mesh/peer_message.hpp"
 #include "net/mesh/peer_status.hpp"
@@ -63,10 +64,12 @@ struct AirTotals {
   std::uint64_t sent_bytes = 0;
   std::uint64_t received = 0;
   std::uint64_t received_bytes = 0;
-  std::uint64_t lost = 0;  ///< datagrams of peers
+  std::uint64_t lost = 0;                     ///< datagrams of peers
+  std::map<RobotId, std::uint64_t> of_peers;  ///< datagrams of each, with those that were lost
 };
 
-/// The shares of the channel between two instants. Lost datagrams are as long as those received.
+/// The shares of the channel between two instants. All datagrams of peers, also the lost ones, are
+/// taken for as long as the mean of those received.
 [[nodiscard]] AirShare air_share(const AirTotals& before, const AirTotals& after,
                                  const Broadcasts& broadcasts);
 

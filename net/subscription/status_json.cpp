@@ -253,6 +253,10 @@ std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId 
   json["neighbors"][0]["ages_s"] = ages_json(*neighbor, status.stamp);
   const auto traffic = std::ranges::find(status.traffic, peer, &PeerTraffic::peer);
   if (traffic != status.traffic.end()) json["neighbors"][0]["reports"] = traffic_json(*traffic);
+  const auto air = status.mesh.air.of_peers.find(peer);
+  if (air != status.mesh.air.of_peers.end()) put(json["neighbors"][0], "airtime", air->second, 3);
+  if (neighbor->range_residual_m)
+    put(json["neighbors"][0], "range_residual_m", *neighbor->range_residual_m, 3);
   json["clocks"] = Json::array();
   const auto clock = std::ranges::find(status.clocks, peer, &ClockStatus::peer);
   if (clock != status.clocks.end()) json["clocks"].push_back(clock_json(*clock));

@@ -89,7 +89,10 @@ TEST(SendPacing, CountsTheAirOfEveryRepeatOfADatagram) {
 }
 
 TEST(SendPacing, AddsUpTheSharesOfAllThatIsHeardOrLost) {
-  const AirTotals before{.at = Timestamp{}, .sent = 10, .sent_bytes = 5000, .received = 100};
+  AirTotals before;
+  before.sent = 10;
+  before.sent_bytes = 5000;
+  before.received = 100;
   AirTotals after = before;
   after.at += std::chrono::seconds{2};
   EXPECT_EQ(air_share(before, after, kSlow).all, 0.0);
@@ -104,6 +107,24 @@ TEST(SendPacing, AddsUpTheSharesOfAllThatIsHeardOrLost) {
   EXPECT_DOUBLE_EQ(share.own, airtime(25, 400, kSlow));
   EXPECT_DOUBLE_EQ(share.all, airtime(25, 400, kSlow) + airtime(50, 300, kSlow));
   EXPECT_EQ(air_share(after, after, kSlow).all, 0.0);
+}
+
+TEST(SendPacing, DividesTheAirAmongPeersByTheirDatagrams) {
+  AirTotals before;
+  before.received = 10;
+  before.received_bytes = 1000;
+  before.of_peers[RobotId{2}] = 10;
+  AirTotals after = before;
+  after.at += std::chrono::seconds{1};
+  after.received += 60;
+  after.received_bytes = before.received_bytes + 60 * 300;
+  after.of_peers = {{RobotId{2}, 10 + 40}, {RobotId{3}, 25}};  // five of which were lost
+
+  const AirShare share = air_share(before, after, kSlow);
+
+  EXPECT_DOUBLE_EQ(share.of_peers.at(RobotId{2}), airtime(40, 300, kSlow));
+  EXPECT_DOUBLE_EQ(share.of_peers.at(RobotId{3}), airtime(25, 300, kSlow));
+  EXPECT_EQ(air_share(after, after, kSlow).of_peers.at(RobotId{2}), 0.0);
 }
 
 }  // namespace

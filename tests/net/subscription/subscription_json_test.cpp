@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -188,7 +189,7 @@ TEST(SubscriptionJson, ReportsAllOfASmallStatus) {
   status.mesh = {.is_sealed = true,
                  .is_signed = false,
                  .warning = "any robot of the swarm could speak for another",
-                 .air = {0.012, 0.2345}};
+                 .air = {0.012, 0.2345, {}}};
 
   const Json json = Json::parse(status_json(status));
 
@@ -247,6 +248,9 @@ TEST(SubscriptionJson, TruncatesALargeStatusAndMarksIt) {
 TEST(SubscriptionJson, ReportsOneNeighborInFull) {
   SystemStatus status = big_status(20);
   status.traffic = {{.peer = RobotId{5}, .received = 70, .lost = 3, .restarts = 1, .age_s = 0.02}};
+  status.mesh.air.of_peers[RobotId{5}] = 0.04;
+  std::ranges::find(status.estimator.neighbors, RobotId{5}, &NeighborStatus::neighbor)
+      ->range_residual_m = -0.03;
 
   const std::string text = peer_status_json(status, RobotId{5}).value();
   const Json json = Json::parse(text);
@@ -257,6 +261,8 @@ TEST(SubscriptionJson, ReportsOneNeighborInFull) {
   EXPECT_EQ(json["neighbors"][0]["name"], "robot-3");
   EXPECT_EQ(json["neighbors"][0]["measurements"]["peer_range"]["gated"], 123456);
   EXPECT_EQ(json["neighbors"][0]["reports"]["lost"], 3);
+  EXPECT_EQ(json["neighbors"][0]["airtime"], 0.04);
+  EXPECT_EQ(json["neighbors"][0]["range_residual_m"], -0.03);
   EXPECT_EQ(json["clocks"][0]["sigma_s"], 1.5e-5);
   EXPECT_FALSE(peer_status_json(status, RobotId{1}).has_value());
 }

@@ -164,7 +164,7 @@ export class Health {
 
   /** One row a neighbor; of each kind of measurement the rate and how long ago the newest was taken. */
   drawLinks(t) {
-    const head = ["neighbor", "heard ms ago", "lost now %", "lost %", "clock s", "± ms", "ppm", "we see /s", "ms ago", "sees us /s", "ms ago", "ranges /s", "ms ago", "gated"];
+    const head = ["neighbor", "heard ms ago", "lost now %", "lost %", "clock s", "± ms", "ppm", "we see /s", "ms ago", "sees us /s", "ms ago", "ranges /s", "ms ago", "off by cm", "gated", "air %"];
     const rows = (this.store.status.neighbors || []).map((neighbor) => {
       const clock = (this.store.status.clocks || []).find(({ peer }) => peer === neighbor.peer) || {};
       const { received = 0, lost = 0, age_s: age, loss } = neighbor.reports || {};
@@ -181,7 +181,9 @@ export class Health {
         ...measuredCells(rates.bearing, since("bearing")),
         ...measuredCells(rates.peer_bearing, since("peer_bearing")),
         ...measuredCells(range, since("range", "peer_range")),
+        [fixed(100 * neighbor.range_residual_m, 1)],
         [String(allOf(neighbor, "gated"))],
+        [fixed(100 * neighbor.airtime, 2)],
       ];
     });
     const table = this.nodes.links;
