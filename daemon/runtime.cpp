@@ -56,6 +56,10 @@ Runtime::Runtime(Config config, const Clock& machine)
         .publish = [this](Outputs outputs) { outputs_.push(std::move(outputs)); },
         .solve_team = [this](TeamProblem problem) { problems_.push(std::move(problem)); },
         .publish_status = [this](EstimatorStatus status) { outputs_.push(std::move(status)); },
+        .sight =
+            [this](PictureRobots sighting) {
+              if (!config_.recording.socket.empty()) sightings_.push(std::move(sighting));
+            },
         .late_frames = late_frames_};
     run_estimator(estimator_settings_, events_, sinks, context, stop);
   });
@@ -86,7 +90,7 @@ Runtime::Runtime(Config config, const Clock& machine)
   for (std::size_t i = 0; i < cameras_.size(); ++i) start_camera(i, sense);
   if (!records) return;
   start("recorder", [this](const StageContext& context, const std::stop_token& stop) {
-    run_recorder({recorder_settings_, recorded_, picture_taps_}, context, stop);
+    run_recorder({recorder_settings_, recorded_, picture_taps_, sightings_}, context, stop);
   });
 }
 

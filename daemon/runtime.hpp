@@ -17,6 +17,7 @@
 #include "daemon/stages/graph_stage.hpp"
 #include "daemon/stages/live_settings.hpp"
 #include "daemon/stages/net_stage.hpp"
+#include "daemon/stages/picture_tap.hpp"
 #include "daemon/stages/sensor_stage.hpp"
 #include "daemon/stages/vision_stage.hpp"
 #include "daemon/stages/worker.hpp"
@@ -83,6 +84,8 @@ class Runtime {
   GraphQueue problems_{256, Overflow::kDropOldest};
   NetInbox outputs_{64};
   RecordQueue recorded_{4096, Overflow::kDropNewest};
+  PictureRobotsQueue sightings_{
+      64, Overflow::kDropOldest};  // a quarter of a second; only the newest matter
   BoundedQueue<ConfigStatus> config_status_{1, Overflow::kDropOldest};
   std::deque<CameraQueues> cameras_;
   std::deque<PictureTap> picture_taps_;  // one a camera

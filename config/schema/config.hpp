@@ -49,6 +49,7 @@ struct Config {
   NetConfig net;
   SubscriptionConfig subscription;
   RecordingConfig recording;
+  ViewConfig view;
   SimConfig sim;
   LogConfig log;
 
@@ -68,6 +69,7 @@ struct Config {
     v.section("net", net, Change::kLive, "mesh");
     v.section("subscription", subscription, Change::kLive, "poses for other programs");
     v.section("recording", recording, Change::kRestart, "measurements for crepesctl record");
+    v.section("view", view, Change::kLive, "the page of crepesctl view");
     v.section("sim", sim, Change::kRestart, "simulated devices");
     v.section("log", log, Change::kLive, "log messages");
   }

@@ -1,4 +1,4 @@
-/// Settings of the service: recording and log messages.
+/// Settings of the service: recording, the page, and log messages.
 #pragma once
 
 #include <array>
@@ -20,6 +20,19 @@ struct RecordingConfig {
     v.field("socket", socket,
             "Unix socket that serves the measurements; empty: none (a relative path starts at the "
             "daemon's working directory)");
+  }
+};
+
+/// What the page of `crepesctl view` may do.
+struct ViewConfig {
+  bool control = false;
+
+  [[nodiscard]] bool operator==(const ViewConfig&) const = default;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("control", control,
+            "whether who opens the page of crepesctl view may set exposure, gain and threshold");
   }
 };
 

@@ -4,15 +4,18 @@
 #include <poll.h>
 #include <sys/socket.h>
 
-#include <array>
-#include <cerrno>
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <optional>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "config/reading/config_file.hpp"
+#include "daemon/recording/block.hpp"
+#include "daemon/recording/picture_block.hpp"
+#include "daemon/recording/recipient.hpp"
 #include "daemon/recording/unix_socket.hpp"
 #include "daemon/service/logging.hpp"
 #include "drivers/dataset/dataset_rows.hpp"
@@ -23,21 +26,10 @@ namespace {
 constexpr int kRecorderPollMs = 50;
 constexpr Duration kRetry = std::chrono::seconds{5};
 constexpr std::size_t kMaxBatch = 1 << 20;  ///< bytes of rows at a time
-constexpr std::size_t kMaxRequest = 100;
-
-void append_block(std::string& text, std::string_view kind, std::string_view content) {
-  text += fmt::format("{} {}\n", kind, content.size());
-  text.append(content);
-}
-
-std::string picture_block(const Frame& frame) {
-  std::string content =
-      fmt::format("{} {} {} {}\n", frame.camera, to_ns(frame.stamp), frame.width, frame.height);
-  content.append(frame.pixels.begin(), frame.pixels.end());
-  std::string block;
-  append_block(block, "picture", content);
-  return block;
-}
+constexpr std::size_t kMaxRecipients = 4;
+constexpr std::size_t kMaxSightings = 64;
+// Robots of a picture that are not known by then are not identified in it.
+constexpr Duration kRobotsPatience = std::chrono::milliseconds{60};
 
 /// For a replay, which may not have the keys.
 Config without_keys(Config config) {
@@ -47,80 +39,30 @@ Config without_keys(Config config) {
   return config;
 }
 
-/// The tool at the other end.
-class Recipient {
- public:
-  explicit Recipient(UniqueFd socket) : socket_(std::move(socket)) {}
-
-  [[nodiscard]] int descriptor() const { return socket_.get(); }
-  [[nodiscard]] bool wants_rows() const { return request_.starts_with(kRecordRequest); }
-  [[nodiscard]] bool wants_pictures() const { return request_ == kPicturesRequest; }
-  /// Everything has been sent, so there is room for more.
-  [[nodiscard]] bool is_idle() const { return sent_ == waiting_.size(); }
-  void put(std::string text) {
-    if (is_idle()) {
-      waiting_ = std::move(text);
-      sent_ = 0;
-    } else {
-      waiting_ += text;
-    }
-  }
-
-  /// Reads the request and sends what the socket accepts without blocking. Returns whether the tool
-  /// is still connected.
-  [[nodiscard]] bool exchange() { return read_request() && send_some(); }
-
- private:
-  [[nodiscard]] bool read_request() {
-    std::array<char, kMaxRequest> buffer{};
-    const ssize_t count = ::recv(socket_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
-    if (count == 0) return false;
-    if (count < 0) return errno == EAGAIN || errno == EINTR;
-    line_.append(buffer.data(), static_cast<std::size_t>(count));
-    const std::size_t end = line_.find('\n');
-    if (end == std::string::npos) return line_.size() < kMaxRequest;
-    request_ = line_.substr(0, end);
-    return wants_rows() && end + 1 == line_.size();
-  }
-
-  [[nodiscard]] bool send_some() {
-    while (!is_idle()) {
-      const ssize_t count = ::send(socket_.get(), waiting_.data() + sent_, waiting_.size() - sent_,
-                                   MSG_DONTWAIT | MSG_NOSIGNAL);
-      if (count < 0) return errno == EAGAIN || errno == EINTR;
-      sent_ += static_cast<std::size_t>(count);
-    }
-    return true;
-  }
-
-  UniqueFd socket_;
-  std::string line_;
-  std::string request_;
-  std::string waiting_;
-  std::size_t sent_ = 0;
-};
-
 /// The recorder thread's state.
 class Recorder {
  public:
   Recorder(const RecorderStage& stage, const StageContext& context)
-      : stage_(stage), context_(context) {}
+      : stage_(stage), context_(context), pictures_(stage.pictures.size()) {}
 
   void run_once() {
     if (auto config = stage_.settings.receive()) {
       config_ = std::move(*config);
-      is_config_sent_ = false;
+      for (Recipient& recipient : recipients_) recipient.forget_config();
     }
     listen();
     wait();
-    if (recipient_ && !recipient_->exchange()) end();
+    std::erase_if(recipients_, [](Recipient& recipient) { return !recipient.exchange(); });
     accept();
-    if (recipient_ && recipient_->wants_rows()) {
-      if (recipient_->is_idle()) hand_over();
+    choose_recording();
+    receive_pictures();
+    if (Recipient* const recording = recipient_that_records()) {
+      if (recording->is_idle()) hand_over(*recording);
     } else {
       while (stage_.events.try_pop()) continue;
       missed_before_ = stage_.events.dropped();
     }
+    look();
   }
 
  private:
@@ -137,50 +79,114 @@ class Recorder {
   }
 
   void wait() {
-    const auto fd_of = [](const auto& thing) { return thing ? thing->descriptor() : -1; };
-    const bool sends = recipient_ && !recipient_->is_idle();
-    const auto events = static_cast<short>(sends ? POLLIN | POLLOUT : POLLIN);
-    std::array<pollfd, 2> watched{pollfd{listener_.get(), POLLIN, 0},
-                                  pollfd{fd_of(recipient_), events, 0}};
+    std::vector<pollfd> watched{{listener_.get(), POLLIN, 0}};
+    for (const Recipient& recipient : recipients_) {
+      const auto events = static_cast<short>(recipient.is_idle() ? POLLIN : POLLIN | POLLOUT);
+      watched.push_back({recipient.descriptor(), events, 0});
+    }
     ::poll(watched.data(), watched.size(), kRecorderPollMs);
   }
 
   void accept() {
     UniqueFd socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC));
     if (!socket) return;
-    if (recipient_) {
-      Recipient surplus(std::move(socket));
-      std::string block;
-      append_block(block, "refused", "another recording is under way");
-      surplus.put(std::move(block));
-      static_cast<void>(surplus.exchange());
+    Recipient recipient(std::move(socket));
+    if (recipients_.size() == kMaxRecipients) {
+      recipient.refuse("too many tools are connected");
       return;
     }
-    recipient_.emplace(std::move(socket));
-    is_config_sent_ = false;
-    log_message(LogLevel::kInfo, "recording: begins");
+    recipients_.push_back(std::move(recipient));
   }
 
-  void end() {
-    recipient_.reset();
-    log_message(LogLevel::kInfo, "recording: ended");
+  Recipient* recipient_that_records() {
+    const auto found =
+        std::ranges::find_if(recipients_, [](const Recipient& each) { return each.records(); });
+    return found == recipients_.end() ? nullptr : &*found;
+  }
+
+  /// The first that asked; others are refused.
+  void choose_recording() {
+    Recipient* const first = recipient_that_records();
+    for (Recipient& recipient : recipients_) {
+      if (recipient.records() && &recipient != first)
+        recipient.refuse("another recording is under way");
+    }
+    std::erase_if(recipients_, [&](Recipient& each) { return each.records() && &each != first; });
+    if (const bool records = first != nullptr; records != std::exchange(is_recording_, records))
+      log_message(LogLevel::kInfo, records ? "recording: begins" : "recording: ended");
+  }
+
+  [[nodiscard]] bool is_looked_at(std::size_t camera) const {
+    return std::ranges::any_of(
+        recipients_, [camera](const Recipient& each) { return each.looks_at() == camera; });
+  }
+
+  /// Takes the pictures that were asked for, and asks for those that somebody waits for now.
+  void receive_pictures() {
+    const Recipient* const recording = recipient_that_records();
+    const bool are_recorded = recording != nullptr && recording->records_pictures();
+    for (std::size_t i = 0; i < pictures_.size(); ++i) {
+      PictureTap& tap = stage_.pictures[i];
+      if (auto picture = tap.pictures.try_pop(); picture && !pictures_[i])
+        pictures_[i] = HeldPicture{std::move(*picture), context_.clock.now(), are_recorded};
+      if (!pictures_[i] && (are_recorded || is_looked_at(i))) tap.requests.push({});
+    }
   }
 
   /// Sends the events since the last call.
-  void hand_over() {
+  void hand_over(Recipient& recipient) {
     std::string text;
-    if (!std::exchange(is_config_sent_, true))
-      append_block(text, "config", write_config(without_keys(config_)));
+    put_config(recipient, text);
     const std::uint64_t missed = stage_.events.dropped();
     const std::uint64_t gap = missed - std::exchange(missed_before_, missed);
     if (gap > 0) append_block(text, "gap", fmt::format("{}", gap));
     for (const auto& [kind, rows] : waiting_rows()) append_block(text, kind, rows);
-    for (PictureTap& tap : stage_.pictures) {
-      if (!recipient_->wants_pictures()) break;
-      if (auto frame = tap.pictures.try_pop()) text += picture_block(*frame);
-      tap.requests.push({});
+    if (recipient.records_pictures()) {
+      for (auto& held : pictures_)
+        if (held && std::exchange(held->is_to_record, false))
+          append_picture(text, held->picture.frame);
     }
-    if (!text.empty()) recipient_->put(std::move(text));
+    if (!text.empty()) recipient.put(std::move(text));
+  }
+
+  /// Sends the pictures to those who look, once the robots in them are known or should be.
+  void look() {
+    while (auto sighting = stage_.sightings.try_pop()) {
+      if (sightings_.size() == kMaxSightings) sightings_.pop_front();
+      sightings_.push_back(std::move(*sighting));
+    }
+    for (std::size_t i = 0; i < pictures_.size(); ++i) {
+      const auto& held = pictures_[i];
+      if (!held) continue;
+      const PictureRobots* const robots = sighting_in(held->picture.frame);
+      const bool is_ready =
+          robots != nullptr || context_.clock.now() - held->since > kRobotsPatience;
+      if (is_looked_at(i) && !is_ready) continue;
+      if (is_looked_at(i)) show(held->picture, robots);
+      if (!held->is_to_record || recipient_that_records() == nullptr) pictures_[i].reset();
+    }
+  }
+
+  [[nodiscard]] const PictureRobots* sighting_in(const Frame& frame) const {
+    const auto found = std::ranges::find_if(sightings_, [&](const PictureRobots& sighting) {
+      return sighting.stamp == frame.stamp && sighting.camera == frame.camera;
+    });
+    return found == sightings_.end() ? nullptr : &*found;
+  }
+
+  void show(const Picture& picture, const PictureRobots* robots) {
+    std::string look;
+    append_look(look, picture, robots);
+    for (Recipient& recipient : recipients_) {
+      if (recipient.looks_at() != picture.frame.camera || !recipient.is_idle()) continue;
+      std::string text;
+      put_config(recipient, text);
+      recipient.put_look(text + look);
+    }
+  }
+
+  void put_config(Recipient& recipient, std::string& text) const {
+    if (recipient.needs_config()) append_block(text, "config", write_config(without_keys(config_)));
   }
 
   [[nodiscard]] std::map<std::string, std::string> waiting_rows() {
@@ -203,14 +209,22 @@ class Recorder {
     return rows;
   }
 
+  struct HeldPicture {
+    Picture picture;
+    Timestamp since{};
+    bool is_to_record = false;
+  };
+
   const RecorderStage& stage_;
   const StageContext& context_;
   Config config_;
   UniqueFd listener_;
   Timestamp retry_at_ = Timestamp::min();
   std::string fault_;
-  std::optional<Recipient> recipient_;
-  bool is_config_sent_ = false;
+  std::vector<Recipient> recipients_;
+  bool is_recording_ = false;
+  std::vector<std::optional<HeldPicture>> pictures_;  ///< of each camera
+  std::deque<PictureRobots> sightings_;
   std::uint64_t missed_before_ = 0;
 };
 

@@ -23,6 +23,12 @@ void hand_on(Outputs outputs, const EstimatorSinks& sinks) {
   if (!outputs.poses.empty() || outputs.report) sinks.publish(std::move(outputs));
 }
 
+void hand_on_sighting(const Event& event, Outputs& outputs, const EstimatorSinks& sinks) {
+  const auto* const frame = std::get_if<SpotFrame>(&event);
+  if (frame == nullptr || outputs.bearings.empty() || !sinks.sight) return;
+  sinks.sight({frame->stamp, frame->camera, std::exchange(outputs.bearings, {})});
+}
+
 }  // namespace
 
 void run_estimator(LiveSettings<EstimatorSettings>& settings, EventQueue& events,
@@ -49,7 +55,9 @@ void run_estimator(LiveSettings<EstimatorSettings>& settings, EventQueue& events
     if (event && is_late(*event, clock.now() - wait_for_frames)) {
       sinks.late_frames.add();
     } else if (event) {
-      hand_on(estimator.step(*event), sinks);
+      Outputs outputs = estimator.step(*event);
+      hand_on_sighting(*event, outputs, sinks);
+      hand_on(std::move(outputs), sinks);
     }
     if (clock.now() < next_tick) continue;
     const Timestamp tick = clock.now();

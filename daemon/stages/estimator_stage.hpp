@@ -7,6 +7,7 @@
 #include "daemon/stages/bounded_queue.hpp"
 #include "daemon/stages/counters.hpp"
 #include "daemon/stages/live_settings.hpp"
+#include "daemon/stages/picture_tap.hpp"
 #include "daemon/stages/stage_context.hpp"
 #include "estimator/core/event.hpp"
 #include "estimator/swarm/estimator.hpp"
@@ -20,6 +21,7 @@ struct EstimatorSinks {
   std::function<void(Outputs)> publish;                 ///< poses and the report
   std::function<void(TeamProblem)> solve_team;          ///< the answer comes back as an event
   std::function<void(EstimatorStatus)> publish_status;  ///< four times a second
+  std::function<void(PictureRobots)> sight{};           ///< the robots in a picture, if any
   Counter& late_frames;                                 ///< dropped, see `run_estimator`
 };
 

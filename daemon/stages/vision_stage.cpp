@@ -34,6 +34,19 @@ Frame copy_of(const Frame& frame) {
   return copy;
 }
 
+/// The frame and what was found in it, for whoever asked.
+Picture picture_of(const Frame& frame, const Detection& found) {
+  const auto hot =
+      found.hot_pixels.first(std::min(found.hot_pixels.size(), Picture::kMaxHotPixels));
+  return {.frame = copy_of(frame),
+          .spots = {found.spots.begin(), found.spots.end()},
+          .hot_pixels = {hot.begin(), hot.end()},
+          .hot_pixel_count = found.hot_pixels.size(),
+          .background = found.background,
+          .threshold = found.threshold,
+          .saturated_share = found.saturated_share};
+}
+
 std::string_view diagnosis_of(const Detection& found, bool is_calibrated) {
   if (!found.failure.empty()) return found.failure;
   if (found.exposure == Exposure::kBright)
@@ -103,7 +116,7 @@ SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::ui
                                  {"delay_p99_us", p99_us},
                                  {"threshold", static_cast<std::uint64_t>(found.threshold)},
                                  {"background", static_cast<std::uint64_t>(found.background)},
-                                 {"hot_pixels", found.hot_pixels},
+                                 {"hot_pixels", found.hot_pixels.size()},
                                  {"hot", rejected.hot},
                                  {"huge", rejected.huge},
                                  {"faint", rejected.faint},
@@ -139,7 +152,7 @@ void run_vision(const VisionStage& stage, const StageContext& context,
       health.publish(std::string(diagnosis_of(found, stage.is_calibrated)),
                      totals_of(found, rejected, failures, delays, levels));
     }
-    if (stage.tap.requests.try_pop()) stage.tap.pictures.push(copy_of(*frame));
+    if (stage.tap.requests.try_pop()) stage.tap.pictures.push(picture_of(*frame, found));
     stage.recycled.push(std::move(*frame));
   }
 }

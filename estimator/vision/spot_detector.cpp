@@ -126,7 +126,7 @@ Detection SpotDetector::detect(const GrayImage& image) {
     }
   } else {
     hot_pixels_.look(image, found.faint_threshold);
-    found.hot_pixels = hot_pixels_.known().size();
+    found.hot_pixels = hot_pixels_.known();
     is_noise = !search_levels(image, sample, found);
     select(found.rejected);
   }

@@ -46,8 +46,9 @@ struct Detection {
   Exposure exposure = Exposure::kGood;
   double saturated_share = 0.0;  ///< of the picture, 0..1
   Rejected rejected;
-  std::size_t hot_pixels = 0;  ///< known ones; they no longer count as rejected
-  std::string_view failure;    ///< why the detector failed on this picture; empty when it did not
+  /// Known ones, which no longer count as rejected; valid until the next detect().
+  std::span<const MendedPixel> hot_pixels;
+  std::string_view failure;  ///< why the detector failed on this picture; empty when it did not
 };
 
 /// Finds LED boards: a ring of LEDs is one spot, be it a blob for each LED or one for all.

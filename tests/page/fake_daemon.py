@@ -25,7 +25,9 @@ class FakeDaemon:
         self.lost = set()  # neighbors without a pose
         self.blind = set()  # neighbors that do not see us
         self.broken = {}  # sensors by name, with what they say
+        self.fixed = None  # where all neighbors stand instead of moving
         self.sent = 0
+        self.newest_ns = 0  # the stamp of the newest poses
         self.start = time.monotonic()
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
@@ -48,12 +50,13 @@ class FakeDaemon:
 
     def send_poses(self, now):
         self.watchers = {client: end for client, end in self.watchers.items() if end > now}
+        self.newest_ns = int(now * 1e9)
         for robot in self.neighbors:
             if robot in self.lost or not self.watchers:
                 continue
             variance = [1e-4, 0, 0, 0, 0, 0, 4e-4, 0, 0, 0, 0, 9e-4, 0, 0, 0, 1e-5, 0, 0, 1e-5, 0, 1e-5]
             pose = json.dumps({"class": "POSE", "seq": self.sent, "timestamp": now, "t_ns": str(int(now * 1e9)), "self": 1, "peer": robot,
-                               "name": f"r{robot}", "mode": ("direct", "graph", "predicted")[robot % 3], "position": position_of(robot, now),
+                               "name": f"r{robot}", "mode": ("direct", "graph", "predicted")[robot % 3], "position": self.fixed or position_of(robot, now),
                                "orientation": {"w": 1, "x": 0, "y": 0, "z": 0}, "up": {"x": 0, "y": 0, "z": 1},
                                "covariance": variance, "age_s": 0.01, "reset_counter": 1, "sources": ["range"]}).encode()
             for client in self.watchers:
@@ -78,6 +81,7 @@ class FakeDaemon:
             if "peer" in request:
                 for each in status["neighbors"]:
                     each["ages_s"] = {"bearing": 0.01, "peer_bearing": 9.0 if each["peer"] in self.blind else 0.02, "range": 0.03, "imu": 0.01}
+                    each.update(airtime=0.042, range_residual_m=-0.031)
             status["clocks"] = [{"peer": r, "offset_s": -10.0 * r, "skew_ppm": 3, "sigma_s": 2e-5} for r in wanted]
         if "peer" not in request:
             status["sensors"] = [{"name": name, "rate_hz": rate, "ok": name not in self.broken, **({"message": self.broken[name]} if name in self.broken else {})}

@@ -2,14 +2,21 @@
 """What the page costs: its size, the server's bytes and CPU with robots at 50 Hz and open pages, latency and rate of the pictures.
     tests/page/measure.py [SECONDS]"""
 import gzip
+import json
+import pathlib
 import select
 import socket
+import subprocess
 import sys
+import tempfile
 import time
 
 from devtools import Browser, CannotStart
+from fake_cameras import FakeCameras
 from fake_daemon import FakeDaemon
-from viewer import SOURCE, Viewer
+from viewer import SOURCE, TOOL, Viewer, cpu_s
+
+PORT = 47583
 
 
 def size_of_the_page():
@@ -17,9 +24,9 @@ def size_of_the_page():
     return sum(map(len, texts)), sum(len(gzip.compress(text)) for text in texts)
 
 
-def reader(viewer):
+def reader(viewer, path="/events?robot=0"):
     connection = socket.create_connection(("127.0.0.1", viewer.port), 10)
-    connection.sendall(f"GET /events?robot=0 HTTP/1.1\r\nHost: 127.0.0.1:{viewer.port}\r\n\r\n".encode())
+    connection.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{viewer.port}\r\n\r\n".encode())
     return connection
 
 
@@ -39,6 +46,91 @@ def cost(robots, pages, seconds):
     viewer.stop()
     daemon.stop()
     return share, received / pages / seconds if pages else 0
+
+
+def cost_of_pictures(pages, seconds):
+    """CPU of the server with open camera panels, bytes and pictures a second to each. 640 x 512 pixels, simulated noise."""
+    with tempfile.TemporaryDirectory() as folder:
+        daemon = FakeDaemon(neighbors=4)
+        cameras = FakeCameras(f"{folder}/socket", daemon, noise=True)
+        viewer = Viewer("--port", daemon.port, "--socket", f"{folder}/socket")
+        readers = [reader(viewer, path) for _ in range(pages) for path in ("/events?robot=0", "/camera?robot=0&camera=0")]
+        time.sleep(1)
+        start, before, received, asked = time.monotonic(), viewer.cpu_s(), 0, cameras.asked
+        while time.monotonic() < start + seconds:
+            for connection in select.select(readers, [], [], 0.2)[0]:
+                received += len(connection.recv(1 << 20))
+        took = time.monotonic() - start
+        share, rate = (viewer.cpu_s() - before) / took, (cameras.asked - asked) / took
+        for connection in readers:
+            connection.close()
+        viewer.stop()
+        cameras.stop()
+        daemon.stop()
+    return share, received / pages / took, rate
+
+
+class Daemon:
+    """A simulated robot's daemon, alone in its world: 200 pictures of 1280 x 1024 a second."""
+
+    def __init__(self, folder):
+        self.socket = f"{folder}/socket"
+        config = pathlib.Path(folder) / "r1.yaml"
+        text = (SOURCE / "config/examples/four-simulated/r1.yaml").read_text()
+        config.write_text(text.replace('socket: ""', f'socket: "{self.socket}"').replace("port: 47475", f"port: {PORT}, listen: [127.0.0.1]"))
+        self.process = subprocess.Popen([TOOL.replace("crepesctl", "crepesd"), "--config", str(config)], stderr=subprocess.DEVNULL)
+
+    def cpu_s(self):
+        return cpu_s(self.process.pid)
+
+    def delays(self):
+        """From a picture's arrival to its spots, in the last second: median and 99 % [us]."""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+            client.settimeout(2)
+            client.sendto(b'{"class":"POLL","about":"sensors"}', ("127.0.0.1", PORT))
+            status = json.loads(client.recv(2000))
+        counts = next(sensor["counts"] for sensor in status["sensors"] if sensor["name"].endswith("spots"))
+        return counts["delay_p50_us"], counts["delay_p99_us"]
+
+
+def look(connection):
+    """Asks for a picture and reads it: its bytes."""
+    connection.sendall(b"LOOK 1 0\n")
+    while True:
+        head = b""
+        while not head.endswith(b"\n"):
+            head += connection.recv(1)
+        kind, size = head.split()
+        left = int(size)
+        while left > 0:
+            left -= len(connection.recv(left))
+        if kind == b"look":
+            return int(size)
+
+
+def cost_to_the_daemon(seconds):
+    """(share of a core, median and 99 % of the delay to the spots, pictures a second) without and with who looks, in turns."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        daemon = Daemon(folder)
+        time.sleep(6)  # hot pixels are learned
+        for is_looking in (False, True, False, True):
+            with socket.socket(socket.AF_UNIX) as connection:
+                connection.connect(daemon.socket)
+                start, before, pictures, delays = time.monotonic(), daemon.cpu_s(), 0, []
+                while time.monotonic() < start + seconds:
+                    due = time.monotonic() + 0.2
+                    if is_looking:
+                        look(connection)
+                        pictures += 1
+                    time.sleep(max(0, due - time.monotonic()))
+                    delays.append(daemon.delays())
+                took = time.monotonic() - start
+            median, worst = (sorted(column)[len(delays) // 2] for column in zip(*delays))
+            rows.append(((daemon.cpu_s() - before) / took, median, worst, pictures / took))
+        daemon.process.terminate()
+        daemon.process.wait()
+    return rows
 
 
 def first_picture():
@@ -88,6 +180,11 @@ if __name__ == "__main__":
     for robots, pages in ((2, 1), (5, 0), (5, 1), (5, 10), (20, 1), (20, 10)):
         share, rate = cost(robots, pages, duration)
         print(f"{robots} robots, {pages} pages: {100 * share:.1f} % of a core, {rate / 1000:.1f} kB/s to each page")
+    for pages in (1, 10):
+        share, rate, pictures = cost_of_pictures(pages, duration)
+        print(f"5 robots, {pages} pages with the camera: {100 * share:.1f} % of a core, {rate / 1000:.1f} kB/s to each page, {pictures:.1f} pictures a second")
+    for share, median, worst, pictures in cost_to_the_daemon(duration):
+        print(f"daemon with {pictures:.1f} looks a second: {100 * share:.1f} % of a core; a picture's delay to its spots {median} us median, {worst} us 99 %")
     try:
         times, period = first_picture()
         for robots in (2, 5, 20):

@@ -2,16 +2,23 @@
 """The page of crepesctl view in a real browser: what it draws, read back."""
 import json
 import math
+import pathlib
+import re
+import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
+import urllib.error
+import urllib.request
 from urllib.parse import urlsplit
 
 from devtools import Browser, CannotStart
+from fake_cameras import CONFIG, FakeCameras
 from fake_daemon import FakeDaemon, position_of
-from viewer import RECORDING, TOOL, Viewer, replayed
+from viewer import RECORDING, TOOL, Viewer, replayed, wait
 
 class PageTest(unittest.TestCase):
     """A page per test; whatever it does, it neither complains nor speaks to any other host."""
@@ -135,6 +142,15 @@ class Live(PageTest):
                 self.assertLessEqual(page.value("document.documentElement.scrollWidth"), width, f"{width}, panel {key}")
                 self.assertLessEqual(page.value("document.documentElement.scrollHeight"), height, f"{width}, panel {key}")
 
+    def test_links_have_residuals_and_air(self):
+        page = self.open(self.viewer)
+        cell = "[...document.querySelectorAll('#links tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent))[0]"
+        page.wait(f"{cell}?.includes('-3.1')", "a range residual of -3.1 cm")
+        head = page.value("[...document.querySelectorAll('#links th[scope=col]')].map(({ textContent }) => textContent)")
+        row = page.value(cell)
+        self.assertEqual(row[head.index("off by cm")], "-3.1")
+        self.assertEqual(row[head.index("air %")], "4.20")
+
     def test_dark_and_light_follow_the_system_and_the_user(self):
         page = self.open(self.viewer, dark=True)
         self.assertEqual(page.value("document.documentElement.dataset.theme"), "dark")
@@ -151,6 +167,112 @@ class Live(PageTest):
         milliseconds = page.value("""(() => { const start = performance.now(); const t = crepes.store.now(start / 1000);
             for (let i = 0; i < 20; ++i) crepes.scene.draw(t); return (performance.now() - start) / 20; })()""")
         print(f"a scene of 20 robots is drawn in {milliseconds:.1f} ms", file=sys.stderr)
+
+
+class Camera(PageTest):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.daemon = FakeDaemon(neighbors=1)
+        self.daemon.fixed = {"x": 2.0, "y": -0.5, "z": 0.35}  # the direction of FakeCameras' robot
+        self.addCleanup(self.daemon.stop)
+        self.cameras = FakeCameras(self.folder / "socket", self.daemon)
+        self.addCleanup(self.cameras.stop)
+        self.file = self.folder / "crepesd.yaml"
+        self.reloads = []
+        signal.signal(signal.SIGHUP, self.reload)
+        self.write(control=True)
+        self.viewer = Viewer("--port", self.daemon.port, "--socket", self.folder / "socket", "--config", self.file)
+        self.addCleanup(self.viewer.stop)
+
+    def write(self, control):
+        self.file.write_text(CONFIG + f"view: {{control: {str(control).lower()}}}\n")
+        self.cameras.config = self.file.read_text()
+
+    def reload(self, *_):
+        """What the daemon does: the fragments are in force now."""
+        fragments = {file.name: file.read_text() for file in (self.folder / "crepesd.d").glob("*.yaml")}
+        self.reloads.append(fragments)
+        exposure = re.search(r"exposure_us: (\S+)", fragments.get("90-exposure.yaml", "exposure_us: 500")).group(1)
+        self.cameras.config = self.file.read_text().replace("exposure_us: 500", f"exposure_us: {exposure}")
+
+    def open_camera(self, **options):
+        page = self.open(self.viewer, **options)
+        page.value("document.querySelector('nav [data-panel=camera]').click()")
+        page.wait("crepes.camera.picture", "a picture")
+        return page
+
+    def test_pictures_are_shown_with_what_is_found_in_them(self):
+        page = self.open_camera(width=1400, height=900)
+        page.wait("crepes.camera.times.length > 3 && crepes.camera.picture.predicted.length > 0", "more pictures")
+        numbers = page.value("document.getElementById('camera-numbers').textContent")
+        for part in ("2 spots", "1 hot pixels", "0.12 % saturated", "background 20, threshold 60"):
+            self.assertIn(part, numbers)
+        rate = float(re.search(r"([\d.]+) pictures a second", numbers).group(1))
+        self.assertTrue(1.5 < rate <= 10.5, numbers)
+        picture = page.value("({ ...crepes.camera.picture, jpeg: '' })")
+        (robot, u, v), = picture["robots"]
+        # A direction of (1, -0.25, 0.175) in the body; the lens is a pinhole of 320 px around (320, 256).
+        self.assertEqual((robot, u, v), (2, 400, 200))
+        self.assertEqual(picture["predicted"], [[2, 400, 200]])
+        self.assertIn("identified: r2", page.value("document.getElementById('camera-canvas').getAttribute('aria-label')"))
+
+        # Read back from the screen: saturated pixels have their mark, those from the threshold on another, the rest is grey.
+        saturated, lit, dark = page.value("""(() => { const { canvas } = crepes.camera, k = canvas.width / 640;
+            const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+            return [[396, 196], [96, 96], [300, 400]].map(([u, v]) => { const i = 4 * (Math.round(u * k) + canvas.width * Math.round(v * k));
+              return [...data.slice(i, i + 3)]; }); })()""")
+        self.assertGreater(saturated[0], saturated[2] + 50)
+        self.assertGreater(lit[2], lit[0] + 30)
+        self.assertLess(max(dark) - min(dark), 3)
+
+    def test_pictures_are_asked_for_only_while_they_are_seen(self):
+        page = self.open_camera()
+        page.value("document.querySelector('nav [data-panel=scene]').click()")
+        page.wait("crepes.camera.stop === null")
+        time.sleep(0.5)
+        asked = self.cameras.asked
+        time.sleep(1)
+        self.assertEqual(self.cameras.asked, asked)
+
+    def test_sliders_write_through_the_daemons_reload(self):
+        page = self.open_camera(width=1400, height=900)
+        page.wait("!document.getElementById('camera-light').disabled", "sliders that move")
+        self.assertEqual(page.value("document.getElementById('exposure_us-value').textContent"), "500 µs")
+        self.move(page, "exposure_us", 2)
+        page.wait("crepes.camera.state.cameras[0].exposure_us === 100", "the exposure that is in force")
+        self.assertIn("exposure_us: 100", self.reloads[-1]["90-exposure.yaml"])
+        self.move(page, "threshold", 77)
+        wait(lambda: "90-threshold.yaml" in self.reloads[-1], "another reload")
+        self.assertIn("threshold: 77", self.reloads[-1]["90-threshold.yaml"])
+        self.assertIn("exposure_us: 100", self.reloads[-1]["90-exposure.yaml"])
+        self.assertEqual(page.value("document.getElementById('camera-change').textContent"), "")
+
+    def move(self, page, name, value):
+        page.value(f"(() => {{ const slider = document.getElementById('{name}'); slider.value = {value};"
+                   " for (const type of ['input', 'change']) slider.dispatchEvent(new Event(type)); })()")
+
+    def test_without_control_nothing_moves(self):
+        self.write(control=False)
+        page = self.open_camera()
+        self.assertTrue(page.value("document.getElementById('camera-light').disabled"))
+        self.assertFalse(page.value("document.getElementById('camera-control').hidden"))
+        own = {"Origin": self.viewer.url.rstrip("/")}
+        with self.assertRaisesRegex(urllib.error.HTTPError, "403"):
+            urllib.request.urlopen(urllib.request.Request(f"{self.viewer.url}light?robot=0&camera=0&exposure_us=100", method="POST", headers=own))
+        self.assertEqual(self.reloads, [])
+        self.assertFalse((self.folder / "crepesd.d").exists())
+
+    def test_a_missing_daemon_is_said(self):
+        page = self.open_camera()
+        self.cameras.is_over = True
+        page.wait("document.getElementById('camera-note').textContent !== ''", "the reason")
+
+    def test_it_fits_a_phone_and_has_names(self):
+        page = self.open_camera(width=360, height=640)
+        self.assertLessEqual(page.value("document.documentElement.scrollWidth"), 360)
+        unnamed = [role for role, name in page.accessible() if role in ("button", "slider", "combobox", "checkbox", "img", "image") and not name.strip()]
+        self.assertEqual(unnamed, [])
 
 
 class Replay(PageTest):

@@ -74,7 +74,7 @@ class Server(unittest.TestCase):
             self.assertNotIn("root:", reply, path)
 
     def test_wrong_robots_are_not_found(self):
-        for query in ("", "?robot=", "?robot=1", "?robot=-1", "?robot=99999999999999999999", "?robot=0x0", "?robot=0;", "?x=0", "?robot=nan"):
+        for query in ("", "?robot=", "?robot=1", "?robot=-1", "?robot=99999999999999999999", "?robot=0x0", "?robot=0.0", "?x=0", "?robot=nan"):
             self.assertEqual(status_of(get(self.viewer, f"/events{query}")), 404, query)
 
     def test_only_get_is_answered(self):
@@ -82,6 +82,19 @@ class Server(unittest.TestCase):
             reply = raw(self.viewer, f"{method} / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 3\r\nConnection: close\r\n\r\nabc", 3)
             self.assertIn(status_of(reply), (405, 403, 404, 400, None), method)
             self.assertNotIn("<!DOCTYPE", reply)
+
+    def test_actions_are_refused_but_from_the_page_itself(self):
+        def post(headers, body=""):
+            return raw(self.viewer, f"POST /light?robot=0&camera=0&exposure_us=9 HTTP/1.1\r\nHost: 127.0.0.1:{self.viewer.port}\r\n"
+                                    f"Connection: close\r\n{headers}\r\n{body}", 3)
+        own = f"Origin: http://127.0.0.1:{self.viewer.port}\r\n"
+        self.assertEqual(status_of(get(self.viewer, "/light?robot=0&camera=0&exposure_us=9", own)), 405)
+        self.assertEqual(status_of(post("Content-Length: 0\r\n")), 403)
+        self.assertEqual(status_of(post("Content-Length: 0\r\nOrigin: http://evil.example\r\n")), 403)
+        self.assertIn("view.control is false", post(f"Content-Length: 0\r\n{own}"))
+        self.assertNotIn("200 OK", post(f"Content-Length: 3\r\n{own}", "abc"))
+        for query in ("", "?robot=0", "?robot=0&camera=9", "?robot=7&camera=0", "?camera=0"):
+            self.assertEqual(status_of(get(self.viewer, f"/camera{query}")), 404, query)
 
     def test_a_rebound_name_and_a_foreign_page_get_nothing(self):
         reply = raw(self.viewer, "GET /robots HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n")

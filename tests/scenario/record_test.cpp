@@ -22,6 +22,9 @@
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/replay/swarm_replay.hpp"
+#include "daemon/recording/block.hpp"
+#include "daemon/recording/picture_block.hpp"
+#include "daemon/recording/recipient.hpp"
 #include "daemon/recording/recorder_stage.hpp"
 #include "daemon/recording/unix_socket.hpp"
 #include "daemon/runtime.hpp"
@@ -154,6 +157,49 @@ TEST_F(Record, WritesPicturesThatTheDataSetReaderFinds) {
   EXPECT_GT(dataset->robots[0].imu.size(), 50U);
 }
 
+/// The next block of a kind.
+Block next_block(BlockStream& daemon, const std::string& kind, Timestamp end,
+                 const Clock& machine) {
+  while (machine.now() < end) {
+    auto block = daemon.next();
+    if (!block) break;
+    if (*block && (*block)->kind == kind) return std::move(**block);
+    if (!*block && !daemon.receive(50).value_or(false)) break;
+  }
+  ADD_FAILURE() << "no " << kind;
+  return {};
+}
+
+TEST_F(Record, ShowsAPictureToWhoLooksBesideARecording) {
+  const Config config = recorded_config(1);
+  const Runtime runtime(config, machine_);
+  const Runtime other(recorded_config(2), machine_);
+  await_socket(config);
+  expect_true_poses(config);
+  BlockStream recording(connect_unix(config.recording.socket).value());
+  ASSERT_TRUE(recording.request(kPicturesRequest));
+  BlockStream looker(connect_unix(config.recording.socket).value());
+  const Timestamp end = machine_.now() + kPatience;
+
+  ASSERT_TRUE(looker.request("LOOK 1 0"));
+  EXPECT_NE(next_block(looker, "config", end, machine_).content.find("cameras:"),
+            std::string::npos);
+  Json head;
+  // A board may be dark in a picture, and the other robot may be out of it.
+  while (machine_.now() < end && (head.is_null() || head["robots"].empty())) {
+    const std::string look = next_block(looker, "look", end, machine_).content;
+    head = Json::parse(look.substr(0, look.find('\n')));
+    const std::size_t pixels = look.size() - look.find('\n') - 1;
+    ASSERT_EQ(pixels, head["width"].get<std::size_t>() * head["height"].get<std::size_t>());
+    ASSERT_TRUE(looker.request("LOOK 1 0"));
+  }
+  EXPECT_EQ(head["robots"][0][0], 2);
+  EXPECT_FALSE(head["spots"].empty());
+  EXPECT_GT(head["threshold"].get<int>(), head["background"].get<int>());
+  EXPECT_LE(head["width"].get<int>(), kMaxLookSide);
+  EXPECT_FALSE(next_block(recording, "picture", end, machine_).content.empty());
+}
+
 TEST_F(Record, StopsAtItsSizeAndRefusesToWriteOverADataSet) {
   const Config config = recorded_config(1);
   const Runtime runtime(config, machine_);
@@ -190,11 +236,12 @@ TEST_F(Record, DropsTheNewestForAToolThatDoesNotReadAndTellsHowMany) {
   const Config config = recorded_config(1);
   RecordQueue events{100, Overflow::kDropNewest};
   std::deque<PictureTap> pictures;
+  PictureRobotsQueue robots{1, Overflow::kDropOldest};
   Counter turns;
   LiveSettings<Config> settings(config);
   const StageContext context{machine_, [](SensorStatus) {}, turns};
   const Worker recorder("recorder", [&](const std::stop_token& stop) {
-    run_recorder({settings, events, pictures}, context, stop);
+    run_recorder({settings, events, pictures, robots}, context, stop);
   });
   await_socket(config);
   UniqueFd lazy = connect_unix(config.recording.socket).value();
@@ -240,7 +287,8 @@ TEST_F(Record, SaysWhenThereIsNoDaemonOrAnotherRecording) {
 
   const Runtime runtime(config, machine_);
   await_socket(config);
-  const UniqueFd first = connect_unix(config.recording.socket).value();
+  BlockStream first(connect_unix(config.recording.socket).value());
+  ASSERT_TRUE(first.request(kRecordRequest));
   const Timestamp end = machine_.now() + kPatience;
   std::string message;
   while (machine_.now() < end && message.find("under way") == std::string::npos) {
@@ -255,8 +303,10 @@ TEST_F(Record, SurvivesToolsThatTalkNonsense) {
   const Config config = recorded_config(1);
   const Runtime runtime(config, machine_);
   await_socket(config);
-  for (const std::string& request : {std::string("GET /\n"), std::string(5000, 'x'),
-                                     std::string("RECORD 1\nRECORD 1\n"), std::string()}) {
+  for (const std::string& request :
+       {std::string("GET /\n"), std::string(5000, 'x'), std::string("RECORD 1\nRECORD 1\n"),
+        std::string(), std::string("LOOK 1 x\n"), std::string("LOOK 1 999\n"),
+        std::string("LOOK 1 7\nGET /\n")}) {
     const UniqueFd tool = connect_unix(config.recording.socket).value();
     ::send(tool.get(), request.data(), request.size(), MSG_NOSIGNAL);
   }

@@ -26,6 +26,12 @@ void add_view(CommandLine& line) {
   add_daemon_options(sub, options.daemon);
   sub->add_option("--also", options.also,
                   "ADDRESS:PORT of another robot's daemon, whose view the page offers; repeatable");
+  sub->add_option("--socket", options.sockets,
+                  "recording.socket of the daemon, then of each --also, for the cameras' pictures")
+      ->capture_default_str();
+  sub->add_option("--config", options.config,
+                  "the daemon's configuration, which the page may change if view.control is true")
+      ->capture_default_str();
   sub->add_flag("--open", options.open, "open the page in the desktop's browser");
   add_json_flag(sub, json, "one object with the address of the page");
   line.run(sub, [&options, &json] {

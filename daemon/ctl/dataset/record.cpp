@@ -1,12 +1,8 @@
 #include "daemon/ctl/dataset/record.hpp"
 
 #include <fmt/core.h>
-#include <poll.h>
-#include <sys/socket.h>
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
 #include <chrono>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
@@ -18,7 +14,8 @@
 #include "daemon/ctl/dataset/recorded_manifest.hpp"
 #include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
-#include "daemon/recording/recorder_stage.hpp"
+#include "daemon/recording/block.hpp"
+#include "daemon/recording/recipient.hpp"
 #include "daemon/recording/unix_socket.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/base/number_text.hpp"
@@ -30,61 +27,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr Duration kManifestPeriod = 5s;
-constexpr std::size_t kMaxBlock = std::size_t{1} << 26;
-
-struct Block {
-  std::string kind;
-  std::string content;
-};
-
-/// The daemon's messages on the socket, as blocks.
-class BlockStream {
- public:
-  explicit BlockStream(UniqueFd socket) : socket_(std::move(socket)) {}
-
-  [[nodiscard]] Result<void> request(std::string_view request) {
-    const std::string line = std::string(request) + '\n';
-    if (::send(socket_.get(), line.data(), line.size(), MSG_NOSIGNAL) < 0) return failure();
-    return {};
-  }
-
-  /// Waits at most 0.1 s for data. Returns false once the daemon has hung up.
-  [[nodiscard]] Result<bool> receive() {
-    pollfd watched{socket_.get(), POLLIN, 0};
-    if (::poll(&watched, 1, 100) <= 0) return true;
-    constexpr std::size_t kChunk = 1 << 16;
-    std::array<char, kChunk> chunk{};
-    const ssize_t count = ::recv(socket_.get(), chunk.data(), chunk.size(), 0);
-    if (count < 0 && errno != EINTR) return failure();
-    if (count > 0) received_.append(chunk.data(), static_cast<std::size_t>(count));
-    return count != 0;
-  }
-
-  /// The next complete block, if it has arrived.
-  [[nodiscard]] Result<std::optional<Block>> next() {
-    constexpr std::size_t kMaxHead = 64;
-    const std::size_t end = received_.find('\n');
-    if (end == std::string::npos && received_.size() <= kMaxHead) return std::nullopt;
-    const std::string head = received_.substr(0, std::min(end, kMaxHead));
-    const std::size_t space = head.find(' ');
-    std::size_t size = 0;
-    const bool is_head =
-        space != std::string::npos && parse_number(head.substr(space + 1), size).empty();
-    if (!is_head || size > kMaxBlock) return fail(ErrorCode::kFormat, "no crepesd speaks there");
-    if (received_.size() - end - 1 < size) return std::nullopt;
-    Block block{head.substr(0, space), received_.substr(end + 1, size)};
-    received_.erase(0, end + 1 + size);
-    return block;
-  }
-
- private:
-  static tl::unexpected<Error> failure() {
-    return fail(ErrorCode::kIo, "record: " + std::generic_category().message(errno));
-  }
-
-  UniqueFd socket_;
-  std::string received_;
-};
+constexpr int kPatienceMs = 100;
 
 /// The stamp of a row.
 std::optional<Timestamp> stamp_at(std::string_view text) {
@@ -225,7 +168,7 @@ Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recor
   const Timestamp start = clock.now();
   Timestamp next_manifest = start;
   for (;;) {
-    const Result<bool> goes_on = daemon.receive();
+    const Result<bool> goes_on = daemon.receive(kPatienceMs);
     if (!goes_on) return tl::unexpected(goes_on.error());
     for (;;) {
       const auto block = daemon.next();

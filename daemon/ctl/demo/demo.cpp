@@ -206,6 +206,10 @@ class Demo {
     const RobotId id = robot.config.robot.id;
     const fs::path file = dir / (name_of_robot(id) + ".yaml");
     const fs::path log = dir / (name_of_robot(id) + ".log");
+    if (!options_.view.empty()) {
+      robot.config.recording.socket = DemoPage::socket_of(dir, name_of_robot(id));
+      robot.config.view.control = true;
+    }
     std::ofstream out(file);
     out << write_config(robot.config);
     out.close();
@@ -243,7 +247,9 @@ class Demo {
   }
 
   Result<void> start_page(const fs::path& tool, const fs::path& dir) {
-    return DemoPage::start(tool, dir, options_.view, options_.port, robots_.size())
+    std::vector<std::string> names;
+    for (const RobotId id : world_.robots()) names.push_back(name_of_robot(id));
+    return DemoPage::start(tool, dir, options_.view, options_.port, names)
         .map([this](DemoPage&& page) { page_.emplace(std::move(page)); });
   }
 

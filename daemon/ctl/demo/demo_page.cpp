@@ -4,7 +4,6 @@
 
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "drivers/base/text_file.hpp"
 
@@ -12,13 +11,19 @@ namespace crepes {
 
 Result<DemoPage> DemoPage::start(const std::filesystem::path& tool,
                                  const std::filesystem::path& dir, const std::string& listen,
-                                 std::uint16_t first_port, std::size_t robots) {
+                                 std::uint16_t first_port, const std::vector<std::string>& robots) {
   std::vector<std::string> arguments{"view", "--listen", listen, "--port",
                                      std::to_string(first_port)};
-  for (std::size_t i = 1; i < robots; ++i) {
-    arguments.emplace_back("--also");
-    arguments.push_back(fmt::format("127.0.0.1:{}", first_port + i));
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    if (i > 0) {
+      arguments.emplace_back("--also");
+      arguments.push_back(fmt::format("127.0.0.1:{}", first_port + i));
+    }
+    arguments.emplace_back("--socket");
+    arguments.push_back(socket_of(dir, robots[i]));
   }
+  arguments.emplace_back("--config");
+  arguments.push_back(dir / (robots.front() + ".yaml"));
   std::filesystem::path log = dir / "view.log";
   return ChildProcess::start(tool, arguments, log).map([&](ChildProcess&& process) {
     return DemoPage(std::move(process), std::move(log));

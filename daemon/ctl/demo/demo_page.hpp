@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "daemon/ctl/demo/child_process.hpp"
 
@@ -12,11 +13,17 @@ namespace crepes {
 class DemoPage {
  public:
   /// Serves at `listen` (ADDRESS:PORT) the robots whose subscriptions are at `first_port` and the
-  /// ports that follow. The log goes to `dir`.
+  /// ports that follow, and whose configurations are DIR/<robot>.yaml. The log goes to `dir`.
   [[nodiscard]] static Result<DemoPage> start(const std::filesystem::path& tool,
                                               const std::filesystem::path& dir,
                                               const std::string& listen, std::uint16_t first_port,
-                                              std::size_t robots);
+                                              const std::vector<std::string>& robots);
+
+  /// Where a daemon of the demo serves its pictures.
+  [[nodiscard]] static std::string socket_of(const std::filesystem::path& dir,
+                                             const std::string& robot) {
+    return dir / (robot + ".socket");
+  }
 
   /// An error if it has ended.
   [[nodiscard]] Result<void> check();

@@ -16,8 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path lights_file(const fs::path& config) {
-  return config.parent_path() / (config.stem().string() + ".d") / "90-exposure.yaml";
+fs::path fragment_of(const fs::path& config, const char* name) {
+  return config.parent_path() / (config.stem().string() + ".d") / name;
 }
 
 std::string lights_text(const std::vector<NamedLight>& lights) {
@@ -37,6 +37,17 @@ Result<void> restore(const fs::path& file, const Result<std::string>& before) {
   std::error_code error;
   fs::remove(file, error);
   return {};
+}
+
+/// Writes a fragment that leaves the configuration without a fault, or none.
+Result<void> write_fragment(const fs::path& config, const char* name, const std::string& text) {
+  const fs::path file = fragment_of(config, name);
+  const Result<std::string> before = read_text_file(file, kMaxConfigBytes);
+  if (auto written = write_text_file(file, text); !written) return written;
+  const Result<Config> result = load_config(config);
+  if (result) return {};
+  if (auto restored = restore(file, before); !restored) return restored;
+  return tl::unexpected(result.error());
 }
 
 }  // namespace
@@ -62,15 +73,17 @@ Result<void> CameraLights::change(const CameraLight& light) {
   std::vector<NamedLight> wanted = lights_;
   if (light.exposure_us) wanted[chosen_].light.exposure_us = light.exposure_us;
   if (light.gain) wanted[chosen_].light.gain = light.gain;
-  const fs::path file = lights_file(config_);
-  const Result<std::string> before = read_text_file(file, kMaxConfigBytes);
-  if (auto written = write_text_file(file, lights_text(wanted)); !written) return written;
-  if (const Result<Config> result = load_config(config_); !result) {
-    if (auto restored = restore(file, before); !restored) return restored;
-    return tl::unexpected(result.error());
-  }
+  if (auto written = write_fragment(config_, "90-exposure.yaml", lights_text(wanted)); !written)
+    return written;
   lights_ = std::move(wanted);
   return {};
+}
+
+Result<void> change_threshold(const fs::path& config, int threshold) {
+  return write_fragment(config, "90-threshold.yaml",
+                        fmt::format("# Written by the page of crepesctl view.\nvision:\n"
+                                    "  threshold: {}\n",
+                                    threshold));
 }
 
 }  // namespace crepes

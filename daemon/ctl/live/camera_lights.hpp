@@ -1,4 +1,4 @@
-/// The cameras' exposure and gain in the files of a configuration.
+/// The cameras' exposure and gain, and the threshold, in the files of a configuration.
 #pragma once
 
 #include <filesystem>
@@ -38,5 +38,8 @@ class CameraLights {
   std::vector<NamedLight> lights_;
   std::size_t chosen_;
 };
+
+/// Writes vision.threshold [grey levels; 0: automatic] to the fragment 90-threshold.yaml, as above.
+[[nodiscard]] Result<void> change_threshold(const std::filesystem::path& config, int threshold);
 
 }  // namespace crepes

@@ -46,17 +46,20 @@ bool equals_in_constant_time(std::string_view a, std::string_view b) {
 }
 
 std::optional<HttpReply> refusal_of(const HttpRequest& request, const AccessPolicy& policy,
-                                    bool is_data) {
-  if (!request.is_get) return refused(kMethodNotAllowed, "only GET\n");
+                                    Access access) {
+  const bool is_action = access == Access::kAction;
+  if (is_action ? !request.is_post : !request.is_get)
+    return refused(kMethodNotAllowed, is_action ? "only POST\n" : "only GET\n");
   if (!is_own_host(request.host, policy))
     return refused(kMisdirected, "this Host is not of this machine: use its address\n");
+  if (is_action && request.origin.empty()) return refused(kForbidden, "without an Origin\n");
   if (!request.origin.empty() && lower(request.origin) != "http://" + lower(request.host))
     return refused(kForbidden, "not for pages of another origin\n");
   constexpr std::string_view kScheme = "Bearer ";
   const std::string_view sent = request.authorization;
   const bool is_known = sent.starts_with(kScheme) &&
                         equals_in_constant_time(sent.substr(kScheme.size()), policy.token);
-  if (is_data && !policy.token.empty() && !is_known)
+  if (access != Access::kFile && !policy.token.empty() && !is_known)
     return refused(kUnauthorized, "a token is required: open the address that was printed\n");
   return std::nullopt;
 }

@@ -10,6 +10,7 @@ namespace crepes {
 /// The parts of a request that the page's server reads. Missing headers are empty.
 struct HttpRequest {
   bool is_get = false;
+  bool is_post = false;
   std::string path{};   ///< decoded, without the query
   std::string query{};  ///< as sent, without '?'
   std::string host{};

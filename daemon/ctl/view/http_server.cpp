@@ -43,10 +43,22 @@ std::string header_of(lws* connection, lws_token_indexes token) {
   return copied < 0 ? std::string() : std::string(text.data(), static_cast<std::size_t>(copied));
 }
 
+/// The library keeps its parts apart.
+std::string query_of(lws* connection) {
+  std::array<char, kMaxHeader> part{};
+  std::string query;
+  for (int i = 0; lws_hdr_copy_fragment(connection, part.data(), static_cast<int>(part.size()),
+                                        WSI_TOKEN_HTTP_URI_ARGS, i) > 0;
+       ++i)
+    query += (query.empty() ? "" : "&") + std::string(part.data());
+  return query;
+}
+
 HttpRequest request_of(lws* connection, std::string path) {
   return {.is_get = lws_hdr_total_length(connection, WSI_TOKEN_GET_URI) > 0,
+          .is_post = lws_hdr_total_length(connection, WSI_TOKEN_POST_URI) > 0,
           .path = std::move(path),
-          .query = header_of(connection, WSI_TOKEN_HTTP_URI_ARGS),
+          .query = query_of(connection),
           .host = header_of(connection, WSI_TOKEN_HOST),
           .origin = header_of(connection, WSI_TOKEN_ORIGIN),
           .authorization = header_of(connection, WSI_TOKEN_HTTP_AUTHORIZATION)};
@@ -101,7 +113,8 @@ struct HttpServer::State {
   lws_context* context = nullptr;
   lws_vhost* vhost = nullptr;
   std::map<lws*, Reply> replies;
-  std::vector<lws*> waiting;  ///< connections without a reply on its way, the oldest first
+  std::map<lws*, HttpReply> deferred;  ///< to requests that announce a body
+  std::vector<lws*> waiting;           ///< connections without a reply on its way, the oldest first
   std::size_t connections = 0;
   lws_usec_t period_us = 0;
   std::function<bool()> on_tick;
@@ -127,6 +140,8 @@ struct HttpServer::State {
   bool make_room();
   /// These return nonzero where the library must close the connection.
   int begin_reply(lws* connection, std::string path);
+  int send_deferred(lws* connection);
+  int send_reply(lws* connection, HttpReply reply);
   int continue_reply(lws* connection);
 };
 
@@ -140,6 +155,19 @@ bool HttpServer::State::make_room() {
 
 int HttpServer::State::begin_reply(lws* connection, std::string path) {
   HttpReply reply = answer(request_of(connection, std::move(path)));
+  const bool announces_body = lws_hdr_total_length(connection, WSI_TOKEN_HTTP_CONTENT_LENGTH) > 0;
+  if (!announces_body) return send_reply(connection, std::move(reply));
+  deferred[connection] = std::move(reply);
+  return 0;
+}
+
+/// The library reads a body first, also an empty one.
+int HttpServer::State::send_deferred(lws* connection) {
+  auto found = deferred.extract(connection);
+  return found.empty() ? -1 : send_reply(connection, std::move(found.mapped()));
+}
+
+int HttpServer::State::send_reply(lws* connection, HttpReply reply) {
   if (!write_head(connection, reply)) return -1;
   std::erase(waiting, connection);
   replies[connection] = {.text = std::move(reply.body), .sent = 0, .topic = reply.topic};
@@ -191,12 +219,16 @@ int HttpServer::State::on_event(lws* connection, lws_callback_reasons reason, vo
       return 0;
     case LWS_CALLBACK_WSI_DESTROY:
       state->replies.erase(connection);
+      state->deferred.erase(connection);
       std::erase(state->waiting, connection);
       if (state->connections > 0) --state->connections;
       return 0;
     case LWS_CALLBACK_HTTP:
       return state->begin_reply(connection, std::string(static_cast<const char*>(in), length));
+    case LWS_CALLBACK_HTTP_BODY_COMPLETION:
+      return state->send_deferred(connection);
     case LWS_CALLBACK_HTTP_BODY:
+      return length == 0 ? 0 : -1;
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
       return -1;
     case LWS_CALLBACK_HTTP_WRITEABLE:

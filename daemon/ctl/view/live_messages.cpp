@@ -48,7 +48,9 @@ std::string kind_of(const Json& status) {
 void LiveMessages::add(const client::Answer& answer, Timestamp now) {
   last_message_ = now;
   if (const auto* heard = std::get_if<client::Pose>(&answer.message)) {
-    new_poses_[RobotId{heard->peer}] = neighbor_pose_of(*heard);
+    const NeighborPose pose = neighbor_pose_of(*heard);
+    new_poses_[pose.neighbor] = pose;
+    poses_.add(pose);
   } else if (const auto* status = std::get_if<client::Status>(&answer.message)) {
     add_status(*status, answer.text);
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/ctl/live/daemon_access.hpp"
+#include "daemon/ctl/view/pose_history.hpp"
 
 namespace crepes {
 
@@ -34,6 +35,7 @@ class LiveMessages {
 
   /// Empty until the daemon has answered.
   [[nodiscard]] const std::optional<ViewedRobot>& robot() const { return robot_; }
+  [[nodiscard]] const PoseHistory& poses() const { return poses_; }
   /// In the order of their ids.
   [[nodiscard]] const std::vector<RobotId>& neighbors() const { return neighbors_; }
 
@@ -44,6 +46,7 @@ class LiveMessages {
 
   DaemonAddress daemon_;
   std::map<RobotId, NeighborPose> new_poses_;
+  PoseHistory poses_;
   std::string new_statuses_;                     ///< as events
   std::map<std::string, std::string> statuses_;  ///< the newest of each kind, as events
   std::optional<Timestamp> last_message_;

@@ -1,9 +1,12 @@
 #include "daemon/ctl/view/site.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 
+#include "daemon/ctl/view/camera_control.hpp"
 #include "daemon/ctl/view/listen_address.hpp"
 #include "daemon/ctl/view/page_files.hpp"
 #include "daemon/ctl/view/view_json.hpp"
@@ -16,28 +19,54 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr int kForbidden = 403;
 constexpr int kNotFound = 404;
 constexpr int kBroken = 500;
 constexpr const char* kJson = "application/json";
+constexpr const char* kStream = "text/event-stream";
 // A reader that is gone is noticed when something is written to it.
 constexpr Duration kHeartbeat = std::chrono::seconds{5};
 
 HttpReply not_found() { return {.status = kNotFound, .body = "no such page\n"}; }
 
-/// The number in "robot=3"; empty for anything else.
-std::optional<std::size_t> robot_in(const std::string& query, std::size_t count) {
-  constexpr std::string_view kKey = "robot=";
-  std::size_t robot = 0;
-  if (!query.starts_with(kKey) || !parse_number(query.substr(kKey.size()), robot).empty() ||
-      robot >= count)
+/// "robot=3&camera=0", by name.
+std::map<std::string, std::string> parameters_of(const std::string& query) {
+  std::map<std::string, std::string> parameters;
+  std::istringstream parts(query);
+  for (std::string part; std::getline(parts, part, '&');) {
+    const std::size_t equal = std::min(part.find('='), part.size());
+    parameters[part.substr(0, equal)] = part.substr(std::min(equal + 1, part.size()));
+  }
+  return parameters;
+}
+
+/// A number below `count`; empty for anything else.
+std::optional<std::size_t> index_in(const std::map<std::string, std::string>& parameters,
+                                    const char* name, std::size_t count) {
+  const auto found = parameters.find(name);
+  std::size_t index = 0;
+  if (found == parameters.end() || !parse_number(found->second, index).empty() || index >= count)
     return std::nullopt;
-  return robot;
+  return index;
+}
+
+HttpReply reply_to(const Result<void>& done) {
+  if (done) return {.body = "done\n"};
+  return {.status = done.error().code == ErrorCode::kUsage ? kForbidden : kBroken,
+          .body = done.error().message + "\n"};
 }
 
 }  // namespace
 
-bool Site::is_data(const std::string& path) {
-  return path == "/robots" || path == "/events" || path == "/replay";
+Access Site::access_to(const std::string& path) {
+  if (path == "/light") return Access::kAction;
+  const bool is_data =
+      path == "/robots" || path == "/events" || path == "/replay" || path == "/camera";
+  return is_data ? Access::kData : Access::kFile;
+}
+
+std::size_t Site::camera_topic(std::size_t robot, std::size_t camera) const {
+  return robot_count() * (1 + camera) + robot;
 }
 
 std::size_t Site::robot_count() const {
@@ -68,22 +97,49 @@ HttpReply Site::answer(const HttpRequest& request, Timestamp now) const {
   if (const PageFile* file = page_file(request.path))
     return {.type = std::string(file->type), .body = std::string(file->text)};
   if (request.path == "/robots") return {.type = kJson, .body = robots_json()};
-  const auto robot = robot_in(request.query, robot_count());
+  const auto parameters = parameters_of(request.query);
+  const auto robot = index_in(parameters, "robot", robot_count());
   if (!robot) return not_found();
-  const auto* live = std::get_if<Live>(&source_);
-  if (request.path == "/events" && live != nullptr) {
-    return {
-        .type = "text/event-stream",
-        .body = stream_event("robots", robots_json()) + (*live)[*robot].messages().greeting(now),
-        .topic = *robot};
-  }
-  if (request.path == "/replay" && live == nullptr) {
+  if (std::holds_alternative<Live>(source_))
+    return live_answer(request.path, *robot, parameters, now);
+  if (request.path == "/replay") {
     const auto& recorded = std::get<RecordedFeed>(source_);
     const auto json = recorded.json_of(recorded.observers()[*robot]);
     return json ? HttpReply{.type = kJson, .body = *json}
                 : HttpReply{.status = kBroken, .body = json.error().message + "\n"};
   }
   return not_found();
+}
+
+HttpReply Site::live_answer(const std::string& path, std::size_t robot,
+                            const Parameters& parameters, Timestamp now) const {
+  if (path == "/events") {
+    const LiveMessages& messages = std::get<Live>(source_)[robot].messages();
+    return {.type = kStream,
+            .body = stream_event("robots", robots_json()) + messages.greeting(now),
+            .topic = robot};
+  }
+  const auto camera = index_in(parameters, "camera", CameraFeed::kMaxCameras);
+  if (!camera) return not_found();
+  if (path == "/camera") {
+    return {
+        .type = kStream, .body = cameras_[robot].greeting(), .topic = camera_topic(robot, *camera)};
+  }
+  if (path == "/light" && robot == 0)
+    return reply_to(change_camera(cameras_.front(), config_, *camera, parameters));
+  return not_found();
+}
+
+void Site::advance_cameras(HttpServer& server, Timestamp now) {
+  const Live& live = std::get<Live>(source_);
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    std::vector<std::uint8_t> wanted;
+    for (std::uint8_t camera = 0; camera < CameraFeed::kMaxCameras; ++camera)
+      if (server.readers(camera_topic(i, camera)) > 0) wanted.push_back(camera);
+    for (const auto& [camera, events] :
+         cameras_[i].exchange(now, wanted, live[i].messages().poses()))
+      server.publish(camera_topic(i, camera), events);
+  }
 }
 
 void Site::advance(HttpServer& server, Timestamp now) {
@@ -100,6 +156,7 @@ void Site::advance(HttpServer& server, Timestamp now) {
     const std::string events = (*live)[i].drain(now);
     if (is_read && !events.empty()) server.publish(i, events);
   }
+  advance_cameras(server, now);
   std::string common;
   if (std::string robots = robots_json(); robots != told_robots_) {
     common += stream_event("robots", robots);
@@ -110,7 +167,8 @@ void Site::advance(HttpServer& server, Timestamp now) {
     next_heartbeat_ = now + kHeartbeat;
   }
   if (common.empty()) return;
-  for (std::size_t i = 0; i < live->size(); ++i) server.publish(i, common);
+  for (std::size_t i = 0; i < live->size() * (1 + CameraFeed::kMaxCameras); ++i)
+    server.publish(i, common);
 }
 
 }  // namespace crepes

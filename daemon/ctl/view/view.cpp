@@ -35,12 +35,14 @@ Result<Site> live_site(const ViewOptions& options) {
     daemons.push_back(std::move(*daemon));
   }
   Site::Live feeds;
-  for (const DaemonAddress& daemon : daemons) {
-    auto feed = LiveFeed::open(daemon);
+  std::vector<CameraFeed> cameras;
+  for (std::size_t i = 0; i < daemons.size(); ++i) {
+    auto feed = LiveFeed::open(daemons[i]);
     if (!feed) return tl::unexpected(feed.error());
     feeds.push_back(std::move(*feed));
+    cameras.emplace_back(i < options.sockets.size() ? options.sockets[i] : "", i == 0);
   }
-  return Site(std::move(feeds), std::move(daemons));
+  return Site(std::move(feeds), std::move(daemons), std::move(cameras), options.config);
 }
 
 Result<Site> site_of(const ViewOptions& options) {
@@ -120,7 +122,7 @@ Result<void> view(const ViewOptions& options) {
   auto server = HttpServer::open(
       {.address = listen->address, .port = listen->port, .name = "crepes/" + std::string(kVersion)},
       [&](const HttpRequest& request) {
-        if (auto refusal = refusal_of(request, policy, Site::is_data(request.path)))
+        if (auto refusal = refusal_of(request, policy, Site::access_to(request.path)))
           return *refusal;
         return site->answer(request, clock.now());
       });

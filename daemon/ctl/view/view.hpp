@@ -13,8 +13,11 @@ namespace crepes {
 struct ViewOptions {
   std::string listen = "127.0.0.1:8080";
   DaemonAddress daemon;
-  std::vector<std::string> also;     ///< ADDRESS:PORT of further daemons
-  std::filesystem::path replay;      ///< empty: live
+  std::vector<std::string> also;  ///< ADDRESS:PORT of further daemons
+  /// recording.socket of the daemon and of the further ones; empty, or fewer: no pictures
+  std::vector<std::string> sockets{"/run/crepes/record"};
+  std::filesystem::path config = "/etc/crepes/crepesd.yaml";  ///< of the daemon, for view.control
+  std::filesystem::path replay;                               ///< empty: live
   std::filesystem::path swarm;       ///< the data set with the truth of the replay
   std::filesystem::path token_file;  ///< empty: a random token where one is needed
   bool open = false;                 ///< start the desktop's browser

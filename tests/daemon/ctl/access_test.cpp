@@ -11,11 +11,12 @@ const AccessPolicy kOpen{.token = "", .names = {"robot1", "robot1.local"}};
 const AccessPolicy kClosed{.token = "0123456789abcdef", .names = {"robot1"}};
 
 HttpRequest request_to(const std::string& host) {
-  return {.is_get = true, .path = "/robots", .query = "", .host = host};
+  return {.is_get = true, .is_post = false, .path = "/robots", .query = "", .host = host};
 }
 
-int status_of(const HttpRequest& request, const AccessPolicy& policy, bool is_data = true) {
-  const auto refusal = refusal_of(request, policy, is_data);
+int status_of(const HttpRequest& request, const AccessPolicy& policy,
+              Access access = Access::kData) {
+  const auto refusal = refusal_of(request, policy, access);
   return refusal ? refusal->status : 200;
 }
 
@@ -43,10 +44,26 @@ TEST(Access, RefusesPagesOfAnotherOrigin) {
   }
 }
 
+TEST(Access, ActionsAreFromItsOwnPageOnly) {
+  HttpRequest request = request_to("127.0.0.1:8080");
+  request.origin = "http://127.0.0.1:8080";
+  EXPECT_EQ(status_of(request, kOpen, Access::kAction), 405);
+  request.is_get = false;
+  request.is_post = true;
+  EXPECT_EQ(status_of(request, kOpen, Access::kAction), 200);
+  EXPECT_EQ(status_of(request, kOpen, Access::kData), 405);
+  EXPECT_EQ(status_of(request, kClosed, Access::kAction), 401);
+
+  for (const char* origin : {"", "null", "http://evil.example"}) {
+    request.origin = origin;
+    EXPECT_EQ(status_of(request, kOpen, Access::kAction), 403) << origin;
+  }
+}
+
 TEST(Access, RequiresTheTokenForDataOnly) {
   HttpRequest request = request_to("10.0.0.2:8080");
   EXPECT_EQ(status_of(request, kClosed), 401);
-  EXPECT_EQ(status_of(request, kClosed, /*is_data=*/false), 200);
+  EXPECT_EQ(status_of(request, kClosed, Access::kFile), 200);
 
   for (const char* wrong :
        {"Bearer ", "Bearer 0123456789abcdeF", "Bearer 0123456789abcde", "Bearer 0123456789abcdef0",

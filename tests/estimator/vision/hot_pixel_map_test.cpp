@@ -40,7 +40,7 @@ class Camera {
 
 std::size_t look(SpotDetector& detector, Camera& camera, int pictures) {
   std::size_t known = 0;
-  for (int i = 0; i < pictures; ++i) known = detector.detect(camera.read()).hot_pixels;
+  for (int i = 0; i < pictures; ++i) known = detector.detect(camera.read()).hot_pixels.size();
   return known;
 }
 
@@ -65,7 +65,7 @@ TEST(HotPixelMap, DoesNotLearnABoardThatIsDarkInOneFrameOfFifty) {
   lit.add_point(50.2, 40.4, 60.0);
   std::size_t known = 0;
   for (int i = 0; i < 4 * HotPixelMap::kKnown; ++i)
-    known = std::max(known, detector.detect((i % 50 == 0 ? dark : lit).read()).hot_pixels);
+    known = std::max(known, detector.detect((i % 50 == 0 ? dark : lit).read()).hot_pixels.size());
 
   EXPECT_EQ(known, 0U);
   EXPECT_EQ(detector.detect(lit.read()).spots.size(), 1U);

@@ -1,5 +1,6 @@
 // The page: opens the stream or the replay, keeps the shown instant, and draws what has changed.
 
+import { CameraPanel } from "./camera.js";
 import { Charts } from "./charts.js";
 import { byId, element, fixed, setText } from "./dom.js";
 import { Health, Rates } from "./health.js";
@@ -25,6 +26,7 @@ let mustDraw = true;
 const scene = new Scene(byId("scene-canvas"), store);
 const charts = new Charts(byId("charts"), store);
 const health = new Health({ neighbors: byId("neighbors"), sensors: byId("sensors"), links: byId("links"), events: byId("events"), load: byId("load") }, store);
+const camera = new CameraPanel(store);
 const redraw = () => { mustDraw = true; };
 
 // ---- the source -------------------------------------------------------------------------------
@@ -74,13 +76,15 @@ async function show(index) {
   robot = index;
   store = new Store(source.live);
   rates = new Rates();
-  for (const part of [scene, charts, health]) part.reset(store);
+  for (const part of [scene, charts, health, camera]) part.reset(store);
   isPlaying = source.live;
   setSource(source);
   byId("truth-label").hidden = byId("ghost-legend").hidden = true;
   byId("measurements-label").hidden = false;
   byId("cameras-label").hidden = true;
   for (const node of document.querySelectorAll("[data-live]")) node.hidden = !source.live;
+  if (!source.live && document.body.dataset.panel === "camera") showPanel("scene");
+  showCamera();
   byId("speed-label").hidden = source.live;
   redraw();
   if (source.live) {
@@ -196,8 +200,11 @@ function press(selector, pressed) {
 function showPanel(name) {
   document.body.dataset.panel = name;
   press("nav button", document.querySelector(`nav [data-panel="${name}"]`));
+  showCamera();
   redraw();
 }
+
+const showCamera = () => camera.show(document.body.dataset.panel === "camera", robot);
 
 function setView(name) {
   scene.setView(name);
@@ -278,6 +285,7 @@ const KEYS = {
   1: () => showPanel("scene"),
   2: () => showPanel("health"),
   3: () => showPanel("time"),
+  4: () => source.live && showPanel("camera"),
   f: () => setView("follow"),
   t: () => setView("top"),
   m: () => byId("measurements").click(),
@@ -321,7 +329,8 @@ function listenToPage() {
   on("play", "click", () => play(!isPlaying));
   on("live", "click", () => play(true));
   on("slider", "input", ({ value }) => seek(Number(value)));
-  addEventListener("resize", redraw);
+  addEventListener("resize", () => { camera.draw(); redraw(); });
+  document.addEventListener("visibilitychange", showCamera);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", ({ matches }) => setTheme(matches ? "dark" : "light"));
 }
 
@@ -335,4 +344,4 @@ start();
 requestAnimationFrame(turn);
 
 // For tests and the curious: what is drawn, read back.
-globalThis.crepes = { get scene() { return scene; }, get store() { return store; }, get charts() { return charts; }, seek, play, select };
+globalThis.crepes = { get scene() { return scene; }, get store() { return store; }, get charts() { return charts; }, camera, seek, play, select };

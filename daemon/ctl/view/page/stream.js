@@ -11,11 +11,16 @@ if (token) {
   history.replaceState(null, "", location.pathname);
 }
 
-async function request(path, signal) {
+async function request(path, signal, method = "GET") {
   const headers = token ? { authorization: `Bearer ${token}` } : {};
-  const reply = await fetch(path, { headers, signal, cache: "no-store", credentials: "omit" });
+  const reply = await fetch(path, { method, headers, signal, cache: "no-store", credentials: "omit" });
   if (!reply.ok) throw new Error(`${(await reply.text()).trim()} (${reply.status})`);
   return reply;
+}
+
+/** Changes something; an error says why it was refused. */
+export async function post(path) {
+  await (await request(path, undefined, "POST")).text();
 }
 
 export async function load(path) {
