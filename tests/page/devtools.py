@@ -158,5 +158,10 @@ class Page:
         nodes = self.call("Accessibility.getFullAXTree")["nodes"]
         return [(n.get("role", {}).get("value"), n.get("name", {}).get("value", "")) for n in nodes if not n.get("ignored")]
 
+    def busy_s(self):
+        """What the page's thread has worked since Performance.enable."""
+        metrics = {each["name"]: each["value"] for each in self.call("Performance.getMetrics")["metrics"]}
+        return metrics["TaskDuration"]
+
     def close(self):
         self.browser.call("Target.closeTarget", targetId=self.target)

@@ -1,4 +1,5 @@
 """The socket of a daemon's pictures, as recorder_stage.hpp says: a thread of this process."""
+import contextlib
 import json
 import os
 import random
@@ -60,7 +61,7 @@ class FakeCameras:
                 client, _ = self.listener.accept()
             except TimeoutError:
                 continue
-            with client:
+            with client, contextlib.suppress(ConnectionError):
                 self.serve(client)
 
     def serve(self, client):
@@ -72,8 +73,6 @@ class FakeCameras:
                 request = client.recv(100)
             except TimeoutError:
                 continue
-            except ConnectionError:
-                return
             if not request:
                 return
             if told != self.config:

@@ -32,6 +32,9 @@ def picture_live(browser, out):
             page.key("m")  # with the measurements
             time.sleep(20)  # trails and charts fill
             page.picture(out / "view-live.png")
+            page.key("4")
+            page.wait("crepes.camera.picture?.robots.length === 3 && crepes.camera.times.length > 5", "three robots in the camera's picture")
+            page.picture(out / "view-camera.png")
             page.close()
         finally:
             demo.terminate()

@@ -155,7 +155,8 @@ def first_picture():
 
 
 def live_pictures(robots, seconds):
-    """Milliseconds from the time of a POSE (sent at once) to the frame that shows it, and the pictures drawn in a second."""
+    """Milliseconds from the time of a POSE (sent at once) to the frame that shows it, the pictures drawn in a second, and the share
+    of a core that the page's own thread takes."""
     daemon = FakeDaemon(neighbors=robots - 1)
     viewer = Viewer("--port", daemon.port)
     browser = Browser()
@@ -163,15 +164,18 @@ def live_pictures(robots, seconds):
     page.wait(f"globalThis.crepes && crepes.scene.robots.length === {robots - 1}")
     time.sleep(1)
     offset = time.time() - time.monotonic()  # the daemon's stamps are monotonic, the page's time is that of the wall
+    page.call("Performance.enable")
+    start, busy = time.monotonic(), page.busy_s()
     latencies, rate = page.value(f"""new Promise((done) => {{ const late = []; let last, drawn = 0; const {{ scene }} = crepes; const draw = scene.draw;
         scene.draw = function (t) {{ ++drawn; return draw.call(this, t); }}; const start = performance.now();
         const look = () => {{ const {{ newest }} = crepes.store;
           if (newest.t !== last) {{ last = newest.t; late.push(performance.timeOrigin + performance.now() - 1000 * ({offset!r} + last)); }}
           const took = performance.now() - start; took < {1000 * seconds} ? requestAnimationFrame(look) : done([late, 1000 * drawn / took]); }}; look(); }})""")
+    share = (page.busy_s() - busy) / (time.monotonic() - start)
     browser.close()
     viewer.stop()
     daemon.stop()
-    return sorted(latencies), rate
+    return sorted(latencies), rate, share
 
 
 if __name__ == "__main__":
@@ -188,8 +192,9 @@ if __name__ == "__main__":
     try:
         times, period = first_picture()
         for robots in (2, 5, 20):
-            late, pictures = live_pictures(robots, duration)
-            print(f"{robots} robots: POSE to picture {late[len(late) // 2]:.0f} ms median, {late[len(late) * 95 // 100]:.0f} ms 95 %; {pictures:.1f} pictures a second")
+            late, pictures, share = live_pictures(robots, duration)
+            print(f"{robots} robots: POSE to picture {late[len(late) // 2]:.0f} ms median, {late[len(late) * 95 // 100]:.0f} ms 95 %; {pictures:.1f} pictures a second; "
+                  f"{100 * share:.0f} % of a core in the page")
         print(f"first robot in the scene after {', '.join(f'{t:.2f}' for t in times)} s; frames every {1000 * period:.0f} ms")
     except CannotStart as why:
         print(why)

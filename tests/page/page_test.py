@@ -206,7 +206,7 @@ class Camera(PageTest):
         page = self.open_camera(width=1400, height=900)
         page.wait("crepes.camera.times.length > 3 && crepes.camera.picture.predicted.length > 0", "more pictures")
         numbers = page.value("document.getElementById('camera-numbers').textContent")
-        for part in ("2 spots", "1 hot pixels", "0.12 % saturated", "background 20, threshold 60"):
+        for part in ("spots: 2", "hot pixels learned: 1", "0.12 % saturated", "background 20, threshold 60"):
             self.assertIn(part, numbers)
         rate = float(re.search(r"([\d.]+) pictures a second", numbers).group(1))
         self.assertTrue(1.5 < rate <= 10.5, numbers)

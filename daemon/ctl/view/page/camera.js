@@ -237,9 +237,9 @@ export class CameraPanel {
     const { spots, robots, threshold, background, saturated, hot_pixels: hot } = this.picture;
     const rate = this.times.length > 1 ? (this.times.length - 1) / (this.times.at(-1) - this.times[0]) : NaN;
     const seen = robots.map(([id]) => this.nameOf(id)).join(", ") || "none";
-    setText(byId("camera-numbers"), `${spots.length} spots, ${hot} hot pixels learned, ${fixed(100 * saturated, 2)} % saturated; ` +
+    setText(byId("camera-numbers"), `spots: ${spots.length}, hot pixels learned: ${hot}, ${fixed(100 * saturated, 2)} % saturated; ` +
       `background ${background}, threshold ${threshold}; ${fixed(rate, 1)} pictures a second`);
-    const label = `Picture of the camera: ${spots.length} spots; identified: ${seen}`;
+    const label = `Picture of the camera; spots: ${spots.length}; identified: ${seen}`;
     if (this.canvas.getAttribute("aria-label") !== label) this.canvas.setAttribute("aria-label", label);
   }
 }
