@@ -235,6 +235,15 @@ class Camera(PageTest):
         time.sleep(1)
         self.assertEqual(self.cameras.asked, asked)
 
+    def test_the_scene_shows_what_the_camera_sees(self):
+        page = self.open(self.viewer)
+        page.key("c")
+        page.wait("crepes.store.cameras.length === 1", "the field of view")
+        # The corner of a pinhole of 320 px: as far to the left as ahead, 0.8 as far up.
+        x, y, z = page.value("crepes.store.cameras[0].border[0]")
+        self.assertTrue(abs(y / x - 1) < 0.01 and abs(z / x - 0.8) < 0.01, (x, y, z))
+        page.wait("crepes.camera.stop === null", "the end of the pictures")
+
     def test_sliders_write_through_the_daemons_reload(self):
         page = self.open_camera(width=1400, height=900)
         page.wait("!document.getElementById('camera-light').disabled", "sliders that move")

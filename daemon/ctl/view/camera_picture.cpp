@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "daemon/ctl/view/field_of_view.hpp"
 #include "drivers/base/number_text.hpp"
 #include "estimator/vision/camera_model.hpp"
 #include "net/subscription/json_parts.hpp"
@@ -112,6 +113,7 @@ std::string cameras_json(const Config& config, bool control, const std::string& 
     const CameraLight& light = camera.device.light;
     if (light.exposure_us) one["exposure_us"] = *light.exposure_us;
     if (light.gain) one["gain"] = *light.gain;
+    one["field"] = Json::parse(field_of_view_json(camera.calibration));
     json["cameras"].push_back(std::move(one));
   }
   return dump(json);

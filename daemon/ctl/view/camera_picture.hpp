@@ -16,8 +16,9 @@ namespace crepes {
 [[nodiscard]] Result<std::string> picture_json(const std::string& look, const Config& config,
                                                const PoseHistory& poses);
 
-/// What the page's camera panel says without a picture: `cameras` with `name`, `exposure_us` and
-/// `gain`, `threshold`, `control`, and unless it is empty `reason`, why there is no picture.
+/// What the page says of the cameras without a picture: `cameras` with `name`, `exposure_us`,
+/// `gain` and `field` (see `field_of_view_json`), `threshold`, `control`, and unless it is empty
+/// `reason`, why there is no picture.
 [[nodiscard]] std::string cameras_json(const Config& config, bool control,
                                        const std::string& reason);
 

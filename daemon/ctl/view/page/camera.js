@@ -24,6 +24,8 @@ async function decoded(jpeg) {
 export class CameraPanel {
   constructor(store) {
     this.store = store;
+    this.isShown = false;
+    this.isLearning = false; // what the cameras see
     this.canvas = byId("camera-canvas");
     this.sheet = element("canvas"); // the picture alone, pixel by pixel
     this.camera = 0;
@@ -38,16 +40,24 @@ export class CameraPanel {
   reset(store) {
     this.store = store;
     this.close();
+    this.isLearning = false;
     this.camera = 0;
     this.picture = null;
   }
 
   /** Asks for pictures only while they are seen. */
   show(isShown, robot) {
-    const isWanted = isShown && this.store.isLive && !document.hidden;
+    this.isShown = isShown;
+    const isWanted = (isShown || this.isLearning) && this.store.isLive && !document.hidden;
     if (this.stop && (!isWanted || robot !== this.robot)) this.close();
     this.robot = robot;
     if (isWanted && !this.stop) this.open();
+  }
+
+  /** What the cameras see, for the scene: the daemon says it with its first picture. */
+  learn(robot) {
+    this.isLearning = this.store.isLive && this.store.cameras.length === 0;
+    this.show(this.isShown, robot);
   }
 
   open() {
@@ -77,6 +87,12 @@ export class CameraPanel {
       select.value = String(this.camera);
     }
     this.note(state.reason || "");
+    if (state.cameras.length > 0) this.store.cameras = state.cameras.map(({ field }) => field).filter(Boolean);
+    this.store.changed();
+    if (this.isLearning && this.store.cameras.length > 0) {
+      this.isLearning = false;
+      this.show(this.isShown, this.robot);
+    }
     this.showLight();
   }
 

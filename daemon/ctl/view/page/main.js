@@ -81,10 +81,11 @@ async function show(index) {
   setSource(source);
   byId("truth-label").hidden = byId("ghost-legend").hidden = true;
   byId("measurements-label").hidden = false;
-  byId("cameras-label").hidden = true;
+  byId("cameras-label").hidden = !source.live;
   for (const node of document.querySelectorAll("[data-live]")) node.hidden = !source.live;
   if (!source.live && document.body.dataset.panel === "camera") showPanel("scene");
   showCamera();
+  if (scene.settings.cameras) camera.learn(robot);
   byId("speed-label").hidden = source.live;
   redraw();
   if (source.live) {
@@ -162,6 +163,7 @@ function drawTransport(t) {
 function noteOf(t) {
   if (!store.link.ok) return store.link.reason;
   if (store.neighbors.size === 0) return "no neighbors yet";
+  if (scene.settings.cameras && camera.isLearning && camera.state.reason) return `What the cameras see is not known: ${camera.state.reason}`;
   if (scene.isLevel) return "";
   if (!store.isLive) return store.hasTruth ? "" : "Gravity is not known without --truth: the grid is the robot's own x-y plane.";
   return store.newest ? "Gravity is not known: the grid is the robot's own x-y plane." : "No poses yet: see Health for the reasons.";
@@ -318,7 +320,10 @@ function listenToPage() {
     scene.settings.measurements = checked;
     for (const node of document.querySelectorAll("[data-measured]")) node.hidden = !checked;
   });
-  on("cameras", "change", ({ checked }) => { scene.settings.cameras = checked; });
+  on("cameras", "change", ({ checked }) => {
+    scene.settings.cameras = checked;
+    if (checked) camera.learn(robot);
+  });
   on("truth", "change", ({ checked }) => { scene.settings.truth = checked; });
   on("focus", "change", ({ value }) => charts.setFocus(value));
   on("zoom-in", "click", () => charts.zoom(0.6));
