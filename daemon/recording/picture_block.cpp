@@ -51,7 +51,7 @@ void append_reduced_row(std::string& text, const Frame& frame, int row, int scal
   for (int v = row * scale; v < (row + 1) * scale; ++v) {
     const std::uint8_t* pixel = frame.data() + v * frame.stride();
     for (std::size_t u = 0; u < width; ++u) {
-      std::uint8_t brightest = static_cast<std::uint8_t>(text[begin + u]);
+      auto brightest = static_cast<std::uint8_t>(text[begin + u]);
       for (int i = 0; i < scale; ++i) brightest = std::max(brightest, *pixel++);
       text[begin + u] = static_cast<char>(brightest);
     }

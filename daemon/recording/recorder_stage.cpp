@@ -142,9 +142,10 @@ class Recorder {
     if (gap > 0) append_block(text, "gap", fmt::format("{}", gap));
     for (const auto& [kind, rows] : waiting_rows()) append_block(text, kind, rows);
     if (recipient.records_pictures()) {
-      for (auto& held : pictures_)
+      for (auto& held : pictures_) {
         if (held && std::exchange(held->is_to_record, false))
           append_picture(text, held->picture.frame);
+      }
     }
     if (!text.empty()) recipient.put(std::move(text));
   }

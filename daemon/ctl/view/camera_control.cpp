@@ -60,11 +60,11 @@ Result<void> change_camera(const CameraFeed& feed, const std::filesystem::path& 
   if (*exposure_us || *gain) {
     auto lights = CameraLights::load(file, config->cameras[camera].calibration.name);
     if (!lights) return tl::unexpected(lights.error());
-    const auto changed = lights->change({.exposure_us = *exposure_us, .gain = *gain});
+    auto changed = lights->change({.exposure_us = *exposure_us, .gain = *gain});
     if (!changed) return changed;
   }
   if (*threshold) {
-    if (const auto changed = change_threshold(file, **threshold); !changed) return changed;
+    if (auto changed = change_threshold(file, **threshold); !changed) return changed;
   }
   return reload(*daemon);
 }

@@ -53,9 +53,10 @@ void CameraFeed::connect(Timestamp now) {
   if (socket_.empty()) reason_ = kElsewhere;
   if (daemon_ || socket_.empty() || now < retry_at_) return;
   auto socket = connect_unix(socket_);
-  if (!socket)
+  if (!socket) {
     return hang_up(socket.error().message + ": is crepesd running, with recording.socket set?",
                    now);
+  }
   daemon_.emplace(std::move(*socket));
   asked_.reset();
   reason_ = "no picture yet";
