@@ -25,8 +25,10 @@ class Recipient {
   [[nodiscard]] int descriptor() const { return socket_.get(); }
   [[nodiscard]] bool records() const { return request_.starts_with(kRecordRequest); }
   [[nodiscard]] bool records_pictures() const { return request_ == kPicturesRequest; }
-  /// The camera of which it waits for a picture.
-  [[nodiscard]] std::optional<std::uint8_t> looks_at() const { return camera_; }
+  /// The camera of which it waits for a picture. Nobody who has not read the last one.
+  [[nodiscard]] std::optional<std::uint8_t> looks_at() const {
+    return is_idle() ? camera_ : std::nullopt;
+  }
   /// Whether it is up to date with the configuration; true afterwards.
   [[nodiscard]] bool needs_config() { return !std::exchange(is_config_sent_, true); }
   void forget_config() { is_config_sent_ = false; }

@@ -179,7 +179,7 @@ class Recorder {
     std::string look;
     append_look(look, picture, robots);
     for (Recipient& recipient : recipients_) {
-      if (recipient.looks_at() != picture.frame.camera || !recipient.is_idle()) continue;
+      if (recipient.looks_at() != picture.frame.camera) continue;
       std::string text;
       put_config(recipient, text);
       recipient.put_look(text + look);
