@@ -152,10 +152,11 @@ std::vector<client::Status::Clock> ask_for_clocks(const SubscriptionConfig& subs
 /// Why the recording ends now; empty while it continues.
 std::string end_reason(const RecordOptions& options, const RecordProgress& progress,
                        Duration elapsed, StopSignals& signals) {
-  constexpr double kLate_s = 1.0;  // measurements come a little after they were made, or not at all
+  constexpr double kLateSeconds =
+      1.0;  // measurements come a little after they were made, or not at all
   if (signals.requested()) return "stopped";
   if (options.duration_s &&
-      std::max(progress.seconds, to_seconds(elapsed) - kLate_s) >= *options.duration_s)
+      std::max(progress.seconds, to_seconds(elapsed) - kLateSeconds) >= *options.duration_s)
     return "--duration is over";
   if (progress.bytes >= options.max_bytes) return "--max-size is reached";
   return "";
