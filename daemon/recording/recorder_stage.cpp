@@ -124,7 +124,9 @@ class Recorder {
   /// Takes the pictures that were asked for, and asks for those that somebody waits for now.
   void receive_pictures() {
     const Recipient* const recording = recipient_that_records();
-    const bool are_recorded = recording != nullptr && recording->records_pictures();
+    // A recording that does not keep up misses them; it must not hold up who looks.
+    const bool are_recorded =
+        recording != nullptr && recording->records_pictures() && recording->is_idle();
     for (std::size_t i = 0; i < pictures_.size(); ++i) {
       PictureTap& tap = stage_.pictures[i];
       if (auto picture = tap.pictures.try_pop(); picture && !pictures_[i])
@@ -164,7 +166,7 @@ class Recorder {
           robots != nullptr || context_.clock.now() - held->since > kRobotsPatience;
       if (is_looked_at(i) && !is_ready) continue;
       if (is_looked_at(i)) show(held->picture, robots);
-      if (!held->is_to_record || recipient_that_records() == nullptr) pictures_[i].reset();
+      pictures_[i].reset();
     }
   }
 
