@@ -12,7 +12,7 @@ namespace crepes {
 namespace {
 
 constexpr int kMethodNotAllowed = 405;
-constexpr int kForbidden = 403;
+constexpr int kStatusForbidden = 403;
 constexpr int kUnauthorized = 401;
 constexpr int kMisdirected = 421;
 
@@ -52,9 +52,9 @@ std::optional<HttpReply> refusal_of(const HttpRequest& request, const AccessPoli
     return refused(kMethodNotAllowed, is_action ? "only POST\n" : "only GET\n");
   if (!is_own_host(request.host, policy))
     return refused(kMisdirected, "this Host is not of this machine: use its address\n");
-  if (is_action && request.origin.empty()) return refused(kForbidden, "without an Origin\n");
+  if (is_action && request.origin.empty()) return refused(kStatusForbidden, "without an Origin\n");
   if (!request.origin.empty() && lower(request.origin) != "http://" + lower(request.host))
-    return refused(kForbidden, "not for pages of another origin\n");
+    return refused(kStatusForbidden, "not for pages of another origin\n");
   constexpr std::string_view kScheme = "Bearer ";
   const std::string_view sent = request.authorization;
   const bool is_known = sent.starts_with(kScheme) &&
