@@ -165,11 +165,12 @@ struct TeamFault {
     kCameraRefused,  ///< it contradicts the team whatever its misalignment
     kRanges,         ///< its ranges are refused
     kClock,          ///< its stamps are used with the offset that the team found
+    kGyro,           ///< it reads other rates than its cameras show; the robot is left out
   };
   RobotId robot{};
   Kind kind = Kind::kCameraTurned;
   /// [rad] of a camera, [m] of ranges, positive if they are too long, [s] of a clock, positive if
-  /// it is ahead.
+  /// it is ahead, [rad/s] of a gyroscope.
   double size = 0.0;
 
   [[nodiscard]] bool operator==(const TeamFault&) const = default;

@@ -25,6 +25,12 @@ class TiltFilter {
   /// of more than half a second restarts the filter.
   bool add(const ImuSample& sample);
 
+  /// Forgets what it knows: the gyroscope was false.
+  void restart() {
+    last_.reset();
+    samples_ = 0;
+  }
+
   /// Empty for the first samples after a start.
   [[nodiscard]] std::optional<Tilt> tilt() const;
 

@@ -250,7 +250,15 @@ Outputs Estimator::State::handle(const GraphSolution& solution) {
 }
 
 Outputs Estimator::State::handle(const TeamSolution& solution) {
+  constexpr Duration kRefusal = std::chrono::milliseconds{300};  // some solutions
   faults = solution.faults;
+  const bool is_gyro_false = std::ranges::any_of(faults, [this](const TeamFault& fault) {
+    return fault.robot == id && fault.kind == TeamFault::Kind::kGyro;
+  });
+  if (is_gyro_false) {
+    self.refused_until = last_tick + kRefusal;
+    tilt_filter.restart();
+  }
   const auto bias_of = [&](RobotId robot) {
     const auto found = std::ranges::find(solution.biases, robot, &ImuBiasEstimate::robot);
     return found == solution.biases.end() ? ImuBiasEstimate{} : *found;

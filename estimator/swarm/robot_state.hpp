@@ -14,6 +14,7 @@ struct RobotState {
   ImuHistory imu;
   std::optional<Tilt> tilt;
   ImuGuard guard{};
+  Timestamp refused_until = Timestamp::min();  ///< the team found its gyroscope false
 
   /// Adds a sample that the guard believes. False for a duplicate, and for a late sample that
   /// contradicts those about it.
@@ -25,11 +26,12 @@ struct RobotState {
     return imu.push(sample);
   }
 
-  /// True if the IMU does not show the motion at `t`: no sample for half a second, or a saturated
-  /// sensor.
+  /// True if the IMU does not show the motion at `t`: no sample for half a second, a saturated
+  /// sensor, or a gyroscope that contradicts the cameras.
   [[nodiscard]] bool lacks_imu(Timestamp t) const {
     constexpr Duration kLongest = std::chrono::milliseconds{500};
-    return imu.empty() || t - imu.newest().stamp > kLongest || guard.is_saturated();
+    return imu.empty() || t - imu.newest().stamp > kLongest || guard.is_saturated() ||
+           t < refused_until;
   }
 
   /// The tilt propagated by the gyroscope to `t`, at most a second away. Empty without tilt or

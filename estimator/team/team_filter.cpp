@@ -99,10 +99,14 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
 }
 
 /// A turned camera of a trusted robot has strained everybody's calibration, so that all start anew.
-/// So have robots with false ranges.
+/// So have robots with false ranges, and this robot's own gyroscope, if it was false.
 void TeamFilter::remove_members(const TeamInterval& interval) {
-  for (const RobotId id : trust_.lost(interval, belief_)) belief_.remove(id);
   bool has_strained = false;
+  for (const RobotId id : trust_.lost(interval, belief_)) belief_.remove(id);
+  for (const RobotId id : trust_.false_gyros(interval, belief_)) {
+    has_strained = has_strained || id == belief_.self;
+    if (id != belief_.self) belief_.remove(id);
+  }
   for (const RobotId id : trust_.turned(interval, belief_)) {
     has_strained = has_strained || belief_.robots.at(id).is_trusted;
     if (id != belief_.self) belief_.remove(id);
@@ -299,6 +303,7 @@ void TeamFilter::report(const TeamInterval& interval, TeamSolution& solution) co
   }
   std::ranges::sort(solution.poses, {}, &TeamPose::neighbor);
   solution.faults = faults_of(belief_, interval.settings.priors);
+  for (const TeamFault& fault : trust_.gyro_faults(interval.from)) solution.faults.push_back(fault);
 }
 
 }  // namespace crepes

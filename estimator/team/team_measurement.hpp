@@ -53,6 +53,9 @@ class SightModel {
   [[nodiscard]] static std::optional<SightModel> at(const TeamPair& pair, const TeamCamera& camera,
                                                     double t_s, double sigma_rad);
 
+  /// The direction in the camera, and axes across it.
+  [[nodiscard]] const Eigen::Vector3d& predicted() const { return predicted_; }
+  [[nodiscard]] const Eigen::Matrix<double, 3, 2>& across() const { return across_; }
   /// Residual zero.
   [[nodiscard]] const TeamRow& row() const { return row_; }
   /// In the plane across the predicted direction. `t_s` is the time of the bearing. Empty if it

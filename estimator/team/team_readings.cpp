@@ -28,16 +28,20 @@ bool takes_part(const TeamBelief& belief, RobotId observer, RobotId neighbor,
                                                 : i->second.is_trusted != j->second.is_trusted;
 }
 
+/// Those of cameras and pairs that this accepts.
+template <class Accepts>
 std::vector<Sight> sights_of(const TeamInterval& interval, const TeamBelief& belief,
-                             TeamReadings::Stage stage) {
+                             const Accepts& accepts) {
   std::map<std::tuple<RobotId, RobotId, std::size_t>, Sight> sights;
   for (const TeamBearing& reading : interval.bearings) {
     const Bearing& z = reading.bearing;
-    if (!is_inside(interval, z.stamp) || !takes_part(belief, reading.observer, z.neighbor, stage))
+    const auto observer = belief.robots.find(reading.observer);
+    if (!is_inside(interval, z.stamp) || observer == belief.robots.end() ||
+        !belief.robots.contains(z.neighbor))
       continue;
-    const auto& cameras = belief.robots.at(reading.observer).cameras;
+    const auto& cameras = observer->second.cameras;
     const auto camera = std::ranges::find(cameras, z.p_B_C, &TeamCamera::p_B_C);
-    if (camera == cameras.end() || camera->is_refused) continue;
+    if (camera == cameras.end() || !accepts(reading.observer, z.neighbor, *camera)) continue;
     const auto index = static_cast<std::size_t>(camera - cameras.begin());
     const std::tuple key(reading.observer, z.neighbor, index);
     sights.try_emplace(key, Sight{reading.observer, z.neighbor, index})
@@ -186,7 +190,14 @@ double Sight::sigma_rad() const {
 }
 
 TeamReadings TeamReadings::of(const TeamInterval& interval, const TeamBelief& belief, Stage stage) {
-  return {sights_of(interval, belief, stage), rangings_of(interval, belief, stage)};
+  const auto accepts = [&](RobotId observer, RobotId neighbor, const TeamCamera& camera) {
+    return !camera.is_refused && takes_part(belief, observer, neighbor, stage);
+  };
+  return {sights_of(interval, belief, accepts), rangings_of(interval, belief, stage)};
+}
+
+std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& belief) {
+  return sights_of(interval, belief, [](RobotId, RobotId, const TeamCamera&) { return true; });
 }
 
 void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelief& belief,

@@ -41,6 +41,9 @@ struct TeamReadings {
   [[nodiscard]] bool empty() const { return sights.empty() && rangings.empty(); }
 };
 
+/// Between any two robots of the belief, those of refused cameras too.
+[[nodiscard]] std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& belief);
+
 /// Drops readings that are too unlikely. Counts how each camera and pair agrees, and when a robot
 /// was last seen.
 void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelief& belief,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator/core/constants.hpp"
+#include "estimator/team/gyro_check.hpp"
 
 namespace crepes {
 namespace {
@@ -24,7 +25,11 @@ constexpr double kTurnedChi2 = 25.0;                 // exceeded by one right ca
 constexpr double kTurn = radians(20.0);       // rad
 constexpr double kTurnAcross = radians(2.0);  // rad
 constexpr double kWrongClock = 8e-3;          // s
-constexpr int kLeastRefused = 3;              // pairs
+constexpr double kGyroMemory = 0.5;           // s
+constexpr double kFalseGyro = 60.0;           // chi-square within that time
+constexpr Duration kGyroRefusal = std::chrono::seconds{1};
+constexpr Duration kStrained = std::chrono::seconds{2};  // by a false gyroscope
+constexpr int kLeastRefused = 3;                         // pairs
 
 /// How many cameras agree with each robot's place, and how many contradict it.
 using Witnesses = std::map<RobotId, Agreement>;
@@ -190,13 +195,41 @@ void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) 
 
 }  // namespace
 
+std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval,
+                                            const TeamBelief& belief) {
+  const double kept = std::exp(-to_seconds(interval.to - interval.from) / kGyroMemory);
+  for (auto& [id, doubt] : gyro_doubts_) doubt.chi2 *= kept;
+  std::vector<RobotId> robots;
+  for (const auto& [id, found] :
+       gyro_contradictions(interval, belief.trajectories(interval), belief)) {
+    GyroDoubt& doubt = gyro_doubts_[id];
+    doubt.chi2 += found.chi2;
+    if (doubt.chi2 <= kFalseGyro) continue;
+    doubt.found = belief.stamp;
+    doubt.rate_radps = found.rate_radps;
+    robots.push_back(id);
+    // What its camera was found guilty of may have been the gyroscope's fault.
+    if (const auto verdict = verdicts_.find(id); verdict != verdicts_.end())
+      verdict->second.is_withdrawn = true;
+  }
+  return robots;
+}
+
+/// Of late: what it has strained may still look as if its camera were turned.
+bool TeamTrust::is_strained(RobotId robot, Timestamp now) const {
+  const auto doubt = gyro_doubts_.find(robot);
+  return doubt != gyro_doubts_.end() && doubt->second.found &&
+         now - *doubt->second.found < kStrained;
+}
+
 std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBelief& belief) {
   const Witnesses all = witnesses(belief.robots, [&](RobotId observer, const TeamCamera& camera) {
     return is_turned(belief.robots, observer, camera);
   });
   // A robot that was away may have been repaired.
-  std::erase_if(verdicts_,
-                [&](const auto& entry) { return interval.member(entry.first) == nullptr; });
+  const auto is_away = [&](const auto& entry) { return interval.member(entry.first) == nullptr; };
+  std::erase_if(verdicts_, is_away);
+  std::erase_if(gyro_doubts_, is_away);
   std::vector<RobotId> lost;
   for (const auto& [id, robot] : belief.robots) {
     if (id == belief.self) continue;
@@ -212,6 +245,7 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
 std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamBelief& belief) {
   std::vector<RobotId> turned;
   for (const auto& [id, robot] : belief.robots) {
+    if (is_strained(id, belief.stamp)) continue;
     const bool was_realigned = is_realigned(id, belief.stamp);
     for (const TeamCamera& camera : robot.cameras) {
       const bool contradicts = is_turned(belief.robots, id, camera);
@@ -311,6 +345,14 @@ void TeamTrust::end_probations(TeamBelief& belief) const {
         !is_placed_by_its_own_ranges(belief, id))
       robot.is_trusted = true;
   }
+}
+
+std::vector<TeamFault> TeamTrust::gyro_faults(Timestamp now) const {
+  std::vector<TeamFault> faults;
+  for (const auto& [id, doubt] : gyro_doubts_)
+    if (doubt.found && now - *doubt.found < kGyroRefusal)
+      faults.push_back({id, TeamFault::Kind::kGyro, doubt.rate_radps});
+  return faults;
 }
 
 std::vector<TeamFault> faults_of(const TeamBelief& belief, const Priors& priors) {

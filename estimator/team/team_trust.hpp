@@ -17,6 +17,11 @@ class TeamTrust {
   /// cameras that see them. Where as many agree, the robot that came last is in the wrong.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
+  /// Robots whose gyroscope contradicts what their cameras see over the interval. All in `belief`
+  /// have an IMU over it.
+  [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval,
+                                                 const TeamBelief& belief);
+
   /// Robots with a camera that is turned, newly. Such a robot has a wrong attitude too. It must
   /// start anew with a camera that may be turned, so that the others' measurements determine it. If
   /// that camera contradicts them again, it is refused.
@@ -27,6 +32,9 @@ class TeamTrust {
   [[nodiscard]] bool is_misled(const TeamBelief& belief);
   /// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.
   void end_probations(TeamBelief& belief) const;
+
+  /// Robots whose gyroscope was false within the last second.
+  [[nodiscard]] std::vector<TeamFault> gyro_faults(Timestamp now) const;
 
   /// How uncertain the misalignment of its cameras is, and likewise its attitude, in its body's
   /// axes [rad^2]. None if its cameras are as they were calibrated.
@@ -41,6 +49,11 @@ class TeamTrust {
     Timestamp last{};
     int count = 0;
   };
+  struct GyroDoubt {
+    double chi2 = 0.0;               ///< of the latest intervals
+    std::optional<Timestamp> found;  ///< when it was last too large
+    double rate_radps = 0.0;         ///< how wrong the gyroscope was then
+  };
   struct Verdict {
     Timestamp since{};
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
@@ -49,12 +62,14 @@ class TeamTrust {
     bool is_withdrawn = false;
   };
   void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
+  [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
   [[nodiscard]] bool is_realigned(RobotId robot, Timestamp now) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] int recent_losses(RobotId robot, Timestamp now) const;
 
   std::map<RobotId, Losses> losses_;
   std::map<RobotId, Verdict> verdicts_;
+  std::map<RobotId, GyroDoubt> gyro_doubts_;
   std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
 };
 

@@ -23,6 +23,11 @@ std::string text_of(const TeamFault& fault) {
     case TeamFault::Kind::kClock:
       return fmt::format("its clock is {:.0f} ms {} of the others'; check what stamps its sensors",
                          1e3 * std::abs(fault.size), fault.size > 0.0 ? "ahead" : "behind");
+    case TeamFault::Kind::kGyro:
+      return fmt::format(
+          "its gyroscope reads rates {:.1f} deg/s off what its camera shows; check the IMU's "
+          "range and unit",
+          kDegPerRad * fault.size);
   }
   return {};
 }

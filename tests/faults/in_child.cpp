@@ -13,7 +13,8 @@
 namespace crepes::faults {
 namespace {
 
-[[noreturn]] void run(const std::function<std::string()>& function, int out) {
+/// An exception ends the process by a signal, as it would end the daemon.
+[[noreturn]] void run(const std::function<std::string()>& function, int out) noexcept {
   const std::string text = function();
   for (std::size_t at = 0; at < text.size();) {
     const ssize_t written = ::write(out, text.data() + at, text.size() - at);

@@ -60,6 +60,9 @@ class EstimatorPair {
     for (const Duration end = now_ + duration; now_ < end;) advance(with);
   }
 
+  /// Our estimator receives what its team's filter found.
+  void solve(const TeamSolution& solution) { (void)estimator_.step(solution); }
+
   /// Our estimator goes on with other settings.
   void reconfigure(const std::function<void(EstimatorSettings&)>& change) {
     change(settings_);

@@ -171,6 +171,25 @@ TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsTold) {
   EXPECT_LE(Trials(saturate<false>).slowest_return, 500ms);
 }
 
+/// Solutions come ten times a second; ours says for three quarters of a second that the gyroscope
+/// is false.
+void distrust(EstimatorPair& pair, std::uint64_t seed) {
+  TeamSolution solution;
+  solution.faults = {{EstimatorPair::kSelf, TeamFault::Kind::kGyro, 0.5}};
+  for (Duration time{}; time < 750ms; time += 100ms) {
+    pair.solve(solution);
+    pair.run_for(100ms);
+    EXPECT_EQ(pair.latest(), nullptr) << seed;
+  }
+  EXPECT_EQ(pair.status().reason, NoPoseReason::kNoOwnImu) << seed;
+}
+
+TEST(EstimatorFaults, AGyroscopeThatTheTeamFoundFalseTakesThePoseAway) {
+  const Trials trials(distrust, 20);
+  EXPECT_LE(trials.slowest_return, 1s);
+  EXPECT_LE(trials.after.dishonest_share(), 0.02);
+}
+
 TEST(EstimatorFaults, HundredStartsAfterASaturatedImuAreHonest) {
   // A pose that starts three sigma off stays so for a while: a few of these decide the share. Our
   // tilt starts anew from a single sample in flight, as wrong as the robot then accelerates.

@@ -208,6 +208,7 @@ TEST(TeamFilter, NamesATurnedCamera) {
     const TeamFault* fault = fault_of(solution, kLiar);
     ASSERT_NE(fault, nullptr) << seed;
     EXPECT_NE(fault->kind, TeamFault::Kind::kRanges);
+    EXPECT_NE(fault->kind, TeamFault::Kind::kGyro);
     if (fault->kind == TeamFault::Kind::kCameraTurned) {
       EXPECT_NEAR(fault->size, radians(8.0), radians(1.0)) << seed;
       ++measured;
@@ -289,6 +290,66 @@ TEST(TeamFilter, AnAntennaDelayThatCameFirstIsOutvoted) {
   }
   EXPECT_GT(poses, 1000);
   EXPECT_EQ(beyond, 0);
+}
+
+/// Its gyroscope reads nearly twice its rate.
+void scale_gyro(TeamInterval& interval, RobotId robot) {
+  for (TeamMember& member : interval.members)
+    if (member.robot == robot)
+      for (ImuMean& mean : member.imu) mean.gyro_radps *= 1.9;
+}
+
+TEST(TeamFilter, NamesAFalseGyroscopeAndIsWithoutThatRobotAsLongAsItLasts) {
+  constexpr RobotId kLiar{4};
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 3.0));
+    team.damage = [&](TeamInterval& interval) { scale_gyro(interval, kLiar); };
+    TeamSolution solution;
+    bool is_named = false;
+    for (double t = 0.0; t < 3.0; t += kIntervalSeconds) {
+      solution = filter.step(team.next());
+      const TeamFault* fault = fault_of(solution, kLiar);
+      is_named = is_named || (fault != nullptr && fault->kind == TeamFault::Kind::kGyro);
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        ASSERT_NE(pose, nullptr) << seed;
+        EXPECT_LT(nees_of(*pose, team.truth(robot)), 30.0) << seed << " at " << t;
+      }
+    }
+    EXPECT_TRUE(is_named) << seed;
+    team.damage = [](TeamInterval&) {};
+    solution = solution_after(team, filter, 3.0);
+    for (const TeamFault& fault : solution.faults)
+      ADD_FAILURE() << seed << ": robot " << fault.robot.value << ", kind "
+                    << static_cast<int>(fault.kind) << ", " << fault.size;
+    const TeamPose* pose = find(solution, kLiar);
+    ASSERT_NE(pose, nullptr) << seed;
+    EXPECT_LT(nees_of(*pose, team.truth(kLiar)), 30.0) << seed;
+  }
+}
+
+// Everything that it knows is relative to itself, so it begins anew.
+TEST(TeamFilter, RecoversFromItsOwnFalseGyroscope) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 3.0));
+    team.damage = [](TeamInterval& interval) { scale_gyro(interval, kSelf); };
+    TeamSolution solution = solution_after(team, filter, 2.0);
+    const TeamFault* fault = fault_of(solution, kSelf);
+    ASSERT_NE(fault, nullptr) << seed;
+    EXPECT_EQ(fault->kind, TeamFault::Kind::kGyro);
+    team.damage = [](TeamInterval&) {};
+    solution = solution_after(team, filter, 3.0);
+    EXPECT_TRUE(solution.faults.empty()) << seed;
+    ASSERT_EQ(solution.poses.size(), 3U) << seed;
+    for (const TeamPose& pose : solution.poses) {
+      EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0) << seed;
+      EXPECT_LT(error_of(pose, team.truth(pose.neighbor)).head<3>().norm(), 0.15) << seed;
+    }
+  }
 }
 
 TEST(TeamFilter, NamesRangesThatAreTooLong) {

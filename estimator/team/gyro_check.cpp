@@ -1,0 +1,209 @@
+#include "estimator/team/gyro_check.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "estimator/core/so3.hpp"
+
+namespace crepes {
+namespace {
+
+constexpr double kLeastTime = 0.02;  // s; between the halves
+constexpr double kUnlikely = 12.0;   // chi-square of two degrees; one right sight in 400
+constexpr double kExplained = 0.8;   // of the sum of all sights' chi-squares
+constexpr double kAnyTurn = 1.0;     // rad; sigma of a camera's turn
+constexpr double kAnyRate = 30.0;    // rad/s; sigma of a rate of which nothing is known
+
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+using Matrix32 = Eigen::Matrix<double, 3, 2>;
+
+/// A direction in one half of an interval.
+struct Direction {
+  Eigen::Vector3d predicted;
+  Eigen::Vector3d measured;
+  Matrix32 across;  ///< the predicted one
+
+  /// In the plane across, if the camera is turned by `R`.
+  [[nodiscard]] Eigen::Vector2d residual(const Eigen::Matrix3d& R) const {
+    const Eigen::Vector3d u = R.transpose() * measured;
+    const double sine = predicted.cross(u).norm();
+    const double stretch = sine < 1e-9 ? 1.0 : std::atan2(sine, predicted.dot(u)) / sine;
+    return stretch * (across.transpose() * u);
+  }
+  /// Of the residual, by a turn of the camera.
+  [[nodiscard]] Matrix23 by_turn() const { return across.transpose() * hat(predicted); }
+};
+
+/// A direction in both halves, with what the belief does not know of it.
+struct Change {
+  Direction first;
+  Direction second;
+  Eigen::Matrix2d turn;              ///< from the second's plane to the first's
+  Eigen::Matrix2d first_covariance;  ///< of the first's residual
+  Eigen::Matrix2d covariance;        ///< of the difference of the residuals
+  double time_s = 0.0;               ///< between the halves
+
+  [[nodiscard]] Eigen::Vector2d residual(const Eigen::Matrix3d& R) const {
+    return turn * second.residual(R) - first.residual(R);
+  }
+  /// A turned camera sees other changes, too.
+  [[nodiscard]] Matrix23 by_turn() const { return turn * second.by_turn() - first.by_turn(); }
+  /// By the observer's rate of rotation, beyond what its gyroscope reads.
+  [[nodiscard]] Matrix23 by_rate() const { return time_s * turn * second.by_turn(); }
+};
+
+/// A vector of three components from residuals.
+struct LeastSquares {
+  Eigen::Matrix3d information;
+  Eigen::Vector3d weighed = Eigen::Vector3d::Zero();
+
+  explicit LeastSquares(double prior_sigma)
+      : information(Eigen::Matrix3d::Identity() / (prior_sigma * prior_sigma)) {}
+  void add(const Eigen::Vector2d& residual, const Eigen::Matrix2d& covariance, const Matrix23& by) {
+    const Matrix32 gain = covariance.llt().solve(by).transpose();
+    information += gain * by;
+    weighed += gain * residual;
+  }
+  [[nodiscard]] Eigen::Vector3d mean() const { return information.ldlt().solve(weighed); }
+};
+
+/// Half of a sight's bearings.
+struct Half {
+  std::span<const Bearing* const> bearings;
+
+  [[nodiscard]] double time_s(Timestamp from) const {
+    double sum_s = 0.0;
+    for (const Bearing* z : bearings) sum_s += to_seconds(z->stamp - from);
+    return sum_s / static_cast<double>(bearings.size());
+  }
+};
+
+double middle_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+/// The median in each component, so that single false bearings do not count.
+std::optional<Eigen::Vector2d> median_residual(const TeamPair& pair, const TeamCamera& camera,
+                                               const SightModel& model, const Half& half,
+                                               Timestamp from) {
+  std::vector<double> x;
+  std::vector<double> y;
+  for (const Bearing* z : half.bearings) {
+    const auto residual = model.residual(pair, camera, z->u_B, to_seconds(z->stamp - from));
+    if (!residual) return std::nullopt;
+    x.push_back(residual->x());
+    y.push_back(residual->y());
+  }
+  return Eigen::Vector2d(middle_of(x), middle_of(y));
+}
+
+Direction direction_of(const SightModel& model, const Eigen::Vector2d& residual) {
+  const double angle = residual.norm();
+  const double sinc = angle < 1e-9 ? 1.0 : std::sin(angle) / angle;
+  return {.predicted = model.predicted(),
+          .measured = std::cos(angle) * model.predicted() + sinc * (model.across() * residual),
+          .across = model.across()};
+}
+
+std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajectories& paths,
+                                const TeamBelief& belief, const Sight& sight) {
+  const std::size_t count = sight.bearings.size() / 2;
+  if (count == 0) return std::nullopt;
+  std::vector<const Bearing*> sorted = sight.bearings;
+  std::ranges::stable_sort(sorted, {}, &Bearing::stamp);
+  const std::span all(sorted);
+  const Half first{all.first(count)};
+  const Half second{all.last(count)};
+  const double t1_s = first.time_s(interval.from);
+  const double t2_s = second.time_s(interval.from);
+  if (t2_s - t1_s < kLeastTime) return std::nullopt;
+
+  const TeamPair pair{belief.robots.at(sight.observer), belief.robots.at(sight.neighbor),
+                      *interval.member(sight.observer), *interval.member(sight.neighbor),
+                      paths.at(sight.observer),         paths.at(sight.neighbor)};
+  const TeamCamera& camera = pair.observer.cameras[sight.camera];
+  const auto before = SightModel::at(pair, camera, t1_s, sight.sigma_rad());
+  const auto after = SightModel::at(pair, camera, t2_s, sight.sigma_rad());
+  if (!before || !after) return std::nullopt;
+  const auto r1 = median_residual(pair, camera, *before, first, interval.from);
+  const auto r2 = median_residual(pair, camera, *after, second, interval.from);
+  if (!r1 || !r2) return std::nullopt;
+
+  const Eigen::Matrix3d R =
+      shortest_rotation(after->predicted(), before->predicted()).toRotationMatrix();
+  const Eigen::Matrix2d turn = before->across().transpose() * R * after->across();
+  TeamRow row = after->row();
+  row.H.leftCols(row.size) =
+      (turn * row.H.leftCols(row.size)).eval() - before->row().H.leftCols(row.size);
+  row.variance += before->row().variance;
+  return Change{.first = direction_of(*before, *r1),
+                .second = direction_of(*after, *r2),
+                .turn = turn,
+                .first_covariance = before->row().covariance(belief.P),
+                .covariance = row.covariance(belief.P),
+                .time_s = t2_s - t1_s};
+}
+
+/// The turn of the camera that explains the first half.
+struct CameraTurn {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d covariance;
+
+  explicit CameraTurn(std::span<const Change> changes) {
+    constexpr int kIterations = 3;
+    for (int iteration = 0; iteration < kIterations; ++iteration) {
+      LeastSquares turn(kAnyTurn);
+      for (const Change& change : changes)
+        turn.add(change.first.residual(R), change.first_covariance, change.first.by_turn());
+      covariance = turn.information.inverse();
+      // A camera turned by m sees Exp(m) u; by_turn is the derivative by the observer's turn.
+      R = R * so3_exp(-turn.mean()).toRotationMatrix();
+    }
+  }
+};
+
+std::optional<GyroContradiction> contradiction(std::span<const Change> changes) {
+  const CameraTurn turn(changes);
+  std::ptrdiff_t unlikely = 0;
+  double sum = 0.0;
+  LeastSquares rate(kAnyRate);
+  for (const Change& change : changes) {
+    const Eigen::Vector2d residual = change.residual(turn.R);
+    const Matrix23 by_turn = change.by_turn();
+    const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
+    const double chi2 = residual.dot(S.llt().solve(residual));
+    unlikely += chi2 > kUnlikely ? 1 : 0;
+    sum += chi2;
+    rate.add(residual, S, change.by_rate());
+  }
+  const Eigen::Vector3d mean = rate.mean();
+  const double explained = rate.weighed.dot(mean);
+  const bool is_common = unlikely >= 2 && 2 * unlikely > std::ssize(changes);
+  if (!is_common || explained <= kExplained * sum) return std::nullopt;
+  return GyroContradiction{.chi2 = explained, .rate_radps = mean.norm()};
+}
+
+}  // namespace
+
+std::map<RobotId, GyroContradiction> gyro_contradictions(const TeamInterval& interval,
+                                                         const TeamTrajectories& paths,
+                                                         const TeamBelief& belief) {
+  std::map<RobotId, std::vector<Change>> changes;
+  for (const Sight& sight : all_sights(interval, belief)) {
+    if (const auto change = change_of(interval, paths, belief, sight))
+      changes[sight.observer].push_back(*change);
+  }
+  std::map<RobotId, GyroContradiction> contradictions;
+  for (const auto& [robot, seen] : changes) {
+    if (const auto found = contradiction(seen)) contradictions.emplace(robot, *found);
+  }
+  return contradictions;
+}
+
+}  // namespace crepes
