@@ -2,6 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+
 #include "drivers/base/number_text.hpp"
 
 namespace crepes {
@@ -12,6 +17,34 @@ void append_row(std::string& text, First first, Rest... rest) {
   append_number(text, first);
   ((text += ',', append_number(text, rest)), ...);
   text += '\n';
+}
+
+/// The next line of `rows`, without its end, which are shortened by it.
+std::string_view next_line(std::string_view& rows) {
+  const std::size_t end = std::min(rows.find('\n'), rows.size());
+  const std::string_view line = rows.substr(0, end);
+  rows.remove_prefix(std::min(end + 1, rows.size()));
+  return line;
+}
+
+/// The stamp and the numbers of a row. Empty if one of them is none.
+template <std::size_t N>
+struct Row {
+  std::int64_t t_ns = 0;
+  std::array<double, N> values{};
+};
+
+template <std::size_t N>
+std::optional<Row<N>> row_of(std::string_view line) {
+  Row<N> row;
+  std::size_t end = std::min(line.find(','), line.size());
+  if (!parse_number(line.substr(0, end), row.t_ns).empty()) return std::nullopt;
+  for (double& value : row.values) {
+    line.remove_prefix(std::min(end + 1, line.size()));
+    end = std::min(line.find(','), line.size());
+    if (!parse_number(line.substr(0, end), value).empty()) return std::nullopt;
+  }
+  return row;
 }
 
 }  // namespace
@@ -31,6 +64,34 @@ void append_rows(std::string& text, const SpotFrame& frame) {
   if (frame.spots.empty()) text += fmt::format("{},,,,\n", stamp);
   for (const Spot& spot : frame.spots)
     append_row(text, stamp, spot.u_px, spot.v_px, spot.area_px2, spot.peak);
+}
+
+std::vector<ImuSample> imu_samples(std::string_view rows) {
+  std::vector<ImuSample> samples;
+  while (!rows.empty()) {
+    const auto row = row_of<6>(next_line(rows));
+    if (!row) continue;
+    const auto& v = row->values;
+    samples.push_back({Timestamp{Duration{row->t_ns}}, {v[0], v[1], v[2]}, {v[3], v[4], v[5]}});
+  }
+  return samples;
+}
+
+std::vector<SpotFrame> spot_frames(std::string_view rows) {
+  std::vector<SpotFrame> frames;
+  while (!rows.empty()) {
+    const std::string_view line = next_line(rows);
+    const auto stamp = row_of<0>(line);
+    if (!stamp) continue;
+    const Timestamp t{Duration{stamp->t_ns}};
+    if (frames.empty() || frames.back().stamp != t)
+      frames.push_back({.stamp = t, .camera = 0, .spots = {}});
+    const auto row = row_of<4>(line);
+    if (!row) continue;
+    const auto& v = row->values;
+    frames.back().spots.push_back({.u_px = v[0], .v_px = v[1], .area_px2 = v[2], .peak = v[3]});
+  }
+  return frames;
 }
 
 void append_bearing_row(std::string& text, Timestamp frame, const Bearing& bearing, double u_px,

@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "estimator/core/measurements.hpp"
 
@@ -19,6 +20,10 @@ void append_rows(std::string& text, const ImuSample& sample);
 void append_rows(std::string& text, const UwbRange& range);
 /// One row per spot. A frame without spots is one row.
 void append_rows(std::string& text, const SpotFrame& frame);
+/// What `append_rows` has written. A row that is none is left out.
+[[nodiscard]] std::vector<ImuSample> imu_samples(std::string_view rows);
+[[nodiscard]] std::vector<SpotFrame> spot_frames(std::string_view rows);
+
 /// A bearing in the picture of `frame`, at the pixel `u_px`, `v_px`. `how` is always read: the
 /// tracker reports a robot only while its blinking is read.
 void append_bearing_row(std::string& text, Timestamp frame, const Bearing& bearing, double u_px,

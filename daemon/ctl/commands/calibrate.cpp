@@ -1,11 +1,15 @@
 #include <cstdio>
+#include <filesystem>
+#include <utility>
 
 #include "daemon/ctl/calibrate/calibrate_camera.hpp"
 #include "daemon/ctl/calibrate/calibrate_imu.hpp"
 #include "daemon/ctl/calibrate/calibrate_range.hpp"
 #include "daemon/ctl/calibrate/calibrate_swarm.hpp"
+#include "daemon/ctl/calibrate/record_for_camera.hpp"
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
+#include "daemon/ctl/dataset/record.hpp"
 
 namespace crepes {
 namespace {
@@ -23,7 +27,20 @@ Result<void> finish(const Result<CalibrationReport>& report) {
   return fail(ErrorCode::kFormat, message);
 }
 
-Result<CalibrationReport> calibrate_camera_with_progress(CalibrateCameraOptions options) {
+struct CameraCommand {
+  CalibrateCameraOptions options;
+  bool live = false;
+  std::filesystem::path socket = RecordOptions{}.socket;
+};
+
+Result<CalibrationReport> calibrate_camera_with_progress(const CameraCommand& command) {
+  CalibrateCameraOptions options = command.options;
+  if (command.live) {
+    auto folder = record_for_camera(
+        {.dir = options.robot_dir, .socket = command.socket, .json = options.json});
+    if (!folder) return tl::unexpected(folder.error());
+    options.robot_dir = std::move(*folder);
+  }
   const TerminalProgress progress;
   options.on_progress = progress.sink();
   return calibrate_camera(options);
@@ -68,13 +85,21 @@ void add_range(CommandLine& line, CLI::App* calibrate) {
 }
 
 void add_camera(CommandLine& line, CLI::App* calibrate) {
-  auto& options = line.make<CalibrateCameraOptions>();
+  auto& command = line.make<CameraCommand>();
+  CalibrateCameraOptions& options = command.options;
   CLI::App* sub = calibrate->add_subcommand(
       "camera",
       "Lens, mounting and time shift of the first camera: one to four LED boards at rest, 2 to 5 m "
       "away, and the robot turned by hand for a minute");
-  sub->add_option("ROBOT_DIR", options.robot_dir, "the robot's folder of a recording")->required();
+  sub->add_option("ROBOT_DIR", options.robot_dir,
+                  "the robot's folder of a recording; with --live a new directory for one")
+      ->required();
   sub->add_option("--out", options.out, "camchain-imucam.yaml of Kalibr")->required();
+  sub->add_flag("--live", command.live,
+                "first record the running daemon, showing which parts of the picture and which "
+                "turns are missing, until there is enough or q is pressed");
+  sub->add_option("--socket", command.socket, "with --live: the daemon's recording.socket")
+      ->capture_default_str();
   sub->add_option("--fov", options.fov_deg,
                   "the lens's rough field of view [deg]; default: start from the lens in "
                   "crepesd.yaml")
@@ -86,7 +111,7 @@ void add_camera(CommandLine& line, CLI::App* calibrate) {
          "distortion, converted from it")
       ->check(CLI::IsMember({"ds", "kb"}));
   add_json_flag(sub, options.json);
-  line.run(sub, [&options] { return finish(calibrate_camera_with_progress(options)); });
+  line.run(sub, [&command] { return finish(calibrate_camera_with_progress(command)); });
 }
 
 Result<CalibrationReport> calibrate_swarm_with_progress(CalibrateSwarmOptions options) {

@@ -39,7 +39,8 @@ std::optional<Timestamp> stamp_at(std::string_view text) {
 /// Writes the blocks to the data set.
 class Recording {
  public:
-  explicit Recording(std::filesystem::path dir) : dir_(std::move(dir)) {}
+  explicit Recording(const RecordOptions& options)
+      : dir_(options.dir), on_config_(options.on_config), on_rows_(options.on_rows) {}
 
   [[nodiscard]] Result<void> append(const Block& block) {
     if (block.kind == "refused") return fail(ErrorCode::kIo, "record: " + block.content);
@@ -79,6 +80,7 @@ class Recording {
     config_ = checked.config;
     ++progress_.configurations;
     if (!folder_) folder_.emplace(dir_ / own_robot_name(config_));
+    if (on_config_) on_config_(config_);
     return folder_->write_config(text);
   }
 
@@ -97,6 +99,7 @@ class Recording {
       last_ = std::max(last_, *stamp);
     }
     progress_.rows += static_cast<std::uint64_t>(std::ranges::count(rows, '\n'));
+    if (on_rows_) on_rows_(block.kind, rows);
     return folder_->append(block.kind, rows);
   }
 
@@ -127,6 +130,8 @@ class Recording {
   }
 
   std::filesystem::path dir_;
+  std::function<void(const Config&)> on_config_;
+  std::function<void(const std::string&, std::string_view)> on_rows_;
   std::optional<RobotFolder> folder_;
   Config config_;
   Timestamp first_ = Timestamp::max();
@@ -155,6 +160,7 @@ std::string end_reason(const RecordOptions& options, const RecordProgress& progr
   constexpr double kLateSeconds =
       1.0;  // measurements come a little after they were made, or not at all
   if (signals.requested()) return "stopped";
+  if (options.is_enough && options.is_enough()) return "it is enough";
   if (options.duration_s &&
       std::max(progress.seconds, to_seconds(elapsed) - kLateSeconds) >= *options.duration_s)
     return "--duration is over";
@@ -205,7 +211,7 @@ Result<RecordSummary> record(const RecordOptions& options) {
   BlockStream daemon(std::move(*socket));
   if (auto asked = daemon.request(options.pictures ? kPicturesRequest : kRecordRequest); !asked)
     return tl::unexpected(asked.error());
-  Recording recording(options.dir);
+  Recording recording(options);
   const Result<std::string> why = run(options, daemon, recording, signals);
   const auto clocks = ask_for_clocks(recording.config().subscription);
   const Result<void> written = recording.write_manifest(clocks);

@@ -6,7 +6,9 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
+#include "config/schema/config.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
@@ -29,6 +31,12 @@ struct RecordOptions {
   std::optional<double> duration_s;
   std::uint64_t max_bytes = kDefaultMaxBytes;
   std::function<void(const RecordProgress&)> on_progress{};
+  /// What is written, as it arrives: the daemon's configuration at the beginning and after each
+  /// reload; rows of `imu0`, `uwb0`, `cam0`, ... as `append_rows` makes them. Optional.
+  std::function<void(const Config&)> on_config{};
+  std::function<void(const std::string& sensor, std::string_view rows)> on_rows{};
+  /// Asked some times a second; ends the recording. Optional.
+  std::function<bool()> is_enough{};
 };
 
 struct RecordSummary {
@@ -37,8 +45,8 @@ struct RecordSummary {
   std::string end_reason;        ///< why it ended
 };
 
-/// Records until a signal, `duration_s`, `max_bytes`, or the end of the daemon. `dir` must not
-/// contain a data set. The data set is complete at the end and every few seconds before.
+/// Records until a signal, `duration_s`, `max_bytes`, `is_enough`, or the end of the daemon. `dir`
+/// must not contain a data set. The data set is complete at the end and every few seconds before.
 [[nodiscard]] Result<RecordSummary> record(const RecordOptions& options);
 
 }  // namespace crepes

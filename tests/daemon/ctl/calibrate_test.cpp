@@ -1,19 +1,30 @@
 /// crepesctl calibrate, from the files of a recording to the files of a configuration.
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/socket.h>
 
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
+#include <thread>
 
 #include "config/reading/config_file.hpp"
 #include "daemon/ctl/calibrate/calibrate_camera.hpp"
 #include "daemon/ctl/calibrate/calibrate_imu.hpp"
 #include "daemon/ctl/calibrate/calibrate_range.hpp"
 #include "daemon/ctl/calibrate/calibrate_swarm.hpp"
+#include "daemon/ctl/calibrate/camera_coverage.hpp"
+#include "daemon/ctl/calibrate/record_for_camera.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/setup/init.hpp"
+#include "daemon/recording/block.hpp"
+#include "daemon/recording/unix_socket.hpp"
+#include "drivers/base/sleep.hpp"
 #include "drivers/dataset/dataset_rows.hpp"
 #include "drivers/dataset/robot_folder.hpp"
 #include "estimator/core/constants.hpp"
@@ -59,7 +70,8 @@ class Calibrate : public testing::Test {
   }
 
   /// Boards 2 and 3 blink their patterns from a phase of their own.
-  void write_spots(const simulated::CameraRecording& recording) const {
+  [[nodiscard]] std::map<Timestamp, SpotFrame> frames_of(
+      const simulated::CameraRecording& recording) const {
     constexpr double kSlot = 10e-3;
     const std::vector<MemberConfig> members = config().swarm.members;
     std::map<Timestamp, SpotFrame> frames;
@@ -73,8 +85,11 @@ class Calibrate : public testing::Test {
       if (pattern[slot] == '1')
         frame.spots.push_back({sighting.uv.x(), sighting.uv.y(), 12.0, 200.0, 1.0});
     }
+    return frames;
+  }
+  void write_spots(const simulated::CameraRecording& recording) const {
     std::string rows;
-    for (const auto& [stamp, frame] : frames) append_rows(rows, frame);
+    for (const auto& [stamp, frame] : frames_of(recording)) append_rows(rows, frame);
     RobotFolder folder(robot_dir(1));
     ASSERT_TRUE(folder.append("cam0", rows));
   }
@@ -154,6 +169,111 @@ TEST_F(Calibrate, WritesNoCameraFromATurnOnASwivelChair) {
   const auto json = nlohmann::json::parse(report->text);
   EXPECT_FALSE(json["ok"]);
   EXPECT_EQ(json["reasons"].size(), report->reasons.size());
+}
+
+/// All of a recording.
+void add_to(CameraCoverage& coverage, const std::vector<ImuSample>& imu,
+            const std::map<Timestamp, SpotFrame>& frames) {
+  for (const ImuSample& sample : imu) coverage.add(sample);
+  for (const auto& [stamp, frame] : frames) coverage.add(frame);
+}
+
+TEST_F(Calibrate, CoverageNamesTheTurnsThatASwivelChairLacks) {
+  const auto chair = simulated::hand_held(3, {.is_chair = true, .dark_share = 0.0}, ImuNoise{});
+  auto coverage = CameraCoverage::of(config()).value();
+  EXPECT_NE(coverage.missing().at(0).find("no board"), std::string::npos);
+
+  add_to(coverage, chair.imu, frames_of(chair));
+
+  EXPECT_LT(coverage.share(), 1.0);
+  EXPECT_EQ(coverage.boards(), (std::set{RobotId{2}, RobotId{3}}));
+  const std::string text = coverage_text(coverage);
+  EXPECT_NE(text.find("turn more about x (roll)"), std::string::npos) << text;
+  EXPECT_NE(text.find("turn more about y (pitch)"), std::string::npos) << text;
+  EXPECT_EQ(text.find("turn more about z"), std::string::npos) << text;
+}
+
+/// A daemon's socket of recordings that sends a recording, a second of it at a time.
+class FakeDaemon {
+ public:
+  FakeDaemon(const fs::path& socket, const Config& config, const std::vector<ImuSample>& imu,
+             const std::map<Timestamp, SpotFrame>& frames)
+      : listener_(listen_unix(socket).value()) {
+    append_block(blocks_.emplace_back(), "config", write_config(config));
+    auto sample = imu.begin();
+    auto frame = frames.begin();
+    for (Timestamp end = imu.front().stamp; sample != imu.end();) {
+      end += std::chrono::seconds{1};
+      std::string imu_rows;
+      std::string spot_rows;
+      for (; sample != imu.end() && sample->stamp < end; ++sample) append_rows(imu_rows, *sample);
+      for (; frame != frames.end() && frame->first < end; ++frame)
+        append_rows(spot_rows, frame->second);
+      std::string& block = blocks_.emplace_back();
+      if (!imu_rows.empty()) append_block(block, "imu0", imu_rows);
+      if (!spot_rows.empty()) append_block(block, "cam0", spot_rows);
+    }
+    thread_ = std::thread([this] { serve(); });
+  }
+  FakeDaemon(const FakeDaemon&) = delete;
+  FakeDaemon& operator=(const FakeDaemon&) = delete;
+  FakeDaemon(FakeDaemon&&) = delete;
+  FakeDaemon& operator=(FakeDaemon&&) = delete;
+  ~FakeDaemon() { thread_.join(); }
+
+ private:
+  void serve() {
+    constexpr int kPatienceMs = 10'000;
+    pollfd calls{.fd = listener_.get(), .events = POLLIN, .revents = 0};
+    if (::poll(&calls, 1, kPatienceMs) != 1) return;
+    const UniqueFd tool(::accept(listener_.get(), nullptr, nullptr));
+    std::array<char, 256> request{};
+    if (::recv(tool.get(), request.data(), request.size(), 0) <= 0) return;
+    for (const std::string& block : blocks_) {
+      for (std::size_t at = 0; at < block.size();) {
+        const ssize_t sent = ::send(tool.get(), block.data() + at, block.size() - at, MSG_NOSIGNAL);
+        if (sent <= 0) return;
+        at += static_cast<std::size_t>(sent);
+      }
+      sleep_for(std::chrono::milliseconds{5});
+    }
+  }
+
+  UniqueFd listener_;
+  std::vector<std::string> blocks_;
+  std::thread thread_;
+};
+
+TEST_F(Calibrate, LiveRecordsUntilTheCameraHasSeenEnoughAndThenCalibrates) {
+  const auto recording = simulated::hand_held(3, {.dark_share = 0.0}, ImuNoise{});
+  const fs::path socket = scratch_.path() / "record.socket";
+  testing::internal::CaptureStdout();
+  Result<fs::path> folder = fail(ErrorCode::kIo, "not recorded");
+  {
+    const FakeDaemon daemon(socket, config(), recording.imu, frames_of(recording));
+    folder = record_for_camera({.dir = scratch_.path() / "live", .socket = socket, .json = true});
+  }
+  const std::string lines = testing::internal::GetCapturedStdout();
+
+  ASSERT_TRUE(folder) << folder.error().message;
+  const auto first = nlohmann::json::parse(lines.substr(0, lines.find('\n')));
+  EXPECT_EQ(first["cells"].size(), static_cast<std::size_t>(CameraCoverage::kRows));
+  const auto report = calibrate_camera({.robot_dir = *folder,
+                                        .out = etc() / "camchain-imucam.yaml",
+                                        .fov_deg = {},
+                                        .kannala_brandt = false,
+                                        .json = false,
+                                        .on_progress = {}});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_TRUE(report->reasons.empty()) << report->reasons.front();
+  EXPECT_LT(error_px(config().cameras[0].calibration, recording.truth), 0.5);
+}
+
+TEST_F(Calibrate, LiveSaysWhenThereIsNoDaemon) {
+  const auto folder = record_for_camera(
+      {.dir = scratch_.path() / "live", .socket = scratch_.path() / "none.socket", .json = true});
+  ASSERT_FALSE(folder);
+  EXPECT_NE(folder.error().message.find("is crepesd running"), std::string::npos);
 }
 
 TEST_F(Calibrate, WritesWhatTheImuIsOffByAsAFragment) {
