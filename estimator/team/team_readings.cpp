@@ -48,6 +48,7 @@ std::vector<Sight> sights_of(const TeamInterval& interval, const TeamBelief& bel
         .first->second.bearings.push_back(&z);
   }
   std::vector<Sight> all;
+  all.reserve(sights.size());
   for (auto& [key, sight] : sights) all.push_back(std::move(sight));
   return all;
 }
@@ -67,6 +68,7 @@ std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief&
         .first->second.ranges.push_back(&reading);
   }
   std::vector<Ranging> all;
+  all.reserve(rangings.size());
   for (auto& [key, ranging] : rangings) all.push_back(std::move(ranging));
   return all;
 }

@@ -298,9 +298,8 @@ bool TeamTrust::is_misled(const TeamBelief& belief) {
   int fitting = 0;
   std::map<RobotId, int> fitting_of;
   for (const auto& [pair, range] : belief.ranges) {
-    const auto has = [&](auto holds) {
-      return std::ranges::any_of(range.agreement,
-                                 [&](const auto& entry) { return holds(entry.second); });
+    const auto has = [&agreement = range.agreement](auto holds) {
+      return std::ranges::any_of(agreement, [&](const auto& entry) { return holds(entry.second); });
     };
     if (has([](const Agreement& a) { return a.is_contradiction(); })) {
       ++refused;
@@ -349,9 +348,10 @@ void TeamTrust::end_probations(TeamBelief& belief) const {
 
 std::vector<TeamFault> TeamTrust::gyro_faults(Timestamp now) const {
   std::vector<TeamFault> faults;
-  for (const auto& [id, doubt] : gyro_doubts_)
+  for (const auto& [id, doubt] : gyro_doubts_) {
     if (doubt.found && now - *doubt.found < kGyroRefusal)
       faults.push_back({id, TeamFault::Kind::kGyro, doubt.rate_radps});
+  }
   return faults;
 }
 

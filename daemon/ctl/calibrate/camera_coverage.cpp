@@ -18,8 +18,8 @@ using Json = nlohmann::ordered_json;
 constexpr int kLeastSightings = 3;       // of a cell
 constexpr double kWholePicture = 0.9;    // of the cells inside the circle
 constexpr double kEnoughTurning = 0.25;  // rad/s RMS about each axis; 0.2 are required
-constexpr double kEnoughSeconds = 55.0;
-constexpr double kLongestStep_s = 0.1;  // between sightings that are one stretch of time
+constexpr double kEnoughSeconds = 55.0;  // with a board in view
+constexpr double kLongestStep = 0.1;     // s; between sightings that are one stretch of time
 constexpr std::array<std::string_view, 3> kAxisNames{"x (roll)", "y (pitch)", "z (yaw)"};
 
 char symbol_of(const CameraCoverage& coverage, int row, int column) {
@@ -80,7 +80,7 @@ void CameraCoverage::add(const SpotFrame& frame) {
     boards_.insert(bearing.neighbor);
   }
   if (bearings.empty()) return;
-  if (last_seen_) seen_s_ += std::clamp(to_seconds(frame.stamp - *last_seen_), 0.0, kLongestStep_s);
+  if (last_seen_) seen_s_ += std::clamp(to_seconds(frame.stamp - *last_seen_), 0.0, kLongestStep);
   last_seen_ = frame.stamp;
 }
 
@@ -130,27 +130,31 @@ double CameraCoverage::share() const {
 std::vector<std::string> CameraCoverage::missing() const {
   std::vector<std::string> missing;
   if (share() >= 1.0) return missing;
-  if (boards_.empty())
+  if (boards_.empty()) {
     return {
         "no board is recognized: are the patterns in swarm.members, are the boards in view, is "
         "the exposure right?"};
+  }
   for (const bool is_low : {false, true}) {
     for (const bool is_right : {false, true}) {
-      if (picture_of(is_low, is_right) < kWholePicture)
+      if (picture_of(is_low, is_right) < kWholePicture) {
         missing.push_back(fmt::format("turn until a board crosses all of the {} {} quarter",
                                       is_low ? "lower" : "upper", is_right ? "right" : "left"));
+      }
     }
   }
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    if (rate_rms_radps()(axis) < kEnoughTurning)
+    if (rate_rms_radps()(axis) < kEnoughTurning) {
       missing.push_back(fmt::format("turn more about {}: {:.0f} of {:.0f} deg/s",
                                     kAxisNames.at(static_cast<std::size_t>(axis)),
                                     kDegPerRad * rate_rms_radps()(axis),
                                     kDegPerRad * kEnoughTurning));
+    }
   }
-  if (seen_s_ < kEnoughSeconds)
+  if (seen_s_ < kEnoughSeconds) {
     missing.push_back(fmt::format("{:.0f} more seconds with a board in view",
                                   std::ceil(kEnoughSeconds - seen_s_)));
+  }
   return missing;
 }
 
