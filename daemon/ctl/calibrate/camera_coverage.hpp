@@ -64,8 +64,8 @@ class CameraCoverage {
 
 /// For a terminal: the picture's cells, the turns, a bar, and what is missing.
 [[nodiscard]] std::string coverage_text(const CameraCoverage& coverage);
-/// The same as one JSON line: `cells` has a string for each row, `#` seen, `.` not yet, a blank
-/// outside the image circle.
+/// The same as one JSON line. `cells` has a string for each row of the picture: a hash for a cell
+/// that was seen, a dot for one that was not yet, a blank outside the image circle.
 [[nodiscard]] std::string coverage_json(const CameraCoverage& coverage);
 
 }  // namespace crepes
