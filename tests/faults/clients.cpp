@@ -9,7 +9,7 @@ namespace crepes::faults {
 namespace {
 
 constexpr double kRenewal_s = 1.0;
-constexpr std::size_t kMostComplaints = 4;
+constexpr std::size_t kMostClientComplaints = 4;
 const Endpoint kHonest = Endpoint::ipv4({127, 0, 0, 1}, 5000);
 constexpr std::string_view kWatch = R"({"class":"WATCH","rate_hz":10})";
 
@@ -111,7 +111,7 @@ void Clients::misbehave(const Fault& fault, Served& at, Timestamp now) {
 }
 
 void Clients::complain(std::string what) {
-  if (complaints_.size() < kMostComplaints) complaints_.push_back(std::move(what));
+  if (complaints_.size() < kMostClientComplaints) complaints_.push_back(std::move(what));
 }
 
 }  // namespace crepes::faults

@@ -12,7 +12,7 @@
 namespace crepes::faults {
 namespace {
 
-constexpr double kStep_s = 0.1;
+constexpr double kCheckPeriod_s = 0.1;
 constexpr std::size_t kPatience = 15;             // steps until a reading must have a verdict
 constexpr std::uint64_t kMostGrowth = 64 << 20U;  // bytes of heap, of the whole swarm
 constexpr std::size_t kMostComplaints = 4;        // they come again at every step
@@ -96,7 +96,7 @@ void Flight::fly_until(double true_s) {
     if (next_check_s_ > now_s_) continue;
     clients_.step(now_s_);
     check();
-    next_check_s_ += kStep_s;
+    next_check_s_ += kCheckPeriod_s;
   }
 }
 

@@ -7,8 +7,7 @@
 namespace crepes::faults {
 namespace {
 
-constexpr double kBeyond5Sigma = 35.0;  // Mahalanobis^2 of the position
-constexpr double kLongestGap_s = 0.1;   // between poses that follow each other
+constexpr double kLongestGap_s = 0.1;  // between poses that follow each other
 constexpr double kWindow_s = 0.3;
 
 }  // namespace

@@ -17,6 +17,9 @@ struct Span {
   [[nodiscard]] bool contains(double t_s) const { return t_s >= from_s && t_s <= to_s; }
 };
 
+/// A position of which Mahalanobis^2 is above this is off by more than 5 sigma (one in 10^7).
+inline constexpr double kBeyond5Sigma = 35.0;
+
 struct PoseError {
   double true_s = 0.0;
   double error_m = 0.0;

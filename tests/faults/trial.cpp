@@ -40,7 +40,6 @@ double allowed_rmse_m(double reference_m) { return 2.0 * reference_m + 0.03; }
 
 /// Poses of a robot that is switched off or frozen: while they are published, they are honest.
 bool is_ghost(const std::vector<Fault>& faults, RobotId robot, const PoseError& pose) {
-  constexpr double kBeyond5Sigma = 35.0;
   return !(pose.mahalanobis2 <= kBeyond5Sigma) &&
          std::ranges::any_of(faults, [&](const Fault& fault) {
            const bool is_gone = fault.kind == Kind::kReboot || fault.kind == Kind::kFreeze;

@@ -24,7 +24,7 @@ Eigen::Vector3d mean_of(const Series& x) {
 
 }  // namespace
 
-ImuNoise imu_noise(const RobotRecording& robot, const TrueMotion& truth) {
+MeasuredImuNoise imu_noise(const RobotRecording& robot, const TrueMotion& truth) {
   const double period_s = 1.0 / robot.config.imu.noise.update_rate;
   Series gyro;
   Series accel;

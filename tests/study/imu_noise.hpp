@@ -8,7 +8,7 @@
 
 namespace crepes::study {
 
-struct ImuNoise {
+struct MeasuredImuNoise {
   double gyro_density = 0.0;   ///< white, vibration included [rad/s/sqrt(Hz)]
   double accel_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
   Eigen::Vector3d gyro_bias_radps = Eigen::Vector3d::Zero();  ///< mean of measured minus true
@@ -17,6 +17,6 @@ struct ImuNoise {
 
 /// Densities from fourth differences of measured minus true, in which motion, seen as means over a
 /// sample here and at instants there, cancels.
-[[nodiscard]] ImuNoise imu_noise(const RobotRecording& robot, const TrueMotion& truth);
+[[nodiscard]] MeasuredImuNoise imu_noise(const RobotRecording& robot, const TrueMotion& truth);
 
 }  // namespace crepes::study

@@ -88,8 +88,8 @@ class Recursion {
         their_(member_of(swarm.dataset, neighbor)),
         priors_(priors),
         P_(prior(priors)) {
-    const ImuNoise body = imu_noise(recording_of(swarm.dataset, observer), body_);
-    const ImuNoise other = imu_noise(recording_of(swarm.dataset, neighbor), other_);
+    const MeasuredImuNoise body = imu_noise(recording_of(swarm.dataset, observer), body_);
+    const MeasuredImuNoise other = imu_noise(recording_of(swarm.dataset, neighbor), other_);
     density_ << Vector3d::Constant(body.gyro_density), Vector3d::Constant(body.accel_density),
         Vector3d::Constant(other.gyro_density), Vector3d::Constant(other.accel_density);
   }

@@ -10,7 +10,7 @@
 namespace crepes::study {
 namespace {
 
-constexpr double kPeriod = 0.02;  // s, of a module of up to five
+constexpr double kRangingPeriod = 0.02;  // s, of a module of up to five
 constexpr std::size_t kModulesAtOnce = 5;
 constexpr std::uint64_t kLateKey = 0x6c617465U;
 constexpr double kThroughBias = 0.3;    // m; through a pillar, as in the simulated world
@@ -78,7 +78,7 @@ std::vector<UwbRange> simulated_ranges(const SimWorld& world, const Config& conf
   // Modules take turns.
   const double phase_s = 0.004 * self.value;
   const auto rounds = std::max<std::size_t>(config.swarm.members.size() / kModulesAtOnce, 1);
-  const double period_s = kPeriod * static_cast<double>(rounds);
+  const double period_s = kRangingPeriod * static_cast<double>(rounds);
   for (int i = 0; i * period_s + phase_s <= duration_s; ++i) {
     const double t = i * period_s + phase_s;
     const auto bytes = module.sample(t);

@@ -20,8 +20,8 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-constexpr double kStep = 0.01;    // s
-constexpr double kPeriod = 0.02;  // s; of published poses and of updates
+constexpr double kMotionStep = 0.01;    // s
+constexpr double kUpdatePeriod = 0.02;  // s; of published poses and of updates
 // Nothing is known of the relative motion at first.
 constexpr double kFirstPosition = 10.0;  // m
 constexpr double kFirstSpeed = 2.0;      // m/s
@@ -137,7 +137,7 @@ class Team {
   Layout layout_;
   std::vector<MemberConfig> members_;
   std::vector<TrueMotion> motions_;
-  std::vector<ImuNoise> noises_;
+  std::vector<MeasuredImuNoise> noises_;
   MatrixXd P_;
   MatrixXd information_;  ///< of what was measured since the last update
 };
@@ -178,7 +178,7 @@ struct Transition {
   Driven G_reference;  ///< by R's IMU
 };
 
-Eigen::Matrix<double, 6, 1> variances(const ImuNoise& noise) {
+Eigen::Matrix<double, 6, 1> variances(const MeasuredImuNoise& noise) {
   Eigen::Matrix<double, 6, 1> density;
   density << Vector3d::Constant(noise.gyro_density), Vector3d::Constant(noise.accel_density);
   return density.cwiseAbs2();
@@ -186,8 +186,8 @@ Eigen::Matrix<double, 6, 1> variances(const ImuNoise& noise) {
 
 /// Euler's step in the frame that turns with the reference R:
 ///   p' = v - w_R x p,  v' = R f_N - f_R - w_R x v,  theta' = w_N - R^T w_R - w_N x theta
-Transition transition_of(const Truth& x, const MotionSample& reference, const ImuNoise& noise,
-                         double dt, Index constants) {
+Transition transition_of(const Truth& x, const MotionSample& reference,
+                         const MeasuredImuNoise& noise, double dt, Index constants) {
   const Matrix3d R = x.T_R_N.R();
   MotionMatrix A = MotionMatrix::Zero();
   A.block<3, 3>(kP, kP) = -hat(reference.w_B);
@@ -389,10 +389,10 @@ TeamBound team_bound(const Swarm& swarm, const SensorPriors& priors, double afte
   Team team(swarm, priors);
   std::map<std::pair<RobotId, RobotId>, Roots> roots;
   auto next = readings.begin();
-  for (int i = 0; (i + 1) * kPeriod < swarm.dataset.manifest.duration_s; ++i) {
-    const double end = (i + 1) * kPeriod;
-    team.propagate(i * kPeriod, kStep);
-    team.propagate(i * kPeriod + kStep, kStep);
+  for (int i = 0; (i + 1) * kUpdatePeriod < swarm.dataset.manifest.duration_s; ++i) {
+    const double end = (i + 1) * kUpdatePeriod;
+    team.propagate(i * kUpdatePeriod, kMotionStep);
+    team.propagate(i * kUpdatePeriod + kMotionStep, kMotionStep);
     for (; next != readings.end() && next->true_s <= end; ++next) {
       if (next->sighting != nullptr) {
         team.see(next->from, next->to, *next->sighting, next->sigma, end);

@@ -123,8 +123,8 @@ TEST(SimulatedSwarm, IsAsNoisyAsTheRecordings) {
   const auto noise_of = [&](RobotId robot) {
     return imu_noise(recording_of(swarm.dataset, robot), TrueMotion(swarm.truth, robot, 20.0));
   };
-  const ImuNoise flying = noise_of(RobotId{1});
-  const ImuNoise driving = noise_of(RobotId{2});
+  const MeasuredImuNoise flying = noise_of(RobotId{1});
+  const MeasuredImuNoise driving = noise_of(RobotId{2});
   const OneWay seen = true_sightings(swarm, RobotId{1}, RobotId{3});
 
   // What the recorded set of the same name shows.
