@@ -1,5 +1,5 @@
-/* Preloaded into a program, makes its monotonic clock slower by the factor in SLOWER, and its waits as much longer:
- * for a robot whose processor is slower than the world that it simulates. */
+/* Preloaded into a program, makes its monotonic clock slower by the factor in SLOWER, and its waits
+ * as much longer: for a robot whose processor is slower than the world that it simulates. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <poll.h>
@@ -22,31 +22,31 @@ static struct timespec scaled(struct timespec t, double factor) {
   return (struct timespec){.tv_sec = whole / 1000000000, .tv_nsec = whole % 1000000000};
 }
 
-int clock_gettime(clockid_t clock, struct timespec *time) {
+int clock_gettime(clockid_t clock, struct timespec* time) {
   const int result = (int)syscall(SYS_clock_gettime, clock, time);
   if (result == 0 && clock == CLOCK_MONOTONIC) *time = scaled(*time, 1 / slower());
   return result;
 }
 
-int nanosleep(const struct timespec *time, struct timespec *rest) {
+int nanosleep(const struct timespec* time, struct timespec* rest) {
   const struct timespec longer = scaled(*time, slower());
   return (int)syscall(SYS_nanosleep, &longer, rest);
 }
 
-int poll(struct pollfd *watched, nfds_t count, int timeout_ms) {
+int poll(struct pollfd* watched, nfds_t count, int timeout_ms) {
   const int longer = timeout_ms > 0 ? (int)(timeout_ms * slower()) : timeout_ms;
   return (int)syscall(SYS_poll, watched, count, longer);
 }
 
-int sigtimedwait(const sigset_t *signals, siginfo_t *info, const struct timespec *time) {
+int sigtimedwait(const sigset_t* signals, siginfo_t* info, const struct timespec* time) {
   const struct timespec longer = time ? scaled(*time, slower()) : (struct timespec){0};
   return (int)syscall(SYS_rt_sigtimedwait, signals, info, time ? &longer : NULL, _NSIG / 8);
 }
 
-int pthread_cond_clockwait(pthread_cond_t *condition, pthread_mutex_t *mutex, clockid_t clock,
-                           const struct timespec *end) {
-  static int (*real)(pthread_cond_t *, pthread_mutex_t *, clockid_t, const struct timespec *);
-  if (!real) *(void **)&real = dlsym(RTLD_NEXT, "pthread_cond_clockwait");
+int pthread_cond_clockwait(pthread_cond_t* condition, pthread_mutex_t* mutex, clockid_t clock,
+                           const struct timespec* end) {
+  static int (*real)(pthread_cond_t*, pthread_mutex_t*, clockid_t, const struct timespec*);
+  if (!real) *(void**)&real = dlsym(RTLD_NEXT, "pthread_cond_clockwait");
   const struct timespec later = clock == CLOCK_MONOTONIC ? scaled(*end, slower()) : *end;
   return real(condition, mutex, clock, &later);
 }
