@@ -113,9 +113,9 @@ class LibcameraCamera final : public Camera {
 
 Result<std::unique_ptr<Camera>> open_libcamera_camera(const CameraConfig& config,
                                                       std::uint8_t index, const Clock& clock) {
-  return open_libcamera_device(config).map([&](std::unique_ptr<LibcameraDevice> device) {
-    return make_libcamera_camera(std::move(device), config, index, clock);
-  });
+  Result<std::unique_ptr<LibcameraDevice>> device = open_libcamera_device(config);
+  if (!device) return tl::unexpected(device.error());
+  return make_libcamera_camera(std::move(*device), config, index, clock);
 }
 
 std::unique_ptr<Camera> make_libcamera_camera(std::unique_ptr<LibcameraDevice> device,

@@ -22,6 +22,7 @@ namespace {
 namespace lc = libcamera;
 
 constexpr unsigned kBuffers = 6;
+constexpr std::uint32_t kGone = UINT32_MAX;  // in place of a buffer: the camera is gone
 
 tl::unexpected<Error> refusal(const std::string& what, int negative_errno) {
   return fail(ErrorCode::kIo,
@@ -96,26 +97,27 @@ class MappedPlane {
   std::size_t length_ = 0;
 };
 
-/// Values on their way from other threads to ours. A value is written as a whole or not at all;
-/// there are fewer buffers than values fit into a pipe.
-template <class T>
-class Pipe {
+/// Numbers of buffers on their way from other threads to ours. A number is written as a whole or
+/// not at all; there are fewer buffers than numbers fit into a pipe.
+class BufferPipe {
  public:
-  Pipe() {
+  BufferPipe() {
     std::array<int, 2> ends{-1, -1};
     if (::pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0) return;
     out_ = UniqueFd(ends[0]);
     in_ = UniqueFd(ends[1]);
   }
   [[nodiscard]] bool is_open() const { return static_cast<bool>(in_); }
-  void push(T value) const { static_cast<void>(::write(in_.get(), &value, sizeof value)); }
-  [[nodiscard]] std::optional<T> pop(std::chrono::milliseconds timeout) const {
+  void push(std::uint32_t buffer) const {
+    static_cast<void>(::write(in_.get(), &buffer, sizeof buffer));
+  }
+  [[nodiscard]] std::optional<std::uint32_t> pop(std::chrono::milliseconds timeout) const {
     pollfd waiting{.fd = out_.get(), .events = POLLIN, .revents = 0};
-    T value{};
+    std::uint32_t buffer = 0;
     if (::poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0 ||
-        ::read(out_.get(), &value, sizeof value) != sizeof value)
+        ::read(out_.get(), &buffer, sizeof buffer) != sizeof buffer)
       return std::nullopt;
-    return value;
+    return buffer;
   }
 
  private:
@@ -158,12 +160,12 @@ class RunningCamera final : public LibcameraDevice {
   [[nodiscard]] Result<std::optional<LibcameraFrame>> next(
       std::chrono::milliseconds timeout) override {
     while (const auto buffer = returned_.pop(std::chrono::milliseconds::zero())) queue(*buffer);
-    const std::optional<lc::Request*> completed = completed_.pop(timeout);
+    const std::optional<std::uint32_t> completed = completed_.pop(timeout);
     if (!completed) return std::optional<LibcameraFrame>{};
-    lc::Request* const request = *completed;
-    if (request == nullptr || request->status() == lc::Request::RequestCancelled)
+    const std::uint32_t buffer = *completed;
+    if (buffer == kGone || requests_[buffer]->status() == lc::Request::RequestCancelled)
       return fail(ErrorCode::kIo, fmt::format("{}: the camera is gone", camera_->id()));
-    const auto buffer = static_cast<std::uint32_t>(request->cookie());
+    lc::Request* const request = requests_[buffer].get();
     mapped_[buffer].sync(DMA_BUF_SYNC_START);
     const lc::FrameMetadata& metadata = request->buffers().begin()->second->metadata();
     LibcameraFrame frame{.buffer = buffer,
@@ -274,13 +276,15 @@ class RunningCamera final : public LibcameraDevice {
     if (light_.gain) controls.set(lc::controls::AnalogueGain, static_cast<float>(*light_.gain));
   }
 
-  void on_completed(lc::Request* request) { completed_.push(request); }
-  void on_disconnected() { completed_.push(nullptr); }
+  void on_completed(lc::Request* request) {
+    completed_.push(static_cast<std::uint32_t>(request->cookie()));
+  }
+  void on_disconnected() { completed_.push(kGone); }
 
   std::shared_ptr<lc::Camera> camera_;
   lc::FrameBufferAllocator allocator_;
-  Pipe<lc::Request*> completed_;  // from libcamera's thread; null: the camera is gone
-  Pipe<std::uint32_t> returned_;  // from the threads that were done with a frame
+  BufferPipe completed_;  // from libcamera's thread
+  BufferPipe returned_;   // from the threads that were done with a frame
   LibcameraStream stream_;
   lc::Stream* stream_of_camera_ = nullptr;
   std::vector<MappedPlane> mapped_;
