@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kFirstResidual = 5;
 constexpr std::size_t kFirstReading = kFirstResidual + 2 * Fusion::kMaxDimension;
-constexpr std::size_t kInnovationColumns = kFirstReading + std::tuple_size_v<Reading>;
+constexpr std::size_t kInnovationColumns = kFirstReading + std::tuple_size_v<SensorReading>;
 constexpr std::size_t kStates = CalibrationRecord::kNames.size();
 
 void append_cell(std::string& text, double value) {
@@ -95,7 +95,8 @@ Result<std::vector<Record>> read_file(const std::filesystem::path& file, std::si
 std::string innovation_file_header() {
   std::string header = "t_ns,kind,verdict,nis,dof";
   for (std::size_t i = 0; i < Fusion::kMaxDimension; ++i) header += fmt::format(",r{0},s{0}", i);
-  for (std::size_t i = 0; i < std::tuple_size_v<Reading>; ++i) header += fmt::format(",z{}", i);
+  for (std::size_t i = 0; i < std::tuple_size_v<SensorReading>; ++i)
+    header += fmt::format(",z{}", i);
   return header;
 }
 

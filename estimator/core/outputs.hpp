@@ -131,7 +131,7 @@ struct Fusion {
 
 /// What a sensor read, as it came: of a bearing u and the camera's place, both in the seeing
 /// robot's body; of a range the distance [m]. Poses have no numbers.
-using Reading = std::array<double, 6>;
+using SensorReading = std::array<double, 6>;
 
 [[nodiscard]] constexpr std::size_t reading_size(MeasurementKind kind) {
   constexpr std::array<std::size_t, kMeasurementKindCount> kSizes{6, 6, 1, 1, 0, 0};
@@ -144,13 +144,13 @@ struct MeasurementRecord {
   Timestamp stamp{};  ///< when it was taken
   MeasurementKind kind = MeasurementKind::kBearing;
   Fusion fusion;
-  Reading reading{};
+  SensorReading reading{};
 };
 
 struct NewestReading {
   Timestamp stamp{};  ///< when it was taken
   Verdict verdict = Verdict::kNoState;
-  Reading reading{};
+  SensorReading reading{};
 };
 
 /// The sensor calibration that the tight filter estimates.

@@ -34,7 +34,7 @@ struct Measurement {
 };
 
 /// What the sensor read; empty for poses.
-[[nodiscard]] Reading reading_of(const Measurement& measurement);
+[[nodiscard]] SensorReading reading_of(const Measurement& measurement);
 
 /// The measurements at the front of `ordered` with the same kind, stamp and camera. They are
 /// alternatives: at most one of them is true. `ordered` must not be empty.

@@ -10,7 +10,7 @@ bool is_range(MeasurementKind kind) {
 }  // namespace
 
 void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion,
-                     const Reading& reading) {
+                     const SensorReading& reading) {
   ++counts_[static_cast<std::size_t>(kind)][static_cast<std::size_t>(fusion.verdict)];
   // Of alternatives, which have the same stamp, the one that was fused.
   std::optional<NewestReading>& newest = newest_[static_cast<std::size_t>(kind)];

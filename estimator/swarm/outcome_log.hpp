@@ -16,7 +16,7 @@ class OutcomeLog {
   [[nodiscard]] Records drain_records() { return std::exchange(records_, {}); }
 
   void add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion,
-           const Reading& reading = {});
+           const SensorReading& reading = {});
   void add(std::optional<CalibrationRecord> calibration);
   [[nodiscard]] bool keeps_records() const { return keeps_records_; }
 

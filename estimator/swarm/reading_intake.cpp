@@ -43,7 +43,7 @@ bool ReadingIntake::add_range(const UwbRange& range, MeasurementKind kind) {
 void ReadingIntake::enqueue(Measurement measurement) {
   const MeasurementKind kind = measurement.kind;
   const Timestamp stamp = measurement.stamp;
-  const Reading reading = reading_of(measurement);
+  const SensorReading reading = reading_of(measurement);
   const bool is_pose = kind == MeasurementKind::kRawPose || kind == MeasurementKind::kGraphPose;
   if (!is_pose && !settings_.traits.fuses_single_readings) return;
   if (!buffer_.push(std::move(measurement))) {

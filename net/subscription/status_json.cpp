@@ -105,19 +105,19 @@ Json measured_json(const NeighborStatus& neighbor) {
   Json json = Json::object();
   const auto put_reading = [&](MeasurementKind kind, const auto& about) {
     const auto& newest = neighbor.newest.at(static_cast<std::size_t>(kind));
-    if (!newest || newest->reading == Reading{} || !is_finite(*newest)) return;
+    if (!newest || newest->reading == SensorReading{} || !is_finite(*newest)) return;
     Json& one = json[std::string(name_of(kind))] = about(newest->reading);
     if (newest->verdict == Verdict::kGated) one["gated"] = true;
   };
   const auto bearing_to = [](const Eigen::Vector3d& ring) {
-    return [&ring](const Reading& z) {
+    return [&ring](const SensorReading& z) {
       return Json{{"u", numbers_json(std::span(z).first(3))},
                   {"from", numbers_json(std::span(z).last(3))},
                   {"to", vector_json(ring)}};
     };
   };
   const PairMounting& mounting = neighbor.mounting;
-  const auto range = [&mounting](const Reading& z) {
+  const auto range = [&mounting](const SensorReading& z) {
     return Json{{"m", numbers_json(std::span(z).first(1))[0]},
                 {"from", vector_json(mounting.p_B_U)},
                 {"to", vector_json(mounting.p_N_Q)}};

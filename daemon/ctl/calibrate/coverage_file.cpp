@@ -15,8 +15,8 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr std::uintmax_t kMaxBytes = 8192;
-constexpr std::chrono::seconds kMaxAge{5};  // it is written once a second
+constexpr std::uintmax_t kMaxCoverageBytes = 8192;
+constexpr std::chrono::seconds kMaxCoverageAge{5};  // it is written once a second
 
 fs::path file_beside(const fs::path& socket) { return fs::path(socket) += ".coverage"; }
 
@@ -47,8 +47,8 @@ std::optional<std::string> read_coverage(const fs::path& socket) {
   const fs::path file = file_beside(socket);
   std::error_code status;
   const auto written = fs::last_write_time(file, status);
-  if (status || fs::file_time_type::clock::now() - written > kMaxAge) return std::nullopt;
-  const auto text = read_text_file(file, kMaxBytes);
+  if (status || fs::file_time_type::clock::now() - written > kMaxCoverageAge) return std::nullopt;
+  const auto text = read_text_file(file, kMaxCoverageBytes);
   if (!text) return std::nullopt;
   const Json json = Json::parse(*text, nullptr, /*allow_exceptions=*/false);
   return is_coverage(json) ? std::optional(dump(json)) : std::nullopt;

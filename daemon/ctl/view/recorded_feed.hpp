@@ -29,9 +29,10 @@ class RecordedFeed {
   /// `field_of_view_json`), `mounting` (`led`, `uwb` in its body), both from the data set's
   /// configuration, and `neighbors` with `name`, `mounting`, `rows` (see `pose_row`), `truth` (see
   /// `truth_row`), and after `replay --debug-innovations` `innovations` (t, kind, verdict, NIS by
-  /// degree of freedom or null, then what was measured, see `Reading`), `gated` (t, measurements a
-  /// second) and `calibrations` (t, then the values of CalibrationRecord). Times are true time if
-  /// there is truth, otherwise seconds since the observer's first row. At most 25 rows a second.
+  /// degree of freedom or null, then what was measured, see `SensorReading`), `gated` (t,
+  /// measurements a second) and `calibrations` (t, then the values of CalibrationRecord). Times are
+  /// true time if there is truth, otherwise seconds since the observer's first row. At most 25 rows
+  /// a second.
   [[nodiscard]] Result<std::string> json_of(const std::string& observer) const;
 
  private:

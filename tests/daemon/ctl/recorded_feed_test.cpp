@@ -59,13 +59,13 @@ TEST_F(RecordedFeedTest, HasThinnedPosesOnTheTruthsTimeAndTheTruth) {
 
 TEST_F(RecordedFeedTest, HasMeasurementsAsTheyCameWithAgesAndWhatWasGated) {
   const auto record = [](Duration t, MeasurementKind kind, Verdict verdict,
-                         const Reading& reading) {
+                         const SensorReading& reading) {
     return MeasurementRecord{.stamp = Timestamp{10s + t},
                              .kind = kind,
                              .fusion = {.verdict = verdict, .nis = 3.0, .dimension = 2},
                              .reading = reading};
   };
-  const Reading ahead{1.0, 0.0, 0.0, 0.06, 0.0, 0.01};
+  const SensorReading ahead{1.0, 0.0, 0.0, 0.06, 0.0, 0.01};
   std::string rows = innovation_file_header() + "\n";
   // In the order of the verdicts, which is not that of time.
   append_innovation_row(rows, record(60ms, MeasurementKind::kRange, Verdict::kGated, {1.5}));

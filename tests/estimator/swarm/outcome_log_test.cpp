@@ -42,7 +42,7 @@ TEST(OutcomeLog, KeepsTheNewestReadingOfEachKindAndOfAlternativesTheFusedOne) {
   const auto& newest = status.newest[static_cast<std::size_t>(MeasurementKind::kBearing)];
   EXPECT_EQ(newest.value().stamp, t);
   EXPECT_EQ(newest.value().verdict, Verdict::kFused);
-  EXPECT_EQ(newest.value().reading, (Reading{0.0, 1.0, 0.0}));
+  EXPECT_EQ(newest.value().reading, (SensorReading{0.0, 1.0, 0.0}));
   EXPECT_FALSE(status.newest[static_cast<std::size_t>(MeasurementKind::kRange)]);
 }
 

@@ -276,7 +276,7 @@ TEST(SubscriptionJson, ReportsWhatWasMeasuredAsItCame) {
                        .p_B_U = {-0.04, 0.02, 0.1},
                        .p_N_M = {0.0, 0.0, 0.3},
                        .p_N_Q = {0.0, 0.0, 0.2}};
-  const auto put = [&](MeasurementKind kind, Verdict verdict, const Reading& reading) {
+  const auto put = [&](MeasurementKind kind, Verdict verdict, const SensorReading& reading) {
     neighbor.newest.at(static_cast<std::size_t>(kind)) =
         NewestReading{status.stamp, verdict, reading};
   };

@@ -57,7 +57,7 @@ export function poseBetween(rows, t, column) {
   return { p: mixed.slice(0, 3), q: mixed.slice(3).map((x) => x / length) };
 }
 
-/** A row of innovations as STATUS says it; see `Reading` in outputs.hpp. */
+/** A row of innovations as STATUS says it; see `SensorReading` in outputs.hpp. */
 function readingOf(row, ours, theirs) {
   const z = row.slice(READING);
   const about = { t: row[T], gated: row[2] === GATED };
