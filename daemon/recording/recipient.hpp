@@ -47,7 +47,7 @@ class Recipient {
 
  private:
   [[nodiscard]] bool read_requests();
-  [[nodiscard]] bool take(const std::string& line);
+  [[nodiscard]] bool parse_request(const std::string& line);
   [[nodiscard]] bool send_some();
 
   UniqueFd socket_;

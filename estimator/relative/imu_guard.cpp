@@ -149,7 +149,8 @@ void ImuGuard::compare(const ImuSample& sample) {
   // The scale learns from refused samples too: a vibration that begins must not be refused for
   // long.
   if (reference_ && !has_jumped_)
-    learn(innovation(sample, held_count_ > 0 ? reference_of_held(held_count_ - 1) : *reference_));
+    update_sigmas(
+        innovation(sample, held_count_ > 0 ? reference_of_held(held_count_ - 1) : *reference_));
   const bool is_in_doubt = held_count_ > 0 || has_jumped_;
   if (reference_ && is_in_doubt) {
     judge(sample);
@@ -160,7 +161,7 @@ void ImuGuard::compare(const ImuSample& sample) {
   }
 }
 
-void ImuGuard::learn(const PerSensor& innovation) {
+void ImuGuard::update_sigmas(const PerSensor& innovation) {
   gyro_.add(innovation.gyro);
   accel_.add(innovation.accel);
 }
@@ -309,7 +310,7 @@ bool ImuGuard::held_are_plausible() const {
 
 void ImuGuard::restart_from_held() {
   for (std::size_t i = 2; i < held_count_; ++i)
-    learn(innovation(held_.at(i), reference_of_held(i - 1)));
+    update_sigmas(innovation(held_.at(i), reference_of_held(i - 1)));
   reference_.reset();
   force_.setZero();
   believe_held(0);

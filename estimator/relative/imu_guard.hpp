@@ -81,7 +81,7 @@ class ImuGuard {
 
   void compare(const ImuSample& sample);
   void judge(const ImuSample& sample);
-  void learn(const PerSensor& innovation);
+  void update_sigmas(const PerSensor& innovation);
   void believe(const ImuSample& sample);
   void believe_held(std::size_t from);
   void drop_held(ImuFault fault);

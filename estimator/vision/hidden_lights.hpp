@@ -34,14 +34,15 @@ class HiddenLights {
     double stranger = 0.0;  ///< the probability that it is another light
   };
 
-  /// The body turned: R_now_before.
-  void turn(const Eigen::Quaterniond& R_now_before);
+  /// Expresses all directions in the axes of the body as it is now.
+  void rotate_frame(const Eigen::Quaterniond& R_now_before);
   /// Drops what has been hidden for too long. The evidence of what is dropped here or by add() goes
   /// to `unused`.
   void drop_old(Timestamp now, std::vector<BlinkEvidence>& unused);
   void add(HiddenLight light, std::vector<BlinkEvidence>& unused);
-  /// The hidden light that `u_B` continues; empty if none is expected there, or several are alike.
-  [[nodiscard]] std::optional<Return> take(const Eigen::Vector3d& u_B, Timestamp now);
+  /// Removes and returns the hidden light that `u_B` continues. Empty if none is expected there, or
+  /// if several are equally likely.
+  [[nodiscard]] std::optional<Return> extract_match(const Eigen::Vector3d& u_B, Timestamp now);
 
  private:
   std::vector<HiddenLight> lights_;

@@ -20,11 +20,11 @@ class HotPixelMap {
   /// Nothing is allocated later.
   HotPixelMap();
 
-  /// Looks at all suspects in the next picture; they shine from `level` on.
-  void look(const GrayImage& image, int level);
-  /// A pixel of a speck of light. Takes effect with the next look().
+  /// Updates all suspects with the next picture. A pixel shines if it is at least `level`.
+  void add_frame(const GrayImage& image, int level);
+  /// A pixel of a speck of light. Takes effect with the next add_frame().
   void suspect(int u, int v);
-  /// Whether a suspect that is new would be taken before the next look().
+  /// Whether a suspect that is new would be taken before the next add_frame().
   [[nodiscard]] bool has_room() const;
 
   /// Ordered by row and column, with the median of their neighbors in the last picture.

@@ -55,7 +55,7 @@ class PhaseMemory {
     Timestamp learned{};
   };
 
-  void learn(const CodeMatch& match, Timestamp now);
+  void update(const CodeMatch& match, Timestamp now);
   [[nodiscard]] std::optional<Phase> of(std::size_t code) const {
     return code < phases_.size() ? phases_[code] : std::nullopt;
   }
@@ -95,7 +95,7 @@ class IdDecoder {
   /// Whether resume() has something to go by.
   [[nodiscard]] static bool is_worth_keeping(const BlinkEvidence& evidence);
   /// Stores the phase in `known` if the board has been identified for two periods.
-  void learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const;
+  void update_phase(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const;
 
   /// The robot whose board the track is; empty while undecided or in doubt.
   [[nodiscard]] std::optional<RobotId> id_of(const BlinkEvidence& evidence) const;

@@ -47,12 +47,12 @@ class MeshRelay {
   void set_period(Duration period) { period_ = period; }
 
   /// A datagram without the mark arrived: its sender is heard directly.
-  void note_heard(RobotId sender, const Endpoint& from, Timestamp at) {
+  void record_heard(RobotId sender, const Endpoint& from, Timestamp at) {
     neighbors_[sender].heard = at;
     neighbors_[sender].address = from;
   }
   /// The neighbor says that it hears `other` directly.
-  void note_hears(RobotId neighbor, RobotId other, Timestamp at) {
+  void record_hears(RobotId neighbor, RobotId other, Timestamp at) {
     neighbors_[neighbor].hears[other] = at;
   }
 
@@ -64,7 +64,7 @@ class MeshRelay {
   void offer(const DatagramId& id, std::span<const std::uint8_t> bytes, const Endpoint& from,
              Timestamp now);
   /// A datagram arrived again. True if it is one that was offered.
-  bool note_copy(const DatagramId& id, const Endpoint& from);
+  bool record_copy(const DatagramId& id, const Endpoint& from);
   /// When `take_due` should be called next; empty if nothing waits.
   [[nodiscard]] std::optional<Timestamp> next_due() const;
   /// What to broadcast now, the newest first.
@@ -87,7 +87,7 @@ class MeshRelay {
 
   /// Robots that are heard and hear none of these.
   [[nodiscard]] std::size_t missed_by(const std::vector<RobotId>& sent_by, Timestamp now) const;
-  void note_sent(Offer& offer, const Endpoint& from) const;
+  void record_sent(Offer& offer, const Endpoint& from) const;
 
   [[nodiscard]] bool is_in_reach(const Neighbor& neighbor, Timestamp now) const;
   [[nodiscard]] bool is_believed(Timestamp said, Timestamp now) const;

@@ -114,7 +114,7 @@ std::optional<ReceivedReport> PeerLink::receive(std::span<const std::uint8_t> da
   }
   if (session == nullptr) return std::nullopt;
   const bool is_live = peer.live && session == &*peer.live;
-  if (is_live || !peer.live) note_who_hears_whom(*message, arrival, from);
+  if (is_live || !peer.live) record_reachability(*message, arrival, from);
   if (is_live && message->mark > 0)
     relay_.offer({sender, message->session, message->sequence}, datagram, from, arrival);
   if (!session->clock.is_usable()) {
@@ -196,16 +196,16 @@ std::optional<MeshCounter> PeerLink::refusal_of(std::span<const std::uint8_t> pl
 /// The counter of a datagram that was refused by its number.
 MeshCounter PeerLink::counted_copy(MeshCounter refusal, const DatagramId& id,
                                    const Endpoint& from) {
-  if (refusal != MeshCounter::kRefusedDuplicate || !relay_.note_copy(id, from)) return refusal;
+  if (refusal != MeshCounter::kRefusedDuplicate || !relay_.record_copy(id, from)) return refusal;
   return MeshCounter::kReceivedAgain;
 }
 
-void PeerLink::note_who_hears_whom(const PeerMessage& message, Timestamp arrival,
+void PeerLink::record_reachability(const PeerMessage& message, Timestamp arrival,
                                    const Endpoint& from) {
-  if (message.mark == 0) relay_.note_heard(message.report.sender, from, arrival);
+  if (message.mark == 0) relay_.record_heard(message.report.sender, from, arrival);
   for (const ClockEcho& echo : message.echoes)
     if (echo.is_direct && (echo.peer == self_ || peers_.contains(echo.peer)))
-      relay_.note_hears(message.report.sender, echo.peer, arrival);
+      relay_.record_hears(message.report.sender, echo.peer, arrival);
 }
 
 bool PeerLink::is_our_own(const PeerHeader& header) const {

@@ -124,7 +124,7 @@ class PeerLink {
   void count_doubled(MeshCounter counter, RobotId robot, Timestamp now);
   static void replace_session(Peer& peer, Timestamp now);
   void update_loss(Session& session, const PeerMessage& message, Timestamp arrival) const;
-  void note_who_hears_whom(const PeerMessage& message, Timestamp arrival, const Endpoint& from);
+  void record_reachability(const PeerMessage& message, Timestamp arrival, const Endpoint& from);
   [[nodiscard]] MeshCounter counted_copy(MeshCounter refusal, const DatagramId& id,
                                          const Endpoint& from);
   [[nodiscard]] std::optional<Timestamp> sent_by_us(std::uint32_t code, Timestamp now) const;
