@@ -8,6 +8,7 @@
 #include "estimator/calibration/arrow_system.hpp"
 #include "estimator/calibration/camera_state.hpp"
 #include "estimator/calibration/jet_geometry.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/time.hpp"
 
@@ -101,7 +102,6 @@ void BodyInterval<T>::seed_matrices(const CameraConstants& constants) {
 
 template <class T>
 void BodyInterval<T>::walk(const ImuStretch& imu) {
-  constexpr double kWorldGravity = 9.81;
   const auto rate_of = [&](const ImuSample& sample) -> Vector3<T> {
     return M_gyro_ * (sample.gyro_radps.cast<T>() - gyro_bias_);
   };
@@ -116,7 +116,7 @@ void BodyInterval<T>::walk(const ImuStretch& imu) {
                                .rate_change = (after - before) * T(0.5 / dt),
                                .accel = M_accel_ * (samples[i].accel_mps2.cast<T>() - accel_bias_),
                                .dt = dt};
-    const Vector3<T> a_W = step.world_acceleration(motion_.R_W_B, kWorldGravity);
+    const Vector3<T> a_W = step.world_acceleration(motion_.R_W_B, kNominalGravityMps2);
     steps_.push_back({motion_, step, a_W});
     motion_.p_W += motion_.v_W * T(dt) + a_W * T(0.5 * dt * dt);
     motion_.v_W += a_W * T(dt);

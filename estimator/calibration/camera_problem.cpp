@@ -10,6 +10,7 @@
 
 #include "estimator/calibration/jet_geometry.hpp"
 #include "estimator/calibration/knot_noise.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -18,7 +19,6 @@ namespace {
 namespace at = camera_constants;
 
 constexpr double kKnotSpacing_s = 0.1;
-constexpr double kWorldGravity = 9.81;
 constexpr double kGaugeSigma = 1e-4;    // position and heading of the first knot: free to choose
 constexpr double kVelocitySigma = 3.0;  // of the first knot [m/s]
 constexpr double kInvalidPx = 200.0;    // what a sighting costs that the lens cannot show
@@ -225,7 +225,7 @@ void CameraProblem::walk(const CameraState& state, std::size_t knot, Visitor& vi
                          .rate_change = (after - before) * T(0.5 / (end - begin)),
                          .accel = local.M_accel * (imu_[i].accel_mps2.cast<T>() - local.accel_bias),
                          .dt = end - begin};
-    const Vector3<T> a_W = step.world_acceleration(local.motion.R_W_B, kWorldGravity);
+    const Vector3<T> a_W = step.world_acceleration(local.motion.R_W_B, kNominalGravityMps2);
     for (; next != sightings_.end() && seconds(next->stamp) + shift <= end; ++next) {
       const auto index = static_cast<std::size_t>(next - sightings_.begin());
       const BoardSighting& seen = *next;

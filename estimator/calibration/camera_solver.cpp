@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/core/quantile.hpp"
+
 namespace crepes {
 namespace {
 
@@ -58,9 +60,7 @@ double sigma_of(const std::vector<SightingResidual>& residuals, const std::vecto
   for (std::size_t i = 0; i < residuals.size(); ++i)
     if (residuals[i].is_valid && mask[i] > 0.0) squares.push_back(residuals[i].uv.squaredNorm());
   if (squares.empty()) return kLeastSigma_px;
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
-  return std::max(kLeastSigma_px, std::sqrt(*middle / kSigmaOfMedian2));
+  return std::max(kLeastSigma_px, std::sqrt(upper_median(squares) / kSigmaOfMedian2));
 }
 
 /// Geman-McClure:  w = 1 / (1 + r^2 / c^2)^2 .

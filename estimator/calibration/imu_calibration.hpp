@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/calibration/rests.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/sensor_noise.hpp"
 
@@ -31,7 +32,7 @@ struct TriadEstimate {
 
 struct ImuCalibrationSettings {
   ImuNoise noise;  ///< the random walks; white noise is measured
-  double gravity_mps2 = 9.81;
+  double gravity_mps2 = kNominalGravityMps2;
 };
 
 struct ImuCalibration {

@@ -7,6 +7,7 @@
 
 #include "estimator/calibration/number_text.hpp"
 #include "estimator/core/constants.hpp"
+#include "estimator/core/so3.hpp"
 
 namespace crepes {
 namespace {
@@ -23,10 +24,6 @@ constexpr double kMostAccelM = 0.001;
 constexpr double kMostGyroM = 0.002;
 constexpr double kResidualRatio = 3.0;  // of what noise explains
 constexpr double kFirstRest_s = 10.0;
-
-double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 /// The faces of the body that never looked up, in words.
 std::string faces_missing(const std::vector<Rest>& rests) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/core/quantile.hpp"
+
 namespace crepes {
 namespace {
 
@@ -54,12 +56,6 @@ class WindowMoments {
   std::vector<Sums> sums_;
 };
 
-double quantile(std::vector<double> values, double share) {
-  const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + place, values.end());
-  return values[static_cast<std::size_t>(place)];
-}
-
 struct Run {
   std::size_t first = 0;
   std::size_t last = 0;
@@ -109,7 +105,7 @@ double quiet_variance(const std::vector<WindowMoments::Variances>& windows, cons
   std::vector<double> values;
   values.reserve(windows.size());
   for (const auto& window : windows) values.push_back(of(window));
-  return quantile(std::move(values), kQuietShare);
+  return quantile(values, kQuietShare);
 }
 
 /// The noise of the rests' samples about their rest's mean. The quietest part shows a little less.

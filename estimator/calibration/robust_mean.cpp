@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/core/quantile.hpp"
+
 namespace crepes {
 namespace {
 
@@ -11,12 +13,6 @@ constexpr double kSigmaOfMad = 1.4826;  // of a normal distribution
 constexpr double kCutoff = 4.685;       // sigmas: 95 % efficient
 constexpr double kLeastScale = 1e-6;
 constexpr int kSteps = 20;
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -27,10 +23,10 @@ double RobustMean::sigma() const {
 
 RobustMean robust_mean(std::vector<double> values) {
   if (values.empty()) return {};
-  RobustMean mean{.value = median_of(values)};
+  RobustMean mean{.value = upper_median(values)};
   std::vector<double> deviations;
   for (const double value : values) deviations.push_back(std::abs(value - mean.value));
-  const double scale = std::max(kLeastScale, kSigmaOfMad * median_of(deviations));
+  const double scale = std::max(kLeastScale, kSigmaOfMad * upper_median(deviations));
   for (int step = 0; step < kSteps; ++step) {
     double sum = 0.0;
     double weights = 0.0;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/core/quantile.hpp"
+
 namespace crepes {
 namespace {
 
@@ -53,18 +55,12 @@ SwarmDescent descend(const SwarmProblem& problem, const SwarmState& prior, Swarm
   return descent;
 }
 
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 double spot_sigma(const std::vector<SightingResidual>& residuals) {
   std::vector<double> squares;
   for (const SightingResidual& residual : residuals)
     if (residual.is_valid) squares.push_back(residual.uv.squaredNorm());
-  return std::max(kLeastSpotSigma_px, std::sqrt(median_of(std::move(squares)) / kMedianOfSquare2));
+  if (squares.empty()) return kLeastSpotSigma_px;
+  return std::max(kLeastSpotSigma_px, std::sqrt(upper_median(squares) / kMedianOfSquare2));
 }
 
 double range_sigma(const std::vector<std::vector<double>>& residuals) {
@@ -72,7 +68,8 @@ double range_sigma(const std::vector<std::vector<double>>& residuals) {
   for (const std::vector<double>& robot : residuals)
     for (const double r : robot)
       if (std::isfinite(r)) sizes.push_back(std::abs(r));
-  return std::max(kLeastRangeSigma_m, median_of(std::move(sizes)) / kMedianOfAbsolute);
+  if (sizes.empty()) return kLeastRangeSigma_m;
+  return std::max(kLeastRangeSigma_m, upper_median(sizes) / kMedianOfAbsolute);
 }
 
 /// Geman-McClure:  w = 1 / (1 + r^2 / c^2)^2 .

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -29,15 +30,11 @@ constexpr PerSensor kMostVibration{.gyro = 3.0, .accel = 30.0};
 // Samples after a jump are plausible if they show gravity where it was, and turn as it does.
 constexpr double kLeastForce = 0.5 * kGravityMps2;
 constexpr double kMostForce = 2.0 * kGravityMps2;
-constexpr double kMostTurned = 45.0 * kRadPerDeg;
-constexpr double kMostContradiction = 30.0 * kRadPerDeg;
+constexpr double kMostTurned = radians(45.0);
+constexpr double kMostContradiction = radians(30.0);
 constexpr double kMostGrowth = 4.0;  // of the gyroscope's noise, if the accelerometer's is the same
 constexpr Duration kOutdated = std::chrono::seconds{5};  // gravity's direction before the jump
 constexpr double kForceShare = 0.05;                     // of one sample in the smoothed force
-
-double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 PerSensor distance(const ImuSample& a, const ImuSample& b) {
   return {(a.gyro_radps - b.gyro_radps).norm(), (a.accel_mps2 - b.accel_mps2).norm()};
@@ -79,9 +76,7 @@ void InnovationScale::add(double size) {
   const std::size_t n = std::min(count_, kKept);
   if (n < kLeast) return;
   std::array<double, kKept> sorted = sizes_;
-  const std::span kept = std::span(sorted).first(n);
-  std::ranges::nth_element(kept, kept.begin() + static_cast<std::ptrdiff_t>(n / 2));
-  median_ = kept[n / 2];
+  median_ = upper_median(std::span(sorted).first(n));
   is_known_ = true;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 #include "estimator/team/gyro_check.hpp"
 
 namespace crepes {
@@ -168,12 +169,6 @@ bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {
   });
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// Clocks that differ from most others, this robot's among them.
 void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) {
   if (belief.robots.size() < 3) return;
@@ -183,8 +178,10 @@ void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) 
     ahead_s.push_back(robot.clock_s);
     variances.push_back(belief.P(robot.clock_index(), robot.clock_index()));
   }
-  const double most_s = median(ahead_s);
-  const double variance = median(variances);
+  std::vector<double> sorted_s = ahead_s;
+  const double most_s = quantile(sorted_s, 0.5);
+  std::vector<double> sorted_variances = variances;
+  const double variance = quantile(sorted_variances, 0.5);
   for (std::size_t i = 0; const auto& [id, robot] : belief.robots) {
     const double size_s = robot.clock_s - most_s;
     const double sigma_s = std::sqrt(variances[i++] + variance);

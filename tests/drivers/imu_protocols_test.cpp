@@ -46,7 +46,7 @@ TEST(Hipnuc, ReadsTheRecordedFrameInSiUnits) {
   const RecordedFrame file = recorded_file("imu/hipnuc_hi91_official");
 
   ASSERT_EQ(Hipnuc::examine(file.bytes).length, file.bytes.size());
-  expect_sample(Hipnuc::read(file.bytes), vector_of(file.decoded["gyro_dps"]) * kRadPerDeg,
+  expect_sample(Hipnuc::read(file.bytes), vector_of(file.decoded["gyro_dps"]) * radians(1.0),
                 vector_of(file.decoded["acc_g"]) * kGravityMps2);
 }
 

@@ -4,7 +4,6 @@
 #include <poll.h>
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <limits>
@@ -18,6 +17,7 @@
 #include "daemon/runtime.hpp"
 #include "drivers/base/text_file.hpp"
 #include "drivers/base/unique_fd.hpp"
+#include "estimator/core/quantile.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
 
@@ -100,9 +100,7 @@ struct Service {
   long lost = 0;  ///< gaps in `seq`
 
   [[nodiscard]] double quantile(double share) {
-    if (delays_s.empty()) return 1e9;
-    std::ranges::sort(delays_s);
-    return delays_s[static_cast<std::size_t>(share * static_cast<double>(delays_s.size() - 1))];
+    return delays_s.empty() ? 1e9 : crepes::quantile(delays_s, share);
   }
 };
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "daemon/ctl/calibrate/calibration_report.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
@@ -12,7 +13,7 @@ namespace crepes {
 struct CalibrateImuOptions {
   std::filesystem::path robot_dir;
   std::filesystem::path out;
-  double gravity_mps2 = 9.81;
+  double gravity_mps2 = kNominalGravityMps2;
   bool rest = false;  ///< the recording is of an hour at rest: noise alone
   bool json = false;
 };

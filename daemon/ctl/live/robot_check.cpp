@@ -328,7 +328,6 @@ void check_mesh(const RobotObservation& seen, Section section) {
 
 /// What an accelerometer at rest measures.
 void check_gravity(const client::Status& status, Section& section) {
-  constexpr double kGravity = 9.81;   // m/s^2
   constexpr double kAtRest = 0.05;    // rad/s
   constexpr double kTolerance = 0.1;  // m/s^2
   constexpr double kMilli = 1e-3;
@@ -339,7 +338,7 @@ void check_gravity(const client::Status& status, Section& section) {
   const std::string text = fmt::format("gravity measures {} m/s^2", fixed(force, 2));
   if (turn > kAtRest) {
     section.doubt(text + " while the robot turns", "hold it still and check again");
-  } else if (std::abs(force - kGravity) > kTolerance) {
+  } else if (std::abs(force - kNominalGravityMps2) > kTolerance) {
     section.doubt(text, "hold it still and check again; if it stays so: crepesctl calibrate imu");
   } else {
     section.good(text);
