@@ -15,7 +15,7 @@
 #include <random>
 #include <vector>
 
-#include "estimator/calibration/camera_problem.hpp"
+#include "estimator/calibration/camera/camera_problem.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/sensor_noise.hpp"

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
-#include "estimator/calibration/swarm_problem.hpp"
-#include "estimator/calibration/swarm_start.hpp"
-#include "estimator/calibration/swarm_state.hpp"
+#include "estimator/calibration/swarm/swarm_problem.hpp"
+#include "estimator/calibration/swarm/swarm_start.hpp"
+#include "estimator/calibration/swarm/swarm_state.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "estimator/calibration/range_calibration.hpp"
+#include "estimator/calibration/range/range_calibration.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
