@@ -104,7 +104,8 @@ struct Status {
     std::string name;
     double rate_hz = 0.0;
     bool ok = false;
-    std::string message;  ///< what is wrong, and what to do
+    bool calibrated = true;  ///< false: a camera whose lens is a guess
+    std::string message;     ///< what is wrong, and what to do
     Totals faults;
     Totals counts;
   };

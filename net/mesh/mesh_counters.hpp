@@ -62,6 +62,11 @@ inline constexpr std::size_t kMeshCounterCount = 42;
 
 /// As STATUS and report.json call it.
 [[nodiscard]] std::string_view name_of(MeshCounter counter);
+/// Whether it counts what was refused.
+[[nodiscard]] constexpr bool is_refusal(MeshCounter counter) {
+  return counter >= MeshCounter::kRefusedBadCovariance &&
+         counter <= MeshCounter::kRefusedUnknownSender;
+}
 /// The counter of datagrams that are refused for this reason.
 [[nodiscard]] MeshCounter counter_of(PeerMessageError error);
 [[nodiscard]] MeshCounter counter_of(UnsealError error);

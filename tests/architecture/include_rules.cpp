@@ -124,8 +124,11 @@ const std::vector<WordRule>& word_rules() {
        "libsodium is for config/keys, net/subscription/keyed_hash.cpp, daemon, and in net/mesh for "
        "packet_seal.cpp, packet_signature.cpp and locked_key.hpp"},
       {include_of("fmt/"),
-       {"config/", "drivers/", "net/", "daemon/", "tests/"},
-       "fmt is for config, drivers, net and daemon"},
+       {"estimator/calibration/", "estimator/vision/camera_model", "estimator/vision/id_library",
+        "config/", "drivers/", "net/", "daemon/", "tests/"},
+       "fmt is for the refusals of calibrations, lenses and codes, and for config, drivers, net "
+       "and "
+       "daemon"},
       {include_of("spdlog/"), {"daemon/", "tests/"}, "spdlog is for daemon"},
       {include_of("yaml-cpp/"),
        {"config/reading/", "daemon/", "tests/"},

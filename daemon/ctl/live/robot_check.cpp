@@ -11,6 +11,7 @@
 
 #include "daemon/ctl/text_table.hpp"
 #include "estimator/core/constants.hpp"
+#include "net/mesh/mesh_counters.hpp"
 
 namespace crepes {
 namespace {
@@ -54,9 +55,6 @@ const SensorLine* sensor_of(const client::Status& status, const std::string& nam
 constexpr std::string_view kSpots = " spots";
 
 bool is_spots(const SensorLine& sensor) { return sensor.name.ends_with(kSpots); }
-bool is_uncalibrated(const SensorLine& sensor) {
-  return sensor.message.starts_with("not calibrated");
-}
 
 std::string name_of_neighbor(const client::Status::Neighbor& neighbor) {
   return neighbor.name.empty() ? fmt::format("robot {}", neighbor.peer) : neighbor.name;
@@ -88,7 +86,7 @@ void check_sensors(const RobotObservation& seen, Section section) {
   if (seen.after.sensors.empty())
     section.fault("the daemon reports no sensor", "see its messages: journalctl -u crepesd");
   for (const SensorLine& sensor : seen.after.sensors) {
-    if (!sensor.ok && !is_uncalibrated(sensor)) {
+    if (!sensor.ok && sensor.calibrated) {
       section.fault(fmt::format("{}: {}", sensor.name,
                                 sensor.message.empty() ? "does not work" : sensor.message),
                     "crepesctl devices lists what is connected; see troubleshooting.md");
@@ -315,9 +313,11 @@ void check_mesh(const RobotObservation& seen, Section section) {
     section.doubt("no other robot is a member of the swarm", "add it to swarm.members");
   for (const auto& neighbor : seen.after.neighbors) check_link(neighbor, section);
   std::string refused;
-  for (const auto& [name, value] : seen.after.network) {
+  for (std::size_t i = 0; i < kMeshCounterCount; ++i) {
+    const auto counter = static_cast<MeshCounter>(i);
+    const std::string name(name_of(counter));
     const std::uint64_t more = growth(seen.before.network, seen.after.network, name);
-    if (more > 0 && name.starts_with("refused"))
+    if (more > 0 && is_refusal(counter))
       refused += fmt::format("{}{} {}", refused.empty() ? "" : ", ", name, more);
   }
   if (!refused.empty()) {
@@ -377,7 +377,7 @@ void check_agreement(const RobotObservation& seen, const client::Status::Neighbo
 void check_calibration(const RobotObservation& seen, Section section) {
   const std::string advice = "crepesctl calibrate, and see calibration.md";
   for (const SensorLine& sensor : seen.after.sensors)
-    if (is_uncalibrated(sensor)) section.fault(sensor.name + ": " + sensor.message, advice);
+    if (!sensor.calibrated) section.fault(sensor.name + ": " + sensor.message, advice);
   check_gravity(seen.after, section);
   for (const auto& neighbor : seen.after.neighbors) check_agreement(seen, neighbor, section);
   for (const std::string& fault : seen.after.faults)

@@ -1,5 +1,7 @@
 #include "estimator/calibration/camera/camera_refusal.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -38,9 +40,10 @@ void check_boards(const CameraSolution& solution, std::span<const BoardSighting>
   }
   for (std::size_t b = 0; b < names.size(); ++b)
     if (all[b] > 0.0 && bad[b] > kMovedOutliers * all[b])
-      result.refusals.push_back("board " + names[b] + " moved, or is seen in a mirror: " +
-                                number_text(100.0 * bad[b] / all[b], 0) +
-                                " % of its sightings contradict the others");
+      result.refusals.push_back(
+          fmt::format("board {} moved, or is seen in a mirror: {} % of its sightings contradict "
+                      "the others",
+                      names[b], number_text(100.0 * bad[b] / all[b], 0)));
 }
 
 void check_quarters(std::span<const BoardSighting> sightings, const CameraBatchSettings& settings,
@@ -55,8 +58,9 @@ void check_quarters(std::span<const BoardSighting> sightings, const CameraBatchS
   }
   for (std::size_t q = 0; q < counts.size(); ++q)
     if (counts[q] < kLeastQuarter * static_cast<double>(sightings.size()))
-      result.warnings.push_back("nothing seen in the " + std::string(kQuarters[q]) +
-                                " quarter of the picture: the lens is not known there");
+      result.warnings.push_back(
+          fmt::format("nothing seen in the {} quarter of the picture: the lens is not known there",
+                      kQuarters[q]));
 }
 
 /// A lens whose field of view is larger than its model shows in the outermost ring first.
@@ -80,10 +84,10 @@ void check_rim(const CameraSolution& solution, std::span<const BoardSighting> si
   const double inner = rms_px(square[0], std::max(1.0, count[0]));
   const double outer = rms_px(square[1], count[1]);
   if (outer > kRimRatio * inner)
-    result.warnings.push_back("residuals grow to the rim (" + number_text(outer, 2) +
-                              " px against " + number_text(inner, 2) +
-                              " px): the field of view is larger than said, or the lens is no "
-                              "Double Sphere");
+    result.warnings.push_back(fmt::format(
+        "residuals grow to the rim ({} px against {} px): the field of view is larger than said, "
+        "or the lens is no Double Sphere",
+        number_text(outer, 2), number_text(inner, 2)));
 }
 
 }  // namespace
@@ -93,20 +97,21 @@ std::vector<std::string> refusals_before_fit(std::span<const ImuSample> imu,
   std::vector<std::string> reasons;
   if (imu.size() < 2) return {"no inertial samples"};
   if (sightings.size() < kLeastSightings) {
-    reasons.push_back(
-        std::to_string(sightings.size()) + " sightings of identified boards, at least " +
-        std::to_string(kLeastSightings) +
-        " are needed: are the boards' patterns in swarm.members, and are they in view?");
+    reasons.push_back(fmt::format(
+        "{} sightings of identified boards, at least {} are needed: are the boards' patterns in "
+        "swarm.members, and are they in view?",
+        sightings.size(), kLeastSightings));
     return reasons;
   }
   const double seen_s = to_seconds(sightings.back().stamp - sightings.front().stamp);
   if (seen_s < kLeastRecording_s)
-    reasons.push_back("boards are seen for " + number_text(seen_s, 0) + " s; record a minute");
+    reasons.push_back(
+        fmt::format("boards are seen for {} s; record a minute", number_text(seen_s, 0)));
   double gap_s = 0.0;
   for (std::size_t i = 1; i < imu.size(); ++i)
     gap_s = std::max(gap_s, to_seconds(imu[i].stamp - imu[i - 1].stamp));
   if (gap_s > kLongestGap_s)
-    reasons.push_back("a gap of " + number_text(gap_s, 2) + " s in the inertial samples");
+    reasons.push_back(fmt::format("a gap of {} s in the inertial samples", number_text(gap_s, 2)));
   return reasons;
 }
 
@@ -115,10 +120,11 @@ std::vector<std::string> motion_refusals(const Eigen::Vector3d& rate_rms_radps) 
   std::vector<std::string> reasons;
   for (int i = 0; i < 3; ++i)
     if (rate_rms_radps[i] < kLeastRate)
-      reasons.push_back("hardly turned about " + std::string(kAxes[static_cast<std::size_t>(i)]) +
-                        ": " + number_text(rate_rms_radps[i] * kDegPerRad, 1) +
-                        " deg/s RMS, at least " + number_text(kLeastRate * kDegPerRad, 0) +
-                        " are needed about each axis of the body");
+      reasons.push_back(fmt::format(
+          "hardly turned about {}: {} deg/s RMS, at least {} are needed about each axis of the "
+          "body",
+          kAxes[static_cast<std::size_t>(i)], number_text(rate_rms_radps[i] * kDegPerRad, 1),
+          number_text(kLeastRate * kDegPerRad, 0)));
   return reasons;
 }
 
@@ -128,28 +134,29 @@ void judge_camera(const CameraSolution& solution, std::span<const BoardSighting>
   result.refusals = motion_refusals(result.rate_rms_radps);
   check_boards(solution, sightings, names, result);
   if (solution.sigma_px > kMostSpotSigma_px)
-    result.refusals.push_back(
-        "residuals of " + number_text(solution.sigma_px, 2) +
-        " px: boards moved, the time stamps jitter, or the picture is blurred");
+    result.refusals.push_back(fmt::format(
+        "residuals of {} px: boards moved, the time stamps jitter, or the picture is blurred",
+        number_text(solution.sigma_px, 2)));
   if (result.lens_sigma_px > kMostLensSigma_px)
-    result.refusals.push_back("the lens remains uncertain by " +
-                              number_text(result.lens_sigma_px, 2) +
-                              " px (one sigma, RMS over the picture); turn more, about all axes, "
-                              "so that a board crosses every part of the picture");
+    result.refusals.push_back(fmt::format(
+        "the lens remains uncertain by {} px (one sigma, RMS over the picture); turn more, about "
+        "all axes, so that a board crosses every part of the picture",
+        number_text(result.lens_sigma_px, 2)));
   if (!solution.has_converged)
     result.warnings.emplace_back("the solver had not converged when it stopped");
   if (result.lens_sigma_px > kGoodLensSigma_px)
-    result.warnings.push_back("the lens is known to " + number_text(result.lens_sigma_px, 2) +
-                              " px only: a second board and faster turns make it better");
+    result.warnings.push_back(fmt::format(
+        "the lens is known to {} px only: a second board and faster turns make it better",
+        number_text(result.lens_sigma_px, 2)));
   check_quarters(sightings, settings, result);
   check_rim(solution, sightings, settings, result);
 }
 
 void judge_held_out(CameraBatchResult& result) {
   if (result.held_out_px > kHeldOutRatio * result.spot_sigma_px)
-    result.warnings.push_back("held-out seconds fit worse (" + number_text(result.held_out_px, 2) +
-                              " px) than the others (" + number_text(result.spot_sigma_px, 2) +
-                              " px)");
+    result.warnings.push_back(
+        fmt::format("held-out seconds fit worse ({} px) than the others ({} px)",
+                    number_text(result.held_out_px, 2), number_text(result.spot_sigma_px, 2)));
 }
 
 }  // namespace crepes

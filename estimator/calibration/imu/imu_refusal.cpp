@@ -1,5 +1,7 @@
 #include "estimator/calibration/imu/imu_refusal.hpp"
 
+#include <fmt/core.h>
+
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -42,9 +44,14 @@ std::string faces_missing(const std::vector<Rest>& rests) {
     bool was_up = false;
     for (const Rest& rest : rests)
       was_up = was_up || angle_between(rest.accel_mps2, face.up) < kNearAxis_rad;
-    if (!was_up) missing += (missing.empty() ? "" : ", ") + std::string(face.name);
+    if (!was_up) missing += fmt::format("{}{}", missing.empty() ? "" : ", ", face.name);
   }
   return missing;
+}
+
+/// The same as the end of a sentence; empty if no face is missing.
+std::string never_up(const std::string& faces) {
+  return faces.empty() ? "" : fmt::format("; never up: {}", faces);
 }
 
 double explained_residual(const ImuCalibrationSettings& settings, const ImuCalibration& found) {
@@ -73,24 +80,24 @@ std::vector<std::string> refusals_before_fit(const ImuCalibration& found) {
   const RestSearch& search = found.search;
   if (search.rests.empty() || search.gyro_sigma_radps > kGyroAtRest ||
       search.accel_sigma_mps2 > kAccelAtRest) {
-    reasons.push_back("never at rest: even the quietest tenth of the recording shows " +
-                      number_text(search.gyro_sigma_radps * kDegPerRad, 2) + " deg/s and " +
-                      number_text(search.accel_sigma_mps2, 3) +
-                      " m/s^2 of motion; lay the robot down, do not hold it");
+    reasons.push_back(fmt::format(
+        "never at rest: even the quietest tenth of the recording shows {} deg/s and {} m/s^2 of "
+        "motion; lay the robot down, do not hold it",
+        number_text(search.gyro_sigma_radps * kDegPerRad, 2),
+        number_text(search.accel_sigma_mps2, 3)));
     return reasons;
   }
   const auto pauses = static_cast<double>(search.shaky) + static_cast<double>(search.rests.size());
   if (static_cast<double>(search.shaky) > kMostShaky * pauses)
-    reasons.push_back("shaky: in " + std::to_string(search.shaky) + " of " +
-                      number_text(pauses, 0) + " pauses the robot was held, not laid down (" +
-                      number_text(search.shake_radps * kDegPerRad, 2) +
-                      " deg/s of trembling); rest it against something each time");
+    reasons.push_back(fmt::format(
+        "shaky: in {} of {} pauses the robot was held, not laid down ({} deg/s of trembling); rest "
+        "it against something each time",
+        search.shaky, number_text(pauses, 0), number_text(search.shake_radps * kDegPerRad, 2)));
   if (found.attitudes < kLeastAttitudes) {
-    const std::string faces = faces_missing(search.rests);
-    reasons.push_back("only " + std::to_string(found.attitudes) + " attitudes at rest; at least " +
-                      std::to_string(kLeastAttitudes) + " are needed, 40 are good: " +
-                      std::to_string(kLeastAttitudes - found.attitudes) + " are missing" +
-                      (faces.empty() ? "" : "; never up: " + faces));
+    reasons.push_back(fmt::format(
+        "only {} attitudes at rest; at least {} are needed, 40 are good: {} are missing{}",
+        found.attitudes, kLeastAttitudes, kLeastAttitudes - found.attitudes,
+        never_up(faces_missing(search.rests))));
   }
   return reasons;
 }
@@ -100,26 +107,28 @@ void judge_fit(const ImuCalibrationSettings& settings, ImuCalibration& found) {
   const double bias_sigma = found.accelerometer.bias_sigma.maxCoeff();
   if (found.refusals.empty() &&
       (bias_sigma > kMostAccelBias || found.accelerometer.M_sigma.maxCoeff() > kMostAccelM))
-    found.refusals.push_back("the attitudes do not determine the accelerometer (bias to " +
-                             number_text(bias_sigma, 4) + " m/s^2, one sigma)" +
-                             (faces.empty() ? "" : "; never up: " + faces));
+    found.refusals.push_back(fmt::format(
+        "the attitudes do not determine the accelerometer (bias to {} m/s^2, one sigma){}",
+        number_text(bias_sigma, 4), never_up(faces)));
   const double explained = explained_residual(settings, found);
   if (found.accelerometer.residual_rms > kResidualRatio * explained)
-    found.refusals.push_back(
-        "gravity at the rests differs by " + number_text(found.accelerometer.residual_rms, 4) +
-        " m/s^2 RMS from " + number_text(settings.gravity_mps2, 4) + ", where noise explains " +
-        number_text(explained, 4) + ": the robot was not at rest, or the sensor is not linear");
+    found.refusals.push_back(fmt::format(
+        "gravity at the rests differs by {} m/s^2 RMS from {}, where noise explains {}: the robot "
+        "was not at rest, or the sensor is not linear",
+        number_text(found.accelerometer.residual_rms, 4), number_text(settings.gravity_mps2, 4),
+        number_text(explained, 4)));
   if (found.refusals.empty() && found.gyroscope.M_sigma.maxCoeff() > kMostGyroM)
-    found.refusals.push_back("the turns do not determine the gyroscope's scale and axes (to " +
-                             number_text(100.0 * found.gyroscope.M_sigma.maxCoeff(), 2) +
-                             " %, one sigma): turn by more than 90 degrees about every axis");
+    found.refusals.push_back(fmt::format(
+        "the turns do not determine the gyroscope's scale and axes (to {} %, one sigma): turn by "
+        "more than 90 degrees about every axis",
+        number_text(100.0 * found.gyroscope.M_sigma.maxCoeff(), 2)));
   if (found.attitudes < kGoodAttitudes)
-    found.warnings.push_back(std::to_string(found.attitudes) + " attitudes; " +
-                             std::to_string(kGoodAttitudes) + " to 50 make it better");
+    found.warnings.push_back(
+        fmt::format("{} attitudes; {} to 50 make it better", found.attitudes, kGoodAttitudes));
   if (found.search.shaky > 0 && found.refusals.empty())
-    found.warnings.push_back(std::to_string(found.search.shaky) +
-                             " pauses were too shaky and are not used");
-  if (!faces.empty()) found.warnings.push_back("never up: " + faces);
+    found.warnings.push_back(
+        fmt::format("{} pauses were too shaky and are not used", found.search.shaky));
+  if (!faces.empty()) found.warnings.push_back(fmt::format("never up: {}", faces));
   if (found.search.rests.front().duration_s() < kFirstRest_s)
     found.warnings.push_back("the recording should begin with half a minute at rest");
 }

@@ -1,5 +1,7 @@
 #include "estimator/calibration/range/range_calibration.hpp"
 
+#include <fmt/core.h>
+
 #include <Eigen/Core>
 #include <Eigen/QR>
 #include <algorithm>
@@ -23,11 +25,12 @@ constexpr double kDisagree = 4.0;  // sigmas
 constexpr double kRankTolerance = 1e-6;
 
 std::string name_of(const RobotPair& pair) {
-  return std::to_string(pair.a.value) + "," + std::to_string(pair.b.value);
+  return fmt::format("{},{}", pair.a.value, pair.b.value);
 }
 
-std::string place_of(const SegmentBias& segment) {
-  return "ids " + name_of(segment.pair) + ", segment " + std::to_string(segment.segment + 1);
+template <class Segment>
+std::string place_of(const Segment& segment) {
+  return fmt::format("ids {}, segment {}", name_of(segment.pair), segment.segment + 1);
 }
 
 bool is_late(const UwbRange& range, double late_path_db) {
@@ -61,27 +64,27 @@ void check_rest(const SegmentBias& segment, const std::vector<double>& errors,
   const double change = std::abs(first.value - second.value);
   const double sigma = std::hypot(first.sigma(), second.sigma());
   if (change > kMoved_m && change > kMovedSigmas * sigma)
-    found.refusals.push_back(place_of(segment) + ": the distance changed by " +
-                             number_text(change, 2) +
-                             " m within the segment: the robots were not at rest; correct from_s "
-                             "and to_s");
+    found.refusals.push_back(fmt::format(
+        "{}: the distance changed by {} m within the segment: the robots were not at rest; correct "
+        "from_s and to_s",
+        place_of(segment), number_text(change, 2)));
 }
 
 void add_segment(const TapedRanges& taped, const RangeNoise& noise, RangeCalibration& found) {
   const std::vector<double> errors = errors_of(taped, noise.late_path_db);
   if (errors.size() < kLeastRanges) {
-    found.refusals.push_back(
-        "ids " + name_of(taped.pair) + ", segment " + std::to_string(taped.segment + 1) + ": " +
-        std::to_string(errors.size()) + " ranges by a direct path of " +
-        std::to_string(taped.ranges.size()) + "; at least " + std::to_string(kLeastRanges) +
-        " are needed: longer, and without anybody in between");
+    found.refusals.push_back(fmt::format(
+        "{}: {} ranges by a direct path of {}; at least {} are needed: longer, and without anybody "
+        "in between",
+        place_of(taped), errors.size(), taped.ranges.size(), kLeastRanges));
     return;
   }
   SegmentBias segment = bias_of(taped, errors);
   check_rest(segment, errors, found);
   if (std::abs(segment.bias_m) > kMost_m)
-    found.refusals.push_back(place_of(segment) + ": measured and taped distance differ by " +
-                             number_text(segment.bias_m, 2) + " m: a mistake on the tape?");
+    found.refusals.push_back(
+        fmt::format("{}: measured and taped distance differ by {} m: a mistake on the tape?",
+                    place_of(segment), number_text(segment.bias_m, 2)));
   found.segments.push_back(segment);
 }
 
@@ -171,9 +174,10 @@ void check_pairs(const std::vector<PairBias>& alone, RangeCalibration& found) {
   for (std::size_t i = 0; i < alone.size(); ++i) {
     const double difference = alone[i].bias_m - found.pairs[i].bias_m;
     if (std::abs(difference) > kDisagree * alone[i].sigma_m)
-      found.warnings.push_back("ids " + name_of(alone[i].pair) + ": " + number_text(difference, 3) +
-                               " m from the sum of its modules: a mistake on the tape, or "
-                               "something between the two");
+      found.warnings.push_back(fmt::format(
+          "ids {}: {} m from the sum of its modules: a mistake on the tape, or something between "
+          "the two",
+          name_of(alone[i].pair), number_text(difference, 3)));
   }
 }
 

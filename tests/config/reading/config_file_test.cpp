@@ -533,6 +533,17 @@ std::vector<fs::path> yaml_files_below(const fs::path& folder) {
   return files;
 }
 
+TEST(ConfigFile, FaultsKnowTheirSection) {
+  const auto in = [](const std::string& key) { return ConfigFault{"f", 1, key, "is wrong"}; };
+
+  EXPECT_TRUE(is_in(in("swarm"), &Config::swarm));
+  EXPECT_TRUE(is_in(in("swarm.members[0].id"), &Config::swarm));
+  EXPECT_TRUE(is_in(in("cameras[1].driver"), &Config::cameras));
+  EXPECT_FALSE(is_in(in("swarming.members"), &Config::swarm)) << "a key that is misspelled";
+  EXPECT_FALSE(is_in(in("imu.device"), &Config::uwb));
+  EXPECT_FALSE(is_in(in(""), &Config::robot)) << "the whole file";
+}
+
 TEST(ConfigFile, EveryFileInConfigLoads) {
   const std::vector<fs::path> files = yaml_files_below(kRoot / "config");
 

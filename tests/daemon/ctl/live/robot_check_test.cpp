@@ -177,6 +177,7 @@ TEST(RobotCheck, HoldsGravityAndTheMeasurementsAgainstEachOther) {
 TEST(RobotCheck, NamesACameraThatIsNotCalibratedOnce) {
   RobotObservation seen = healthy();
   sensor(seen, "cam0 spots").ok = false;
+  sensor(seen, "cam0 spots").calibrated = false;
   sensor(seen, "cam0 spots").message = "not calibrated: no pose comes from this camera";
 
   EXPECT_EQ(complaints(seen),
