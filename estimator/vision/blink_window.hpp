@@ -1,4 +1,4 @@
-/// What a source showed of late, and how likely that is for one that is no board.
+/// The recent on/off observations of a source, and their likelihood for a source that is no board.
 #pragma once
 
 #include <array>

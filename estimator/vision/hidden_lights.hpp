@@ -20,10 +20,11 @@ struct HiddenLight {
   BlinkEvidence evidence;
 };
 
-/// Carries hidden lights by the gyro and their own motion, for a few seconds. A light that appears
-/// where one of them is expected continues its evidence. The more uncertain the direction has
-/// become and the nearer another one is expected, the likelier it is another. Bounded; what has
-/// been hidden longest is dropped first.
+/// Predicts the directions of hidden lights for a few seconds, by the gyro and their own motion. A
+/// light that appears in a predicted direction continues the evidence of the hidden one. The
+/// probability that it is another light grows with the uncertainty of the direction and with the
+/// nearness of other hidden lights. The capacity is bounded: the light that has been hidden longest
+/// is dropped first.
 class HiddenLights {
  public:
   static constexpr std::size_t kCapacity = 32;

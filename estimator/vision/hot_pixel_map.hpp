@@ -9,9 +9,9 @@
 
 namespace crepes {
 
-/// Learns pixels that shine in every picture. A board is dark in some of a few hundred, wherever it
-/// rests; a lamp that is as steady is no board. A pixel is known after kKnown pictures, and
-/// forgotten within a few that do not show it. Bounded.
+/// Learns the pixels that shine in every picture. Every board is dark in some of a few hundred
+/// pictures, and a lamp that is never dark is no board. A pixel is known after kKnown pictures, and
+/// forgotten after a few pictures in which it is dark. The number of pixels is bounded.
 class HotPixelMap {
  public:
   static constexpr int kKnown = 400;  ///< pictures: 2 s at 200 Hz

@@ -12,14 +12,15 @@
 
 namespace crepes {
 
-/// To verify a signature takes twenty times as long as to open a seal, so who has the swarm's key
-/// could keep a robot busy with false ones. Only verifications in vain consume tokens.
+/// Verifying a signature takes twenty times as long as opening a seal. Somebody with the swarm's
+/// key could therefore overload a robot with false signatures. Only failed verifications consume
+/// tokens.
 ///
-/// Address and sender of a datagram can be forged, so no limit may be so low that a few false ones
-/// exhaust it. A source is a sender and an address from which a datagram of it was accepted. All
-/// sources share a reserve that is larger than what a channel of 6 Mbit/s carries. When it is
-/// exhausted, each has a bucket of its own: false datagrams in the name of one then cost the others
-/// nothing. What comes from elsewhere shares a third bucket.
+/// Address and sender of a datagram can be forged, so a few false datagrams must not exhaust a
+/// limit. A source is a sender together with an address from which a datagram of that sender was
+/// accepted. All sources share a reserve that is larger than what a channel of 6 Mbit/s carries.
+/// When the reserve is exhausted, each source has a bucket of its own, so that false datagrams in
+/// one robot's name do not affect the others. All unknown sources share a third bucket.
 class SignatureLimiter {
  public:
   static constexpr TokenBucket::Rate kReserveRate{.per_s = 1500, .burst = 300};
