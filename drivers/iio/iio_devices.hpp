@@ -32,7 +32,7 @@ struct IioDevice {
 /// All that measure rate or acceleration, by id.
 [[nodiscard]] std::vector<IioDevice> find_iio_devices(const IioPaths& paths);
 
-/// The name of the chip, without what tells its gyroscope from its accelerometer.
+/// The name of the chip, without the suffix of its gyroscope or accelerometer.
 [[nodiscard]] std::string_view chip_of(std::string_view name);
 
 /// The devices of an IMU; both may be the same.

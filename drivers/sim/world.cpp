@@ -105,7 +105,7 @@ Motion resting(WaveSource waves, double x, double y, double z, double yaw) {
           .roll = askew(0.0)};
 }
 
-/// A multirotor in a light wind, which is told where to fly; it begins near a place.
+/// A multirotor in a light wind, which follows commands; it begins near a place.
 Motion steered(WaveSource waves, double x, double y, double spread, double yaw) {
   const double near_x = waves.within(x, spread);
   const double near_y = waves.within(y, spread);

@@ -237,9 +237,9 @@ TEST_F(HostileClients, GetNothingAmplifiedWhoeverTheyPretendToBe) {
   const Timestamp end = machine_.now() + kPatience;
   while (!child->exit_reason() && machine_.now() < end) ::poll(nullptr, 0, 50);
 
-  const std::string told = read_text_file(log).value_or("");
-  std::printf("%s", told.c_str());
-  if (child->exit_reason() == "exit code 77") GTEST_SKIP() << told;
+  const std::string reported = read_text_file(log).value_or("");
+  std::printf("%s", reported.c_str());
+  if (child->exit_reason() == "exit code 77") GTEST_SKIP() << reported;
   EXPECT_EQ(child->exit_reason(), "exit code 0");
 }
 

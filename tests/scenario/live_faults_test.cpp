@@ -200,7 +200,7 @@ TEST_F(SealedSwarm, KeepsItsPosesWhateverHappensToAMember) {
     const Beside clone(clone_of_second());
     const Watched doubled = watch(seconds{3});
     EXPECT_TRUE(Client(configs_.at(1)).await_status([](const Json& status) {
-      return tells(sensor_of(status, "mesh"), "id 2");
+      return mentions(sensor_of(status, "mesh"), "id 2");
     }));
     EXPECT_GT(doubled.poses, 0U);
     expect_unmoved("a clone of r2", doubled);

@@ -69,12 +69,12 @@ TEST(ConfigFile, SuggestsTheRightKeyForAMisspeltOne) {
             "f:11: uwb.niose_m: unknown key; did you mean noise_m?");
 }
 
-TEST(ConfigFile, TellsAMisspeltRequiredKeyOnce) {
+TEST(ConfigFile, ReportsAMisspeltRequiredKeyOnce) {
   EXPECT_EQ(faults_of(replaced("intrinsics", "intrinsic")),
             "f:8: cameras[0].intrinsic: unknown key; did you mean intrinsics?");
 }
 
-TEST(ConfigFile, TellsAnUnknownKeyThatIsLikeNoOther) {
+TEST(ConfigFile, ReportsAnUnknownKeyThatIsLikeNoOther) {
   EXPECT_EQ(faults_of(replaced("uwb: {noise_m: 0.05}", "telemetry: 5")),
             "f:11: telemetry: unknown key");
 }
@@ -404,7 +404,7 @@ TEST(ConfigFile, RefusesAPipeAtOnce) {
   EXPECT_EQ(load_config("/dev/zero").error().message, "/dev/zero: is not a file");
 }
 
-TEST(ConfigFile, TellsAllFaultsAtOnceInOrderOfLines) {
+TEST(ConfigFile, ReportsAllFaultsAtOnceInOrderOfLines) {
   std::string text = replaced("{id: 1}", "{idd: 1}");
   text.replace(text.find("duty: 0.3"), 9, "duty: 3.0");
   text.replace(text.find("0.05"), 4, "[]");

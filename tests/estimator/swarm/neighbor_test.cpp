@@ -36,7 +36,7 @@ struct Ingredients {
   bool peer_bearings = true;
   bool ranges = true;
   int second_camera = -1;       ///< sees it as well: 0 at the same instants, 1 between them
-  Duration imu_memory = 160ms;  ///< how much of the past a report tells
+  Duration imu_memory = 160ms;  ///< how much of the past a report contains
   double heading_rad = 0.0;  ///< own bearings turned so far about the vertical: a mirror in a wall
 };
 

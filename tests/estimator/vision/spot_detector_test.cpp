@@ -147,7 +147,7 @@ TEST(SpotDetector, CentersARingOfWhichLedsAreHiddenWhereTheyAreApart) {
 }
 
 TEST(SpotDetector, CentersHalfARingThatIsTurnedAway) {
-  // Three points do not tell perspective, which is worth R^2/d^2 at the lens: 0.5 px at 0.7 m.
+  // Three points do not determine perspective, which is worth R^2/d^2 at the lens: 0.5 px at 0.7 m.
   for (const double range : {0.7, 0.9, 1.1}) {
     const Accuracy at = accuracy(range, radians(40.0), {}, {.hidden = 0b000111U});
 
@@ -271,7 +271,7 @@ TEST(SpotDetector, TakesTheGrainOfAGlowForNoSpots) {
   EXPECT_LT(off(found.spots[0], board), 0.3);
 }
 
-TEST(SpotDetector, TellsHowLongASpotIs) {
+TEST(SpotDetector, MeasuresHowLongASpotIs) {
   RingScene scene(small_fisheye(), {}, 3);
   for (int i = 0; i < 20; ++i) scene.add_point({100.0 + i, 100.0 + i}, 300.0);
   scene.add_point({250.0, 200.0}, 3000.0);

@@ -162,7 +162,7 @@ TEST(SwarmDataset, RefusesAStampFarFromTheRecording) {
   EXPECT_EQ(swarm.robots[0].cameras[0].spots[0].spots.size(), 1U);
 }
 
-TEST(SwarmDataset, TellsOfAMissingHeaderAndKeepsTheRow) {
+TEST(SwarmDataset, ReportsAMissingHeaderAndKeepsTheRow) {
   const TinySwarm files;
   std::string text = files.read("r1/imu0/data.csv");
   text.erase(0, text.find('\n') + 1);
@@ -174,7 +174,7 @@ TEST(SwarmDataset, TellsOfAMissingHeaderAndKeepsTheRow) {
   expect_sizes(swarm.robots[0], kImu, kRanges, kFrames);
 }
 
-TEST(SwarmDataset, TellsOfACameraWithoutCalibration) {
+TEST(SwarmDataset, ReportsACameraWithoutCalibration) {
   const TinySwarm files;
   files.write("r1/cam1/spots.csv", files.read("r1/cam0/spots.csv"));
 

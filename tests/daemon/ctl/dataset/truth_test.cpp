@@ -60,7 +60,7 @@ TEST(SwarmTruth, GivesTheRelativePoseAtTheObserversOwnTime) {
   EXPECT_FALSE(truth.relative(RobotId{1}, RobotId{2}, RobotClock{100.0, 0.0}.local(10.5)));
 }
 
-TEST(SwarmTruth, TellsARightBearingFromAnothers) {
+TEST(SwarmTruth, DistinguishesARightBearingFromAnothers) {
   Bearing bearing;
   bearing.p_B_C = {0.1, 0.0, 0.0};
   bearing.u_B = Vector3d(1, 1, 0).normalized();

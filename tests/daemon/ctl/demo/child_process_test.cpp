@@ -12,7 +12,7 @@
 namespace crepes {
 namespace {
 
-TEST(ChildProcess, TellsHowItEndedAndKeepsItsOutput) {
+TEST(ChildProcess, ReportsHowItEndedAndKeepsItsOutput) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
   const auto log = scratch.path() / "log";
   {

@@ -58,7 +58,7 @@ class Steered : public testing::Test {
   UdpSocket sender_ = UdpSocket::bind("127.0.0.1", 0).value();
 };
 
-TEST_F(Steered, FliesAsToldAndStopsWithoutCommands) {
+TEST_F(Steered, FliesAsCommandedAndStopsWithoutCommands) {
   run(0.0, 4.0, R"({"robot":2,"velocity":[0.5,0,0]})");
   run(4.0, 8.0, "");
   const SimWorld world(sim_);

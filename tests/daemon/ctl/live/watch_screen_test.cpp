@@ -76,7 +76,7 @@ TEST(WatchScreen, ShowsPosesReasonsAndWhatIsWrong) {
   EXPECT_NE(text.find("robot 1 r1, up 10 s"), std::string::npos);
 }
 
-TEST(WatchScreen, TellsTheLoadOfTheLastSecondNotOfAllTime) {
+TEST(WatchScreen, ShowsTheLoadOfTheLastSecondNotOfAllTime) {
   WatchScreen screen = some_screen();
   EXPECT_NE(screen.text(kStart, kFile).find("10.0 % of a core"), std::string::npos);
 
@@ -124,12 +124,12 @@ TEST(WatchScreen, WantsTheDetailsOfWhomEnterPicks) {
   EXPECT_EQ(screen.detailed_neighbor(), RobotId{3});
 
   client::Status answer;
-  client::Status::Neighbor told;
-  told.peer = 3;
-  told.state = "direct";
-  told.measurements["bearing"] = {{"fused", 77}, {"gated", 5}};
-  told.ages_s["bearing"] = 0.125;
-  answer.neighbors = {told};
+  client::Status::Neighbor reported;
+  reported.peer = 3;
+  reported.state = "direct";
+  reported.measurements["bearing"] = {{"fused", 77}, {"gated", 5}};
+  reported.ages_s["bearing"] = 0.125;
+  answer.neighbors = {reported};
   screen.handle_message(answer, kStart);
   EXPECT_NE(screen.text(kStart, kTerminal).find("fused 77, gated 5"), std::string::npos);
   EXPECT_NE(screen.text(kStart, kTerminal).find("125"), std::string::npos);

@@ -204,7 +204,7 @@ TEST(ReplayOutput, LooksWholeOnlyWhenItIs) {
   EXPECT_EQ(read_pose_file(dir / "r2/r1.csv", RobotId{1})->size(), 0U);
 }
 
-TEST(ReplayOutput, TellsOfADirectoryThatCannotBe) {
+TEST(ReplayOutput, ReportsADirectoryThatCannotBe) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
   std::ofstream(scratch.path() / "file") << "in the way";
 

@@ -89,7 +89,7 @@ TEST(PairScore, MoreRowsThanInstantsAreNoMoreAvailable) {
   EXPECT_DOUBLE_EQ(score.availability, 6.0 / 21.0);
 }
 
-TEST(PairScore, ToldOfACovarianceThatIsNone) {
+TEST(PairScore, GivenACovarianceThatIsNone) {
   NeighborPose pose = off_by(0, 0.1, 0.0);
   pose.T_B_N.covariance(2, 2) = -1.0;
 

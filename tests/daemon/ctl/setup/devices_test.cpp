@@ -56,14 +56,14 @@ TEST_F(Devices, AreFoundAndListenedTo) {
   const auto json = list_devices(options_);
 
   ASSERT_TRUE(json);
-  const auto told = nlohmann::json::parse(*json);
-  EXPECT_EQ(told["cameras"][0].value("driver", ""), "aravis") << told;
-  EXPECT_EQ(told["cameras"][0].value("device", ""), GigeCamera::kId);
-  EXPECT_EQ(told["serial_ports"][0].value("speaks", ""), "witmotion") << told;
-  EXPECT_EQ(told["serial_ports"][0].value("port", ""), port.string());
+  const auto reported = nlohmann::json::parse(*json);
+  EXPECT_EQ(reported["cameras"][0].value("driver", ""), "aravis") << reported;
+  EXPECT_EQ(reported["cameras"][0].value("device", ""), GigeCamera::kId);
+  EXPECT_EQ(reported["serial_ports"][0].value("speaks", ""), "witmotion") << reported;
+  EXPECT_EQ(reported["serial_ports"][0].value("port", ""), port.string());
 }
 
-TEST_F(Devices, AreToldInWordsToo) {
+TEST_F(Devices, AreReportedInWordsToo) {
   const GigeCamera camera(black);
 
   const auto text = list_devices(options_);
@@ -78,10 +78,10 @@ TEST_F(Devices, ThatCannotBeListenedToAreNamedToo) {
   options_.json = true;
   fs::create_symlink("/dev/null", options_.dev / "serial/by-id/usb-nothing");
 
-  const auto told = nlohmann::json::parse(list_devices(options_).value());
+  const auto reported = nlohmann::json::parse(list_devices(options_).value());
 
-  EXPECT_TRUE(told["cameras"].empty());
-  EXPECT_NE(told["serial_ports"][0].value("fault", ""), "");
+  EXPECT_TRUE(reported["cameras"].empty());
+  EXPECT_NE(reported["serial_ports"][0].value("fault", ""), "");
 }
 
 TEST_F(Devices, OfTheKernelAreFoundToo) {
@@ -89,14 +89,14 @@ TEST_F(Devices, OfTheKernelAreFoundToo) {
 
   const std::string text = list_devices(options_).value();
   options_.json = true;
-  const auto told = nlohmann::json::parse(list_devices(options_).value());
+  const auto reported = nlohmann::json::parse(list_devices(options_).value());
 
   EXPECT_NE(text.find("iio:device0 (icm42688-gyro), iio:device1 (icm42688-accel)\n"
                       "    imu: protocol: iio, port: \"icm42688\"\n"),
             std::string::npos)
       << text;
-  EXPECT_EQ(told["kernel_imus"][0].value("port", ""), "icm42688") << told;
-  EXPECT_EQ(told["kernel_imus"][0].value("accelerometer", ""), "icm42688-accel");
+  EXPECT_EQ(reported["kernel_imus"][0].value("port", ""), "icm42688") << reported;
+  EXPECT_EQ(reported["kernel_imus"][0].value("accelerometer", ""), "icm42688-accel");
 }
 
 TEST_F(Devices, MayBeNone) { EXPECT_EQ(list_devices(options_), "no camera\nno serial port\n"); }

@@ -76,7 +76,7 @@ TEST_F(Init, WritesAConfigurationThatTheDaemonAccepts) {
   EXPECT_FALSE(config.cameras[0].calibration.calibrated);
 }
 
-TEST_F(Init, GuessesALensOfTheFieldOfViewThatLooksWhereItWasTold) {
+TEST_F(Init, GuessesALensOfTheFieldOfViewThatLooksWhereConfigured) {
   options_.id = 1;
   options_.robots = 2;
   options_.look = "left";
@@ -241,17 +241,17 @@ TEST_F(Init, PrintsASheetWithTheAxesAndRoomForEveryRobot) {
   EXPECT_FALSE(report->warnings.empty());  // lever arms that nobody measured
 }
 
-TEST_F(Init, TellsInJsonWhatItWrote) {
+TEST_F(Init, ReportsInJsonWhatItWrote) {
   options_.id = 1;
   options_.robots = 2;
   options_.json = true;
 
-  const auto told = nlohmann::json::parse(run().value().text);
+  const auto reported = nlohmann::json::parse(run().value().text);
 
-  EXPECT_TRUE(told["ok"]);
-  EXPECT_EQ(told["written"].size(), 4U);
-  EXPECT_TRUE(fs::exists(told["written"][0].get<std::string>()));
-  EXPECT_FALSE(told["warnings"].empty());
+  EXPECT_TRUE(reported["ok"]);
+  EXPECT_EQ(reported["written"].size(), 4U);
+  EXPECT_TRUE(fs::exists(reported["written"][0].get<std::string>()));
+  EXPECT_FALSE(reported["warnings"].empty());
 }
 
 TEST(RobotPlan, TurnsTheCameraByRotationsAlone) {

@@ -89,16 +89,16 @@ MemberConfig member(const std::string& pattern) {
 TEST(LedCommandLine, ProgramsABoardThatThenBlinksAsTheLibrarySays) {
   HostBoard board;
 
-  const Result<std::string> told = led_set(
+  const Result<std::string> reported = led_set(
       {.port = board.port(), .id = 3, .library = kLibrary, .brightness = {80, 70, 60, 50, 40, 30}});
 
-  ASSERT_TRUE(told.has_value()) << told.error().message;
-  EXPECT_NE(told->find("id 3: pattern 00100100111100111111, slots of 10.0 ms\n"
-                       "brightness 80 70 60 50 40 30 %\n"
-                       "firmware 1.2.3, clock: crystal, 0 bytes skipped\n"),
+  ASSERT_TRUE(reported.has_value()) << reported.error().message;
+  EXPECT_NE(reported->find("id 3: pattern 00100100111100111111, slots of 10.0 ms\n"
+                           "brightness 80 70 60 50 40 30 %\n"
+                           "firmware 1.2.3, clock: crystal, 0 bytes skipped\n"),
             std::string::npos)
-      << *told;
-  EXPECT_EQ(led_get({.port = board.port()}).value_or(""), *told);
+      << *reported;
+  EXPECT_EQ(led_get({.port = board.port()}).value_or(""), *reported);
   EXPECT_EQ(led_get({.port = board.port(), .json = true}).value_or(""),
             R"({"id":3,"pattern":"00100100111100111111","slot_ms":10.0,)"
             R"("brightness":[80,70,60,50,40,30],"firmware":"1.2.3","clock":"crystal",)"
@@ -116,24 +116,26 @@ TEST(LedCommandLine, ProgramsABoardThatThenBlinksAsTheLibrarySays) {
 TEST(LedCommandLine, AsksAgainWhenAnAnswerIsTorn) {
   HostBoard board({.answers_torn = 2});
 
-  const Result<std::string> told = led_set({.port = board.port(), .id = 64, .library = kLibrary});
+  const Result<std::string> reported =
+      led_set({.port = board.port(), .id = 64, .library = kLibrary});
 
-  EXPECT_EQ(error_of(told), "");
+  EXPECT_EQ(error_of(reported), "");
   EXPECT_EQ(board.stop().robot_id, 64);
 }
 
-TEST(LedCommandLine, TellsWhyTheBoardRefuses) {
+TEST(LedCommandLine, ReportsWhyTheBoardRefuses) {
   HostBoard board({.is_flash_dead = true});
 
-  const Result<std::string> told = led_set({.port = board.port(), .id = 3, .library = kLibrary});
+  const Result<std::string> reported =
+      led_set({.port = board.port(), .id = 3, .library = kLibrary});
 
-  EXPECT_EQ(error_of(told), board.port() + ": refused: " + describe(LED_BAD_FLASH));
+  EXPECT_EQ(error_of(reported), board.port() + ": refused: " + describe(LED_BAD_FLASH));
   EXPECT_NE(led_get({.port = board.port()}).value_or("").find("never set"), std::string::npos);
   const std::string json = led_get({.port = board.port(), .json = true}).value_or("");
   EXPECT_TRUE(json.starts_with(R"({"firmware":"1.2.3")")) << json;
 }
 
-TEST(LedCommandLine, TellsSilenceFromAnotherDevice) {
+TEST(LedCommandLine, DistinguishesSilenceFromAnotherDevice) {
   PseudoTerminal silent = *PseudoTerminal::open();
   PseudoTerminal other = *PseudoTerminal::open();
   const std::jthread chatter([&](const std::stop_token& stop) {

@@ -34,21 +34,21 @@ TEST(SetupWitMotion, SetsASensorAndMeasuresThatItObeys) {
   const Worker sensor("sensor",
                       [&](const std::stop_token& stop) { run_witmotion_at_20_hz(line, stop); });
 
-  const auto told = set_up_witmotion(
+  const auto reported = set_up_witmotion(
       {.port = line.path(), .baud = 115200, .rate_hz = 20, .pause = 0ms, .listen = 1s});
 
-  ASSERT_TRUE(told) << told.error().message;
-  EXPECT_NEAR(*told, 20.0, 5.0);  // what it takes for obedience
+  ASSERT_TRUE(reported) << reported.error().message;
+  EXPECT_NEAR(*reported, 20.0, 5.0);  // the measured rate
 }
 
-TEST(SetupWitMotion, TellsThatNothingAnswers) {
+TEST(SetupWitMotion, ReportsThatNothingAnswers) {
   const PseudoTerminal line = PseudoTerminal::open().value();
 
-  const auto told = set_up_witmotion(
+  const auto reported = set_up_witmotion(
       {.port = line.path(), .baud = 115200, .rate_hz = 100, .pause = 0ms, .listen = 1ms});
 
-  ASSERT_FALSE(told);
-  EXPECT_NE(told.error().message.find("no sample"), std::string::npos);
+  ASSERT_FALSE(reported);
+  EXPECT_NE(reported.error().message.find("no sample"), std::string::npos);
 }
 
 }  // namespace

@@ -174,7 +174,7 @@ TEST_F(Pictures, ThatWereNotRecordedAreReplacedBySpots) {
   EXPECT_EQ(summary->robots.count(RobotId{2}), 1U);
 }
 
-TEST_F(Pictures, AreToldInJson) {
+TEST_F(Pictures, AreReportedInJson) {
   save("shots/1.png", picture(0, true));
   save("shots/2.png", picture(0, false));
   options_.json = true;

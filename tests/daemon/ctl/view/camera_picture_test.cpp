@@ -66,7 +66,7 @@ TEST(CameraPicture, RefusesWhatIsNone) {
     EXPECT_FALSE(picture_json(look, config, {})) << look;
 }
 
-TEST(CameraPicture, TellsTheLightAndWhoMayChangeIt) {
+TEST(CameraPicture, ShowsTheLightAndWhoMayChangeIt) {
   Config config = config_of_one_camera();
   const Json json = Json::parse(cameras_json(config, /*control=*/true, ""));
   EXPECT_EQ(json["cameras"][0]["exposure_us"], 500.0);
