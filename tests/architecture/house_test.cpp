@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <map>
 #include <regex>
+#include <set>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -78,6 +80,17 @@ TEST(Documents, WrapTheirProse) {
     for (const int line : wide_lines(text_of_file(file)))
       ADD_FAILURE() << file << ":" << line << " is wider than " << kWidth << " columns";
   }
+}
+
+TEST(Folders, HaveFewConceptsOnOneLevel) {
+  constexpr std::size_t kMost = 28;  // about 25 pairs of a header and its source
+  std::map<fs::path, std::set<fs::path>> concepts;
+  for (const fs::path file :
+       source_files({"config", "daemon", "drivers", "estimator", "firmware", "net"}))
+    concepts[file.parent_path()].insert(file.stem());
+
+  EXPECT_GT(concepts.size(), 30U);
+  for (const auto& [folder, files] : concepts) EXPECT_LE(files.size(), kMost) << folder;
 }
 
 TEST(Documents, NameTheReleaseOfTheProject) {
