@@ -17,6 +17,7 @@ struct IioPaths {
   std::filesystem::path dev = "/dev";
 };
 
+/// A device of the kernel in sysfs.
 struct IioDevice {
   std::string id;     ///< as in "iio:device0"
   std::string name;   ///< of the chip, as in "icm42688-gyro"
@@ -46,6 +47,7 @@ struct IioImuDevices {
 /// own is taken. kNotFound: there is none now.
 [[nodiscard]] Result<IioImuDevices> choose_iio_imu(const IioPaths& paths, std::string_view port);
 
+/// The devices of one inertial sensor.
 struct FoundIioImu {
   std::string port;  ///< what names it, for `choose_iio_imu`
   IioImuDevices devices;

@@ -11,6 +11,7 @@
 
 namespace crepes {
 
+/// A rate or an acceleration, and its time.
 struct StampedTriad {
   Timestamp stamp;
   Eigen::Vector3d value;

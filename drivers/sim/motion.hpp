@@ -12,6 +12,7 @@ namespace crepes {
 
 /// One coordinate over time: a line plus sines.
 struct Wave {
+  /// One sine of a wave.
   struct Sine {
     double amplitude;
     double omega_radps;
@@ -38,6 +39,7 @@ struct BodyState {
   }
 };
 
+/// How the attitude follows from the motion.
 enum class AttitudeRule {
   kEuler,   ///< yaw, pitch and roll as given: hand-held robots, wheels
   kThrust,  ///< z along the specific force, yaw as given: multirotors

@@ -101,6 +101,7 @@ inline constexpr std::size_t kVerdictCount = 6;
   return kNames[static_cast<std::size_t>(verdict)];
 }
 
+/// Who measured what.
 enum class MeasurementKind : std::uint8_t {
   kBearing,      ///< our camera, the neighbor's ring
   kPeerBearing,  ///< its camera, our ring
@@ -162,6 +163,7 @@ struct CalibrationRecord {
   std::array<double, kSize> sigma{};
 };
 
+/// The outcome of each measurement, and calibrations over time.
 struct Records {
   std::vector<MeasurementRecord> measurements;
   std::vector<CalibrationRecord> calibrations;
@@ -186,6 +188,7 @@ using ImuFaultCounts = std::array<std::uint64_t, kImuFaultCount>;
   return kNames[static_cast<std::size_t>(fault)];
 }
 
+/// The state of one neighbor, for STATUS.
 struct NeighborStatus {
   RobotId neighbor{};
   std::string name;
@@ -203,6 +206,7 @@ struct NeighborStatus {
   std::vector<TeamFault> faults;        ///< what the team finds wrong with it
 };
 
+/// The state of the estimator, for STATUS.
 struct EstimatorStatus {
   std::vector<NeighborStatus> neighbors;  ///< all members but this robot, ordered by id
   std::optional<Tilt> tilt;

@@ -30,6 +30,7 @@ struct DirectionReading {
   double sigma_rad = 0.0;
 };
 
+/// A range and its noise.
 struct RangeReading {
   double range_m = 0.0;
   double sigma_m = 0.0;
@@ -74,6 +75,7 @@ class NeighborFilter {
   /// Bearings of this kind come from another camera from now on, with another misalignment.
   void reset_misalignment(MeasurementKind kind, double misalignment_rad);
 
+  /// One Gaussian of a split, and its weight.
   struct Part;
   /// Splits the Gaussian along its most uncertain attitude axis into parts that are narrow enough
   /// for one linearization. Their weighted sum approximates the whole.

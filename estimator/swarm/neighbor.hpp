@@ -15,6 +15,7 @@
 
 namespace crepes {
 
+/// A pose of the graph's solution and its time.
 struct StampedGraphPose {
   Timestamp stamp;
   GraphPose pose;

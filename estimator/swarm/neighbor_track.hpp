@@ -52,6 +52,7 @@ class NeighborTrack {
   /// Corrects with a reading taken at `stamp()`.
   Fusion fuse(const Measurement& measurement, const PairMounting& mounting, const Gates& gates);
 
+  /// One track of a split, and its weight.
   struct Part;
   /// NeighborFilter::split; the paper's filter is one part.
   [[nodiscard]] std::vector<Part> split() const;

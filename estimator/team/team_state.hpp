@@ -34,6 +34,7 @@ struct Agreement {
   [[nodiscard]] bool is_contradiction() const { return gated > 4.0 && gated > fused; }
 };
 
+/// What is known of one camera of a robot.
 struct TeamCamera {
   Eigen::Vector3d p_B_C = Eigen::Vector3d::Zero();
   Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< u_measured = Exp(m) u
@@ -42,6 +43,7 @@ struct TeamCamera {
   bool is_refused = false;                   ///< it contradicted the others after that, too
 };
 
+/// What is known of one robot.
 struct TeamRobot {
   /// [gyroscope and accelerometer bias, the gyroscope's scale errors, antenna delay, clock]
   static constexpr int kCalibration = FreeMotionAt::kBias + 2;

@@ -9,6 +9,7 @@
 
 namespace crepes {
 
+/// Whether a source was lit in one frame.
 struct BlinkObservation {
   Timestamp stamp{};
   bool lit = false;

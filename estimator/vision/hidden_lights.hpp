@@ -30,6 +30,7 @@ class HiddenLights {
   static constexpr std::size_t kCapacity = 32;
   static constexpr Duration kLongest = std::chrono::milliseconds{3000};
 
+  /// The evidence of a light that is visible again.
   struct Return {
     BlinkEvidence evidence;
     double stranger = 0.0;  ///< the probability that it is another light

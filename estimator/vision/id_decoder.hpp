@@ -51,6 +51,7 @@ struct BlinkEvidence {
 /// keeps blinking, and its phase can be predicted: two crystals differ by at most 200 ppm.
 class PhaseMemory {
  public:
+  /// When a code began last, and when that was known.
   struct Phase {
     std::size_t phase = 0;
     Timestamp learned{};

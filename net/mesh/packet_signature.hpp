@@ -48,6 +48,7 @@ struct RobotKey {
 /// Empty for a text that is not a key, and for points that make every signature valid.
 [[nodiscard]] std::optional<PublicKey> parse_public_key(std::string_view text);
 
+/// Signs the datagrams of this robot.
 class PacketSigner {
  public:
   static constexpr std::size_t kOverhead = 64;  ///< bytes that signing adds

@@ -66,6 +66,7 @@ struct WireLimits {
   double accel_step_mps2 = 1e-2;        ///< coarsest rounding of specific forces
 };
 
+/// A datagram, and the number of measurements that had no room.
 struct EncodedPeerMessage {
   std::vector<std::uint8_t> bytes;
   std::size_t left_out = 0;          ///< neighbors whose newest measurements had no room

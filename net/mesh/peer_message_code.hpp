@@ -26,6 +26,7 @@ struct CodedTilt {
   unsigned sigma = 0;
 };
 
+/// A `ClockEcho` in integers.
 struct CodedEcho {
   std::uint16_t peer = 0;
   std::uint32_t sent_code = 0;
@@ -40,11 +41,13 @@ struct Prediction {
   unsigned order = 0;
 };
 
+/// An inertial sample in steps of the rounding.
 struct CodedImuSample {
   std::int64_t age = 0;
   std::array<std::int64_t, 6> values{};  ///< gyro, acceleration
 };
 
+/// All inertial samples of a datagram, in integers.
 struct CodedImu {
   int gyro_exponent = 0;
   int accel_exponent = 0;
@@ -52,6 +55,7 @@ struct CodedImu {
   std::vector<CodedImuSample> samples;
 };
 
+/// A bearing in integers.
 struct CodedBearing {
   std::int64_t age = 0;
   std::uint64_t camera = 0;
@@ -59,6 +63,7 @@ struct CodedBearing {
   std::int64_t sigma = 0;
 };
 
+/// A range in integers.
 struct CodedRange {
   std::int64_t age = 0;
   std::int64_t range_mm = 0;
@@ -73,6 +78,7 @@ struct CodedSource {
   std::vector<CodedRange> ranges;
 };
 
+/// An estimate of a neighbor, in integers.
 struct CodedEstimate {
   std::uint64_t neighbor = 0;
   std::int64_t age = 0;
@@ -84,6 +90,7 @@ struct CodedEstimate {
   std::array<std::int64_t, 15> factor{};
 };
 
+/// Everything after the clear header, in integers.
 struct CodedBody {
   std::uint64_t sent_ns = 0;  ///< two's complement
   unsigned mark = 0;

@@ -18,6 +18,7 @@ struct Broadcasts {
   [[nodiscard]] bool operator==(const Broadcasts&) const = default;
 };
 
+/// What and how often a robot sends.
 struct SendSettings {
   double rate_hz = 25.0;           ///< reports per second, and datagrams at most
   double airtime_of_all = 0.5;     ///< share of the channel for all robots that hear each other

@@ -8,6 +8,7 @@ namespace crepes {
 
 class SequenceWindow {
  public:
+  /// What a sequence number says of a datagram.
   enum class Verdict : std::uint8_t { kNew, kDuplicate, kTooOld, kTooFarAhead };
 
   /// How far behind the newest a datagram can be and still be checked for duplicates.

@@ -22,6 +22,7 @@ struct SensorStatus {
   SensorTotals totals{};
 };
 
+/// The drops of one queue.
 struct QueueStatus {
   std::string name;
   std::uint64_t dropped = 0;

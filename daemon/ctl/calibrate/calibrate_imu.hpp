@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl calibrate imu`.
 struct CalibrateImuOptions {
   std::filesystem::path robot_dir;
   std::filesystem::path out;

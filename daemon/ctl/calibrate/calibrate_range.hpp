@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl calibrate range`.
 struct CalibrateRangeOptions {
   std::filesystem::path swarm_dir;
   std::filesystem::path tape;

@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// Exposure and gain of the camera of this name.
 struct NamedLight {
   std::string camera;
   CameraLight light;

@@ -17,6 +17,7 @@ class BasicArrowSystem {
   using StateMatrix = Eigen::Matrix<double, Size, Size>;
   using StateVector = Eigen::Matrix<double, Size, 1>;
 
+  /// The solution: one vector a state, and the constants.
   struct Step {
     std::vector<StateVector> states;
     Eigen::VectorXd constants;

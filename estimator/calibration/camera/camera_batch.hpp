@@ -15,6 +15,7 @@
 
 namespace crepes {
 
+/// What is known before: the picture, the first guess, the priors.
 struct CameraBatchSettings {
   int width = 0;
   int height = 0;
@@ -24,6 +25,7 @@ struct CameraBatchSettings {
   Progress on_progress;  ///< optional
 };
 
+/// The calibration, its quality, and the reasons to refuse it.
 struct CameraBatchResult {
   CameraConstants constants;
   LensVector lens_sigma = LensVector::Zero();

@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// The state of least cost, with residuals and covariance.
 struct CameraSolution {
   CameraState state;
   Eigen::MatrixXd covariance;  ///< of the constants, in the order of `camera_constants`

@@ -20,6 +20,7 @@ namespace crepes {
 [[nodiscard]] std::optional<Eigen::Vector3d> direction_of(const LensVector& lens,
                                                           const Eigen::Vector2d& uv);
 
+/// The rotation between camera and body, and its residual.
 struct HandEye {
   Eigen::Quaterniond q_C_B = Eigen::Quaterniond::Identity();
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();

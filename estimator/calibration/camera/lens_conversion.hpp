@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// The coefficients, and how well they fit.
 struct KannalaBrandtFit {
   Eigen::Vector4d pinhole = Eigen::Vector4d::Zero();  ///< fu, fv, pu, pv
   std::array<double, 4> k{};                          ///< k1 to k4

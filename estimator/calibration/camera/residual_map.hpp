@@ -15,6 +15,7 @@ namespace crepes {
 struct ResidualMap {
   static constexpr int kColumns = 10;
   static constexpr int kRows = 8;
+  /// The residuals in one cell of the picture.
   struct Cell {
     std::size_t count = 0;
     double square_px2 = 0.0;  ///< sum of squared lengths

@@ -7,6 +7,7 @@
 
 namespace crepes {
 
+/// The deviation of means over one averaging time.
 struct AllanPoint {
   double tau_s = 0.0;
   double sigma = 0.0;  ///< Allan deviation, in the unit of the readings

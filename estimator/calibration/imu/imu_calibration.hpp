@@ -30,6 +30,7 @@ struct TriadEstimate {
   }
 };
 
+/// What is known before.
 struct ImuCalibrationSettings {
   ImuNoise noise;  ///< the random walks; white noise is measured
   double gravity_mps2 = kNominalGravityMps2;

@@ -21,6 +21,7 @@ struct Rest {
   [[nodiscard]] double duration_s() const { return end_s - begin_s; }
 };
 
+/// The rests of a recording, and the noise in them.
 struct RestSearch {
   std::vector<Rest> rests;
   double gyro_sigma_radps = 0.0;  ///< of one sample and axis at rest

@@ -36,11 +36,13 @@ struct SegmentBias {
   std::size_t late = 0;      ///< refused by their first path's power
   std::size_t outliers = 0;  ///< refused by the robust mean
 };
+/// The bias of the ranges between two robots.
 struct PairBias {
   RobotPair pair;
   double bias_m = 0.0;
   double sigma_m = 0.0;
 };
+/// The delay of one module.
 struct ModuleBias {
   RobotId id{};
   double bias_m = 0.0;

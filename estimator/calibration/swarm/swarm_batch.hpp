@@ -13,6 +13,7 @@
 
 namespace crepes {
 
+/// Names for the messages, and a function that receives the progress.
 struct SwarmBatchSettings {
   std::vector<std::string> names;  ///< of the robots, for messages
   Progress on_progress;            ///< optional
@@ -39,6 +40,7 @@ struct RobotCalibration {
   }
 };
 
+/// The calibrations of all robots, their quality, and the reasons to refuse them.
 struct SwarmBatchResult {
   std::vector<RobotCalibration> robots;
   Eigen::MatrixXd covariance;  ///< of all constants, robot by robot

@@ -24,6 +24,7 @@ inline constexpr int kRing = 24;
 inline constexpr int kSize = 27;
 }  // namespace sighting_columns
 
+/// The predicted pixel of another robot's ring, and its derivative.
 struct SightingFactor {
   Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< predicted [px]
   Eigen::Matrix<double, 2, sighting_columns::kSize> J;
@@ -50,6 +51,7 @@ inline constexpr int kOtherDelay = 19;
 inline constexpr int kSize = 20;
 }  // namespace range_columns
 
+/// The predicted range between two robots, and its derivative.
 struct RangeFactor {
   double range_m = 0.0;  ///< predicted
   Eigen::Matrix<double, 1, range_columns::kSize> J;

@@ -35,6 +35,7 @@ struct SwarmWeights {
   std::vector<std::vector<double>> ranges;
 };
 
+/// The residuals of all sightings and ranges, by robot.
 struct SwarmResiduals {
   std::vector<std::vector<SightingResidual>> sightings;
   std::vector<std::vector<double>> ranges;  ///< [m], measured minus predicted; NaN: none

@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// The state of least cost, with residuals and covariance.
 struct SwarmSolution {
   SwarmState state;
   Eigen::MatrixXd covariance;  ///< of the constants, robot by robot; empty if they are singular
