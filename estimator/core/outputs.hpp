@@ -20,6 +20,7 @@ enum class PoseMode : std::uint8_t {
   kPredicted,  ///< coasting on the IMUs
 };
 
+/// As it is called in POSE and in files.
 [[nodiscard]] constexpr std::string_view name_of(PoseMode mode) {
   constexpr std::array<std::string_view, 3> kNames{"direct", "graph", "predicted"};
   return kNames[static_cast<std::size_t>(mode)];
@@ -66,6 +67,7 @@ enum class NoPoseReason : std::uint8_t {
   kUncertain,      ///< known worse than 1 m or 20 deg
 };
 
+/// In words, for STATUS.
 [[nodiscard]] constexpr std::string_view name_of(NoPoseReason reason) {
   constexpr std::array<std::string_view, 14> kNames{"none",
                                                     "never heard",
@@ -95,6 +97,7 @@ enum class Verdict : std::uint8_t {
 };
 inline constexpr std::size_t kVerdictCount = 6;
 
+/// As it is called in STATUS and in files.
 [[nodiscard]] constexpr std::string_view name_of(Verdict verdict) {
   constexpr std::array<std::string_view, kVerdictCount> kNames{"fused", "gated",    "degenerate",
                                                                "late",  "no_state", "skipped"};
@@ -112,6 +115,7 @@ enum class MeasurementKind : std::uint8_t {
 };
 inline constexpr std::size_t kMeasurementKindCount = 6;
 
+/// As it is called in STATUS and in files.
 [[nodiscard]] constexpr std::string_view name_of(MeasurementKind kind) {
   constexpr std::array<std::string_view, kMeasurementKindCount> kNames{
       "bearing", "peer_bearing", "range", "peer_range", "raw_pose", "graph_pose"};
@@ -182,6 +186,7 @@ enum class ImuFault : std::uint8_t {
 inline constexpr std::size_t kImuFaultCount = 5;
 using ImuFaultCounts = std::array<std::uint64_t, kImuFaultCount>;
 
+/// As it is called in STATUS and in reports.
 [[nodiscard]] constexpr std::string_view name_of(ImuFault fault) {
   constexpr std::array<std::string_view, kImuFaultCount> kNames{"implausible", "spike", "jump",
                                                                 "hangs", "saturated"};

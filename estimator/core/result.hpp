@@ -32,6 +32,7 @@ struct Error {
 template <class T>
 using Result = tl::expected<T, Error>;
 
+/// A failure that converts to any `Result`.
 [[nodiscard]] inline tl::unexpected<Error> fail(ErrorCode code, std::string message) {
   return tl::unexpected<Error>(Error{code, std::move(message)});
 }

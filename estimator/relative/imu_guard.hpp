@@ -17,6 +17,7 @@ namespace crepes {
 /// Ronchetti 2009, "Robust Statistics", 5.1).
 class InnovationScale {
  public:
+  /// Adds the size of an innovation.
   void add(double size);
   [[nodiscard]] double median() const { return median_; }
   /// False before there are enough.

@@ -42,6 +42,7 @@ struct FilterSettings {
   double late_path_db = 0.0;
 };
 
+/// Derives the settings of the filters.
 [[nodiscard]] FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuNoise& imu,
                                              const RangeNoise& range);
 

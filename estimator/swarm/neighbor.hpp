@@ -34,6 +34,7 @@ class Neighbor {
 
   /// Our own measurements of it, and its pose by the team's estimate.
   void add(const NeighborInput& input);
+  /// A report of the neighbor; `self` is the state of our robot.
   void add_report(const ReceivedReport& received, const RobotState& self);
 
   /// Advances to `now`: fuses the released readings and updates the pose.

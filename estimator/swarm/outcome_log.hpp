@@ -15,7 +15,9 @@ class OutcomeLog {
   void keep_records() { keeps_records_ = true; }
   [[nodiscard]] Records drain_records() { return std::exchange(records_, {}); }
 
+  /// Counts the outcome of a measurement, and records it if asked to.
   void add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion);
+  /// Records a calibration, if asked to.
   void add(std::optional<CalibrationRecord> calibration);
   [[nodiscard]] bool keeps_records() const { return keeps_records_; }
 

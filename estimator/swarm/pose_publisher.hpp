@@ -24,6 +24,7 @@ class PosePublisher {
  public:
   PosePublisher(RobotId neighbor, PairMounting mounting, const FilterSettings& settings);
 
+  /// Applies to the next predictions.
   void reconfigure(const FilterSettings& settings);
 
   /// A reading or sample has arrived for `stamp`.

@@ -33,8 +33,10 @@ struct TeamBelief {
   int append_calibration(const Priors& priors);
   /// For pairs that measure ranges for the first time.
   void append_range_biases(const TeamInterval& interval);
+  /// Removes a robot and its states.
   void remove(RobotId id);
 
+  /// The motions of all robots over the interval.
   [[nodiscard]] TeamTrajectories trajectories(const TeamInterval& interval) const;
   /// T_S_N with S this robot.
   [[nodiscard]] GaussianPose pose(RobotId id) const;

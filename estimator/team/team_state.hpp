@@ -16,6 +16,7 @@ namespace crepes {
 /// The lower id first.
 using RobotPair = std::pair<RobotId, RobotId>;
 
+/// The pair with the lower id first.
 [[nodiscard]] inline RobotPair ordered(RobotId a, RobotId b) {
   return a < b ? RobotPair(a, b) : RobotPair(b, a);
 }
@@ -25,10 +26,12 @@ struct Agreement {
   double fused = 0.0;
   double gated = 0.0;
 
+  /// Scales both counts, so that the past is forgotten.
   void fade(double kept) {
     fused *= kept;
     gated *= kept;
   }
+  /// Counts a reading.
   void add(bool fits) { (fits ? fused : gated) += 1.0; }
   /// Most are refused, and not only a few outliers.
   [[nodiscard]] bool is_contradiction() const { return gated > 4.0 && gated > fused; }
@@ -73,6 +76,7 @@ struct TeamRangeBias {
   std::map<RobotId, Agreement> agreement{};  ///< of the ranges that this robot measured
   std::map<RobotId, double> refused_m{};     ///< mean of the latest residuals that were refused
 
+  /// Counts a range that `observer` measured.
   void add(RobotId observer, bool fits, double residual_m) {
     constexpr double kWeight = 0.1;
     agreement[observer].add(fits);

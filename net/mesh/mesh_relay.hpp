@@ -57,6 +57,7 @@ class MeshRelay {
     neighbors_[neighbor].hears[other] = at;
   }
 
+  /// Whether datagrams of this robot arrive directly.
   [[nodiscard]] bool is_heard(RobotId sender, Timestamp now) const;
   /// Whether this robot should mark datagrams.
   [[nodiscard]] bool is_needed(Timestamp now) const;

@@ -41,6 +41,7 @@ struct RobotKey {
 [[nodiscard]] RobotKey robot_key_of(std::span<const std::uint8_t, 32> seed);
 /// Whether the public part belongs to the seed.
 [[nodiscard]] bool is_whole(const RobotKey& key);
+/// The public part of a key.
 [[nodiscard]] PublicKey public_key_of(const RobotKey& key);
 
 /// Base64, 44 characters.

@@ -30,6 +30,7 @@ class SignatureLimiter {
   /// own.
   static constexpr std::size_t kMaxAddresses = 4;
 
+  /// Whether a signature of this source may be verified now.
   [[nodiscard]] bool allows(const Endpoint& from, RobotId sender, Timestamp now);
   /// A signature was false, or its datagram of no use.
   void count_in_vain(const Endpoint& from, RobotId sender, Timestamp now);
