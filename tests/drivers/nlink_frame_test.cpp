@@ -6,6 +6,7 @@
 #include <set>
 
 #include "drivers/uwb/nlink.hpp"
+#include "drivers/uwb/nlink_encoder.hpp"
 #include "estimator/core/constants.hpp"
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/recorded_files.hpp"

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include "drivers/uwb/nlink_encoder.hpp"
 #include "tests/support/recorded_files.hpp"
 #include "tests/support/recorded_frames.hpp"
 
