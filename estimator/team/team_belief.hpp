@@ -16,7 +16,7 @@ using TeamTrajectories = std::map<RobotId, RobotTrajectory>;
 /// The frame falls freely with this robot at `stamp`, the keyframe. So this robot's motion there is
 /// known by definition, and gravity and the team's common motion are no states.
 struct TeamBelief {
-  static constexpr double kLeastVariance = 1e-12;  ///< of a prior; one known exactly stays regular
+  static constexpr double kLeastVariance = 1e-12;  ///< of a prior, so that P stays regular
 
   RobotId self{};
   Timestamp stamp{};

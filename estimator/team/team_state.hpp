@@ -54,15 +54,14 @@ struct TeamRobot {
   FreeMotion motion{};
   ImuBias bias{};
   double antenna_delay_m = 0.0;  ///< of its module; lengthens all its ranges
-  /// Its clock is so much ahead of this robot's. Its motion is by its own clock.
+  /// How far its clock is ahead of this robot's. Its motion is kept on its own clock.
   double clock_s = 0.0;
   int motion_index = -1;  ///< none for this robot
   int bias_index = 0;
   std::vector<TeamCamera> cameras{};
   Timestamp last_sighting{};
   Timestamp since{};
-  /// A robot on probation is corrected by what is measured between it and trusted robots, which are
-  /// not.
+  /// Measurements between a robot on probation and trusted robots correct the former only.
   bool is_trusted = false;
 
   [[nodiscard]] int delay_index() const { return bias_index + FreeMotionAt::kBias; }

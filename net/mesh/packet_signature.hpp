@@ -2,7 +2,7 @@
 ///
 /// A signed datagram has the bit `kSignedMark` in its version. It ends with the 64 bytes of the
 /// signature of all bytes before: version, sender, session, sequence number and contents. A seal
-/// is put around it. Whoever has the swarm's key and no robot's own cannot make one.
+/// is put around it. The swarm's key alone is not sufficient to make one.
 #pragma once
 
 #include <array>

@@ -58,8 +58,8 @@ class PeerLink {
       std::span<const std::uint8_t> datagram, Timestamp arrival,
       const std::optional<PacketSeal>& seal = std::nullopt, const Endpoint& from = {});
 
-  /// Whether it is time for a datagram. Where the air is short, what a report has waits for the
-  /// next one that is sent.
+  /// Whether a datagram is due. Where airtime is short, the contents of a report wait for the next
+  /// datagram.
   [[nodiscard]] bool is_due(Timestamp now) const;
   /// The datagram to broadcast immediately; `now` is the time of sending.
   [[nodiscard]] std::vector<std::uint8_t> compose(

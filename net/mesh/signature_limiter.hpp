@@ -26,8 +26,8 @@ class SignatureLimiter {
   static constexpr TokenBucket::Rate kReserveRate{.per_s = 1500, .burst = 300};
   static constexpr TokenBucket::Rate kSourceRate{.per_s = 50, .burst = 100};
   static constexpr TokenBucket::Rate kElsewhereRate{.per_s = 500, .burst = 200};
-  /// Addresses of a sender; then the longest silent is forgotten. A member can only displace its
-  /// own.
+  /// Addresses of one sender. Beyond that the longest silent one is forgotten, so a member can
+  /// displace only its own.
   static constexpr std::size_t kMaxAddresses = 4;
 
   /// Whether a signature of this source may be verified now.
