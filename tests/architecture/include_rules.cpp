@@ -24,6 +24,7 @@ const std::vector<FolderRule>& folder_rules() {
       {"estimator/relative/", {"estimator/core/", "estimator/relative/"}},
       {"estimator/vision/", {"estimator/core/", "estimator/vision/"}},
       {"estimator/graph/", {"estimator/core/", "estimator/graph/"}},
+      {"estimator/calibration/", {"estimator/core/"}},
       {"estimator/calibration/batch/", {"estimator/core/", "estimator/calibration/batch/"}},
       {"estimator/calibration/camera/",
        {"estimator/core/", "estimator/vision/double_sphere", "estimator/calibration/batch/",
