@@ -134,12 +134,28 @@ struct Fusion {
   std::array<double, kMaxDimension> sigma{};     ///< roots of S's diagonal
 };
 
+/// What a sensor read, as it came: of a bearing u and the camera's place, both in the seeing
+/// robot's body; of a range the distance [m]. Poses have no numbers.
+using Reading = std::array<double, 6>;
+
+[[nodiscard]] constexpr std::size_t reading_size(MeasurementKind kind) {
+  constexpr std::array<std::size_t, kMeasurementKindCount> kSizes{6, 6, 1, 1, 0, 0};
+  return kSizes[static_cast<std::size_t>(kind)];
+}
+
 /// One measurement of a neighbor, with its result.
 struct MeasurementRecord {
   RobotId neighbor{};
   Timestamp stamp{};  ///< when it was taken
   MeasurementKind kind = MeasurementKind::kBearing;
   Fusion fusion;
+  Reading reading{};
+};
+
+struct NewestReading {
+  Timestamp stamp{};  ///< when it was taken
+  Verdict verdict = Verdict::kNoState;
+  Reading reading{};
 };
 
 /// The sensor calibration that the tight filter estimates.
@@ -200,8 +216,9 @@ struct NeighborStatus {
   NoPoseReason reason = NoPoseReason::kNeverHeard;
   std::optional<NeighborPose> pose;
   std::array<VerdictCounts, kMeasurementKindCount> measurements{};  ///< [kind][verdict]
-  /// When the newest of a kind was taken, whatever its outcome.
-  std::array<std::optional<Timestamp>, kMeasurementKindCount> newest{};
+  /// Of each kind, whatever its outcome.
+  std::array<std::optional<NewestReading>, kMeasurementKindCount> newest{};
+  PairMounting mounting;
   /// Measured minus expected, own and the neighbor's ranges: the mean of about the last sixteen
   /// [m].
   std::optional<double> range_residual_m;

@@ -20,12 +20,13 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
     : id_(neighbor.id),
       name_(neighbor.name),
       self_id_(self.id),
+      mounting_(mounting_of(self, neighbor)),
       recent_(settings.recent),
       forget_(settings.forget),
       intake_(neighbor.id, settings),
       initiator_(self, neighbor, settings),
-      hypotheses_(settings, mounting_of(self, neighbor)),
-      publisher_(neighbor.id, mounting_of(self, neighbor), settings) {}
+      hypotheses_(settings, mounting_),
+      publisher_(neighbor.id, mounting_, settings) {}
 
 void Neighbor::reconfigure(const FilterSettings& settings) {
   recent_ = settings.recent;
@@ -122,7 +123,8 @@ void Neighbor::fuse_released(Timestamp now, const RobotState& self) {
                                            : Association{.fusion{.verdict = Verdict::kNoState}};
     const Fusion other{.verdict = usable ? Verdict::kGated : Verdict::kNoState};
     for (std::size_t i = 0; i < group.size(); ++i)
-      outcomes().add(first.stamp, first.kind, i == association.chosen ? association.fusion : other);
+      outcomes().add(first.stamp, first.kind, i == association.chosen ? association.fusion : other,
+                     reading_of(group[i]));
   }
   hypotheses_.prune();
   // Without readings the filter advances too: IMU samples are kept for a limited time, and the cost
@@ -154,6 +156,7 @@ NeighborStatus Neighbor::status() const {
   status.reason = reason_;
   status.pose = publisher_.published();
   intake_.outcomes().write_to(status);
+  status.mounting = mounting_;
   status.refused_imu = body_.guard.refused();
   if (!body_.imu.empty()) status.newest_imu = body_.imu.newest().stamp;
   return status;

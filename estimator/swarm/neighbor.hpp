@@ -58,6 +58,7 @@ class Neighbor {
   RobotId id_;
   std::string name_;
   RobotId self_id_;
+  PairMounting mounting_;
   Duration recent_;
   Duration forget_;
 

@@ -16,14 +16,6 @@
 
 namespace crepes {
 
-/// The lever arms that readings refer to.
-struct PairMounting {
-  Eigen::Vector3d p_B_M;  ///< our LED ring
-  Eigen::Vector3d p_B_U;  ///< our antenna
-  Eigen::Vector3d p_N_M;
-  Eigen::Vector3d p_N_Q;
-};
-
 /// Long before any stamp, yet safe to subtract from one.
 inline constexpr Timestamp kNever{Duration{std::numeric_limits<std::int64_t>::min() / 4}};
 

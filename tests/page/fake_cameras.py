@@ -1,7 +1,7 @@
 """The socket of a daemon's pictures, as recorder_stage.hpp says: a thread of this process."""
 import contextlib
 import json
-import os
+import pathlib
 import random
 import socket
 import threading
@@ -53,7 +53,7 @@ class FakeCameras:
         self.is_over = True
         self.thread.join()
         self.listener.close()
-        os.unlink(self.path)
+        pathlib.Path(self.path).unlink(missing_ok=True)
 
     def run(self):
         while not self.is_over:

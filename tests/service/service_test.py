@@ -196,6 +196,26 @@ def page():
     check("when started, it shows the neighbor", served, f"{seconds:.2f} s" if served else state)
 
 
+def page_with_camera():
+    """Pictures come, and the sliders write through the daemon's reload, though the page's service may write nowhere else."""
+    CONFIG.write_text(CONFIG.read_text() + "view: {control: true}\n")
+    run("systemctl", "reload", "crepesd")
+    address = "http://127.0.0.1:8080"
+    light = urllib.request.Request(f"{address}/light?robot=0&camera=0&exposure_us=321", method="POST", headers={"Origin": address})
+    try:
+        with urllib.request.urlopen(f"{address}/camera?robot=0&camera=0", timeout=10) as stream:
+            pictured = any(stream.readline() == b"event: picture\n" for _ in range(200))
+            check("its camera panel shows pictures", pictured)
+            changed = urllib.request.urlopen(light, timeout=10).status
+            in_force = any(b'"exposure_us":321' in stream.readline() for _ in range(400))
+            check("its sliders change the light", changed == 200 and in_force)
+    except OSError as error:
+        check("its sliders change the light", False, f"{error} {getattr(error, 'read', lambda: b'')()}")
+    check("by a fragment", "321" in pathlib.Path("/etc/crepes/crepesd.d/90-exposure.yaml").read_text())
+    mode = os.stat("/run/crepes").st_mode & 0o777
+    check("the group may show the page a calibration's coverage", mode == 0o770, oct(mode))
+
+
 def stop():
     begin = time.monotonic()
     run("systemctl", "stop", "crepesd")
@@ -226,6 +246,7 @@ def main():
     reloading(subscriber)
     recording()
     page()
+    page_with_camera()
     stop()
     neighbor.terminate()
     neighbor.wait()

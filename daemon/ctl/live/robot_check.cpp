@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "daemon/ctl/live/pose_advice.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "estimator/core/constants.hpp"
 #include "net/mesh/mesh_counters.hpp"
@@ -289,12 +290,12 @@ void check_link(const client::Status::Neighbor& neighbor, Section& section) {
   const std::string name = name_of_neighbor(neighbor);
   if (!neighbor.reports || neighbor.reports->received == 0) {
     return section.fault(name + ": never heard",
-                         "is its crepesd running, on the same mesh, net.interface and key?");
+                         std::string(advice_for(NoPoseReason::kNeverHeard)));
   }
   if (neighbor.reports->age_s > kSilent) {
     return section.fault(
         fmt::format("{}: silent for {} s", name, fixed(neighbor.reports->age_s, 0)),
-        "out of reach, or its battery or daemon has stopped");
+        std::string(advice_for(NoPoseReason::kSilent)));
   }
   const std::string text =
       fmt::format("{}: {} % lost", name, fixed(100.0 * neighbor.reports->loss, 0));

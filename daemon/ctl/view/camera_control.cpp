@@ -57,15 +57,10 @@ Result<void> change_camera(const CameraFeed& feed, const std::filesystem::path& 
   if (!exposure_us) return tl::unexpected(exposure_us.error());
   if (!gain) return tl::unexpected(gain.error());
   if (!threshold) return tl::unexpected(threshold.error());
-  if (*exposure_us || *gain) {
-    auto lights = CameraLights::load(file, config->cameras[camera].calibration.name);
-    if (!lights) return tl::unexpected(lights.error());
-    auto changed = lights->change({.exposure_us = *exposure_us, .gain = *gain});
-    if (!changed) return changed;
-  }
-  if (*threshold) {
-    if (auto changed = change_threshold(file, **threshold); !changed) return changed;
-  }
+  auto lights = CameraLights::load(file, config->cameras[camera].calibration.name);
+  if (!lights) return tl::unexpected(lights.error());
+  auto changed = lights->change({.exposure_us = *exposure_us, .gain = *gain}, *threshold);
+  if (!changed) return changed;
   return reload(*daemon);
 }
 

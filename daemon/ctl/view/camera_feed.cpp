@@ -7,6 +7,7 @@
 #include <chrono>
 
 #include "config/reading/config_file.hpp"
+#include "daemon/ctl/calibrate/coverage_file.hpp"
 #include "daemon/ctl/view/camera_picture.hpp"
 #include "daemon/ctl/view/view_json.hpp"
 #include "daemon/recording/recipient.hpp"
@@ -20,6 +21,7 @@ using namespace std::chrono_literals;
 constexpr Duration kPeriod = 200ms;  // five pictures a second
 constexpr Duration kRetry = 1s;
 constexpr Duration kPatience = 2s;
+constexpr Duration kCoveragePeriod = 1s;
 constexpr int kMaxReads = 32;  // of 64 kB a turn
 
 constexpr const char* kElsewhere =
@@ -41,6 +43,10 @@ std::map<std::uint8_t, std::string> CameraFeed::exchange(Timestamp now,
     request_picture(now, wanted);
     if (const auto received = receive(now, poses, events); !received)
       hang_up(received.error().message, now);
+  }
+  if (now >= next_coverage_) {
+    next_coverage_ = now + kCoveragePeriod;
+    coverage_ = read_coverage(socket_);
   }
   if (std::string state = greeting(); state != sent_state_) {
     sent_state_ = std::move(state);
@@ -106,14 +112,16 @@ void CameraFeed::handle_block(const Block& block, Timestamp now, const PoseHisto
     config_ = std::move(checked.config);
   }
   if (block.kind != "look" || !config_ || !asked_) return;
-  const auto picture = picture_json(block.content, *config_, poses);
+  const auto picture = picture_json(block.content, asked_->camera, *config_, poses);
   reason_ = picture ? "" : picture.error().message;
   if (picture) events[asked_->camera] += stream_event("picture", *picture);
   asked_.reset();
 }
 
 std::string CameraFeed::greeting() const {
-  return stream_event("camera", cameras_json(config_ ? *config_ : Config{}, can_control_, reason_));
+  return stream_event("camera",
+                      cameras_json(config_ ? *config_ : Config{}, can_control_, reason_)) +
+         stream_event("coverage", coverage_.value_or("{}"));
 }
 
 std::optional<pid_t> CameraFeed::daemon_pid() const {

@@ -58,6 +58,8 @@ class CameraFeed {
   };
   std::optional<Request> asked_;
   std::map<std::uint8_t, Timestamp> last_asked_;
+  std::optional<std::string> coverage_;  ///< of a calibration that runs
+  Timestamp next_coverage_{};
   std::string sent_state_;
 };
 

@@ -2,8 +2,9 @@
 
 import { CameraPanel } from "./camera.js";
 import { Charts } from "./charts.js";
-import { byId, element, fixed, setText } from "./dom.js";
+import { byId, element, fixed, forgetStyles, setText } from "./dom.js";
 import { Health, Rates } from "./health.js";
+import { RobotStops } from "./robots.js";
 import { Scene } from "./scene.js";
 import { Store } from "./store.js";
 import { listen, load } from "./stream.js";
@@ -25,8 +26,9 @@ let mustDraw = true;
 
 const scene = new Scene(byId("scene-canvas"), store);
 const charts = new Charts(byId("charts"), store);
-const health = new Health({ neighbors: byId("neighbors"), sensors: byId("sensors"), links: byId("links"), events: byId("events"), load: byId("load") }, store);
+const health = new Health({ neighbors: byId("neighbors"), sensors: byId("sensors"), links: byId("links"), team: byId("team"), teamAge: byId("team-age"), events: byId("events"), load: byId("load") }, store);
 const camera = new CameraPanel(store);
+const stops = new RobotStops(byId("scene-robots"), (robot) => select(robot));
 const redraw = () => { mustDraw = true; };
 
 // ---- the source -------------------------------------------------------------------------------
@@ -40,6 +42,7 @@ function showLink() {
 
 function setSource(about) {
   source = about;
+  if (source.advice) health.advice = source.advice;
   const labels = source.robots.map(({ name, place }, i) => name || place || `robot ${i + 1}`);
   const select = byId("robot");
   const shown = [...select.options].map(({ text }) => text);
@@ -178,6 +181,7 @@ function turn() {
     drawnTime = t;
     mustDraw = false;
     scene.draw(t);
+    stops.place(scene.robots);
     setText(byId("scene-note"), noteOf(t));
     drawTransport(t);
     const now = performance.now();
@@ -230,6 +234,7 @@ function select({ key, name }) {
 function setTheme(name) {
   document.documentElement.dataset.theme = name;
   localStorage.setItem("theme", name);
+  forgetStyles();
   redraw();
 }
 const flipTheme = () => setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
@@ -331,6 +336,7 @@ function listenToPage() {
   on("zoom-all", "click", () => charts.showAll());
   on("csv", "click", () => charts.saveCsv(store.now(wall())));
   on("png", "click", () => charts.savePng());
+  on("scene-png", "click", () => scene.savePng());
   on("play", "click", () => play(!isPlaying));
   on("live", "click", () => play(true));
   on("slider", "input", ({ value }) => seek(Number(value)));

@@ -53,6 +53,7 @@ MeasurementRecord a_measurement() {
                    .dimension = 2,
                    .residual = {0.1, -0.3},
                    .sigma = {0.02, 0.06}};
+  record.reading = {0.6, -0.8, 0.0, 0.06, 0.0, 0.01};
   return record;
 }
 
@@ -86,6 +87,7 @@ TEST(RecordFile, ReadsBackWhatItWrote) {
   EXPECT_EQ(measurements->front().fusion.verdict, Verdict::kGated);
   EXPECT_EQ(measurements->front().fusion.residual, a_measurement().fusion.residual);
   EXPECT_EQ(measurements->front().fusion.sigma, a_measurement().fusion.sigma);
+  EXPECT_EQ(measurements->front().reading, a_measurement().reading);
   EXPECT_EQ(measurements->back().fusion.dimension, 0U);
   ASSERT_TRUE(calibrations) << calibrations.error().message;
   EXPECT_EQ(calibrations->front().value, a_calibration().value);

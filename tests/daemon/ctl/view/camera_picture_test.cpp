@@ -47,8 +47,8 @@ PoseHistory two_metres_ahead() {
 }
 
 TEST(CameraPicture, SaysWhereRobotsAreAndWhereTheyShouldBe) {
-  const auto text =
-      picture_json(kHead + "\n" + std::string(8, '\7'), config_of_one_camera(), two_metres_ahead());
+  const auto text = picture_json(kHead + "\n" + std::string(8, '\7'), 0, config_of_one_camera(),
+                                 two_metres_ahead());
   ASSERT_TRUE(text) << text.error().message;
   const Json json = Json::parse(*text);
 
@@ -63,7 +63,10 @@ TEST(CameraPicture, RefusesWhatIsNone) {
   for (const std::string& look :
        {std::string(), std::string("{}\n"), kHead, kHead + "\n" + std::string(7, 'x'),
         std::string("[1]\nx"), std::string("{\"camera\":9}\nx")})
-    EXPECT_FALSE(picture_json(look, config, {})) << look;
+    EXPECT_FALSE(picture_json(look, 0, config, {})) << look;
+  const std::string of_camera_0 = kHead + "\n" + std::string(8, '\7');
+  EXPECT_TRUE(picture_json(of_camera_0, 0, config, {}));
+  EXPECT_FALSE(picture_json(of_camera_0, 1, config, {}));
 }
 
 TEST(CameraPicture, ShowsTheLightAndWhoMayChangeIt) {

@@ -6,6 +6,7 @@
 
 #include "daemon/ctl/view/page_files.hpp"
 #include "drivers/dataset/pose_file.hpp"
+#include "drivers/dataset/record_file.hpp"
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 
 namespace crepes {
@@ -54,6 +55,37 @@ TEST_F(RecordedFeedTest, HasThinnedPosesOnTheTruthsTimeAndTheTruth) {
   EXPECT_EQ(json["up"][0], Json({0.0, 0.0, 0.0, 1.0}));
   ASSERT_EQ(json["cameras"].size(), 1U);
   EXPECT_EQ(json["cameras"][0]["border"].size(), 40U);
+}
+
+TEST_F(RecordedFeedTest, HasMeasurementsAsTheyCameWithAgesAndWhatWasGated) {
+  const auto record = [](Duration t, MeasurementKind kind, Verdict verdict,
+                         const Reading& reading) {
+    return MeasurementRecord{.stamp = Timestamp{10s + t},
+                             .kind = kind,
+                             .fusion = {.verdict = verdict, .nis = 3.0, .dimension = 2},
+                             .reading = reading};
+  };
+  const Reading ahead{1.0, 0.0, 0.0, 0.06, 0.0, 0.01};
+  std::string rows = innovation_file_header() + "\n";
+  // In the order of the verdicts, which is not that of time.
+  append_innovation_row(rows, record(60ms, MeasurementKind::kRange, Verdict::kGated, {1.5}));
+  append_innovation_row(rows, record(30ms, MeasurementKind::kBearing, Verdict::kFused, ahead));
+  append_innovation_row(rows, record(70ms, MeasurementKind::kPeerRange, Verdict::kGated, {1.4}));
+  swarm_.write("results/r1/r2.innovations.csv", rows);
+  const auto feed = RecordedFeed::open(results(), swarm_.dir());
+  ASSERT_TRUE(feed) << feed.error().message;
+
+  const Json r2 = Json::parse(feed->json_of("r1").value())["neighbors"][0];
+
+  ASSERT_EQ(r2["innovations"].size(), 3U);
+  EXPECT_EQ(r2["innovations"][0], Json({0.03, 0, 0, 1.5, 1.0, 0.0, 0.0, 0.06, 0.0, 0.01}));
+  EXPECT_EQ(r2["innovations"][1], Json({0.06, 2, 1, 1.5, 1.5}));
+  EXPECT_EQ(r2["gated"], Json::parse("[[0,2]]"));
+  // Rows 40 ms apart; the bearing is of 30 ms. Before it nothing was measured.
+  EXPECT_EQ(r2["rows"][0][17], 0.0);
+  EXPECT_EQ(r2["rows"][1][17], 0.01);
+  EXPECT_EQ(r2["rows"][2][17], 0.05);
+  EXPECT_EQ(r2["mounting"]["led"].size(), 3U);
 }
 
 TEST_F(RecordedFeedTest, ShowsPosesWithoutTruth) {
