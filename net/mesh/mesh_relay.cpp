@@ -48,6 +48,11 @@ bool MeshRelay::is_heard(RobotId sender, Timestamp now) const {
   return known != neighbors_.end() && is_in_reach(known->second, now);
 }
 
+bool MeshRelay::is_neighbor(const Endpoint& address) const {
+  return std::ranges::any_of(
+      neighbors_, [&](const auto& neighbor) { return neighbor.second.address == address; });
+}
+
 bool MeshRelay::is_needed(Timestamp now) const {
   return std::ranges::any_of(neighbors_, [&](const auto& neighbor) {
     return is_in_reach(neighbor.second, now) &&

@@ -59,6 +59,8 @@ class MeshRelay {
 
   /// Whether datagrams of this robot arrive directly.
   [[nodiscard]] bool is_heard(RobotId sender, Timestamp now) const;
+  /// Whether a robot that was heard directly has this address.
+  [[nodiscard]] bool is_neighbor(const Endpoint& address) const;
   /// Whether this robot should mark datagrams.
   [[nodiscard]] bool is_needed(Timestamp now) const;
 
