@@ -50,6 +50,7 @@ TEST(IncludeRules, CatchLibrariesOutOfPlace) {
        std::vector<Sample>{{"estimator/relative/raw_pose.cpp", "#include <opencv2/core.hpp>"},
                            {"estimator/vision/blink_tracker.cpp", "#include <opencv2/core.hpp>"},
                            {"estimator/swarm/estimator.cpp", "#include <ceres/ceres.h>"},
+                           {"drivers/camera/camera.hpp", "#include <libcamera/camera.h>"},
                            {"net/peer_message.cpp", "#include <nlohmann/json.hpp>"},
                            {"net/udp_socket.cpp", "#include <spdlog/spdlog.h>"},
                            {"config/schema/config.hpp", "#include <yaml-cpp/yaml.h>"},

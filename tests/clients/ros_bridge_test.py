@@ -355,6 +355,14 @@ class TheNode(unittest.TestCase):
         self.assertEqual(connection.arguments, ("127.0.0.1", 48000))
         self.assertEqual(connection.options, {"rate_hz": 20.0, "poll_s": 1.0})
 
+    def test_takes_whole_numbers_for_rates_too(self):
+        connection = FakeConnection(pose_of())
+
+        self.published(connection, "rate_hz:=20", "diagnostics_period_s:=2")
+
+        self.assertEqual(connection.options, {"rate_hz": 20.0, "poll_s": 2.0})
+        self.assertIsInstance(connection.options["rate_hz"], float)
+
     def test_leaves_out_what_is_not_wanted(self):
         published, _ = self.published(FakeConnection(pose_of()), "publish_odometry:=false")
 

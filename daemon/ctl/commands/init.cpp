@@ -28,7 +28,7 @@ Result<void> run_init(const InitOptions& options, bool asks) {
 
 void add_camera_options(CLI::App* sub, InitOptions& options) {
   sub->add_option("--camera", options.camera_driver, "its driver, instead of the one that is found")
-      ->check(CLI::IsMember({"none", "aravis", "v4l2", "mindvision"}));
+      ->check(CLI::IsMember({"none", "aravis", "v4l2", "libcamera", "mindvision"}));
   sub->add_option("--device", options.camera_device, "its device, with --camera");
   sub->add_option("--resolution", options.resolution, "width and height [px]; default: 1280 1024")
       ->expected(2)

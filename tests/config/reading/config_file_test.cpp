@@ -468,6 +468,8 @@ TEST(ConfigFile, RefusesWhatACamerasDriverCannotDo) {
             "frame at rate_hz");
   EXPECT_EQ(with("rolling_shutter_us_per_row: 4.4"), "");
   EXPECT_EQ(with("driver: v4l2"), "f:7: cameras[0].device: driver v4l2 needs one, as /dev/video0");
+  EXPECT_NE(with("driver: libcamera\n    trigger: hardware").find(".trigger:"), std::string::npos);
+  EXPECT_NE(with("driver: libcamera\n    offset: [8, 0]").find(".offset:"), std::string::npos);
   EXPECT_NE(with("driver: v4l2\n    device: d\n    trigger: hardware").find(".trigger:"),
             std::string::npos);
   EXPECT_NE(with("driver: mindvision\n    gain: 2").find(".gain:"), std::string::npos);
