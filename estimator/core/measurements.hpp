@@ -168,6 +168,7 @@ struct ImuBiasEstimate {
 
 /// A robot whose sensors contradict the rest of the team.
 struct TeamFault {
+  /// What is wrong.
   enum class Kind : std::uint8_t {
     kCameraTurned,   ///< its bearings are used with the misalignment that the team found
     kCameraRefused,  ///< it contradicts the team whatever its misalignment

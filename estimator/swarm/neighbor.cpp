@@ -37,12 +37,16 @@ void Neighbor::reconfigure(const FilterSettings& settings) {
   publisher_.reconfigure(settings);
 }
 
-void Neighbor::add_bearing(const Bearing& bearing) {
+void Neighbor::add(const NeighborInput& input) {
+  std::visit([this](const auto& one) { add_input(one); }, input);
+}
+
+void Neighbor::add_input(const Bearing& bearing) {
   initiator_.add_bearing(bearing);
   intake_.add_bearing(bearing);
 }
 
-void Neighbor::add_range(const UwbRange& range) {
+void Neighbor::add_input(const UwbRange& range) {
   if (intake_.add_range(range, MeasurementKind::kRange))
     initiator_.add_range(range.stamp, range.range_m);
 }
@@ -71,7 +75,8 @@ void Neighbor::add_report(const ReceivedReport& received, const RobotState& self
   }
 }
 
-void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
+void Neighbor::add_input(const StampedGraphPose& input) {
+  const auto& [stamp, pose] = input;
   const bool sighted =
       !hypotheses_.empty() &&
       stamp - hypotheses_.leader().heaviest().last_sighting() <= recent_ + intake_.buffer().lag();
@@ -82,10 +87,7 @@ void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
   }
 }
 
-void Neighbor::add_team_pose(Timestamp stamp, const TeamPose& pose, const ImuBiasEstimate& bias_B,
-                             const ImuBiasEstimate& bias_N) {
-  publisher_.add_team_pose({stamp, pose, bias_B, bias_N});
-}
+void Neighbor::add_input(const TeamEstimate& estimate) { publisher_.add_team_pose(estimate); }
 
 void Neighbor::tick(Timestamp now, const RobotState& self) {
   publisher_.clear();

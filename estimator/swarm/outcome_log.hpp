@@ -15,8 +15,10 @@ class OutcomeLog {
   void keep_records() { keeps_records_ = true; }
   [[nodiscard]] Records drain_records() { return std::exchange(records_, {}); }
 
+  /// Counts the outcome of a measurement, and records it if asked to, with what was read.
   void add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion,
            const SensorReading& reading = {});
+  /// Records a calibration, if asked to.
   void add(std::optional<CalibrationRecord> calibration);
   [[nodiscard]] bool keeps_records() const { return keeps_records_; }
 

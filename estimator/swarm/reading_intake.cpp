@@ -9,7 +9,7 @@ ReadingIntake::ReadingIntake(RobotId neighbor, const FilterSettings& settings)
 
 void ReadingIntake::reconfigure(const FilterSettings& settings) {
   // The waiting readings are meant for the filter of the former profile.
-  if (settings.profile != settings_.profile) buffer_.clear();
+  if (settings.traits != settings_.traits) buffer_.clear();
   settings_ = settings;
   buffer_.set_least_lag(settings.lag);
 }

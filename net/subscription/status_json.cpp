@@ -30,6 +30,7 @@ Json sensor_json(const SensorStatus& sensor) {
   Json json{{"name", truncated_utf8(sensor.name, kMaxName)}};
   put(json, "rate_hz", sensor.rate_hz, 4);
   json["ok"] = sensor.ok;
+  if (!sensor.is_calibrated) json["calibrated"] = false;
   if (!sensor.message.empty()) json["message"] = truncated_utf8(sensor.message, kMaxText);
   if (Json faults = totals_json(sensor.totals.faults); !faults.empty())
     json["faults"] = std::move(faults);

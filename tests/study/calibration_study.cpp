@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "estimator/calibration/camera_batch.hpp"
-#include "estimator/calibration/camera_start.hpp"
-#include "estimator/calibration/jet_geometry.hpp"
+#include "estimator/calibration/batch/jet_geometry.hpp"
+#include "estimator/calibration/camera/camera_batch.hpp"
+#include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 #include "tests/support/calibration_recording.hpp"
 
 namespace crepes {
@@ -126,10 +127,7 @@ Score trial(std::uint64_t seed, const simulated::HandHeld& hand) {
   return score;
 }
 
-double median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values.empty() ? 0.0 : values[values.size() / 2];
-}
+double median(std::vector<double> values) { return values.empty() ? 0.0 : upper_median(values); }
 
 std::vector<double> column(const std::vector<Score>& scores, double Score::*value) {
   std::vector<double> values;

@@ -9,7 +9,7 @@
 #include "daemon/ctl/calibrate/board_sightings.hpp"
 #include "daemon/ctl/calibrate/camera_report.hpp"
 #include "drivers/dataset/robot_folder.hpp"
-#include "estimator/calibration/camera_start.hpp"
+#include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {

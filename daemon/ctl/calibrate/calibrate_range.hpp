@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl calibrate range`.
 struct CalibrateRangeOptions {
   std::filesystem::path swarm_dir;
   std::filesystem::path tape;
@@ -15,9 +16,9 @@ struct CalibrateRangeOptions {
   bool json = false;
 };
 
-/// Writes FILE, the biases of pairs and modules. Where the
-/// pairs determine the modules, or there are two robots, also FILE's
-/// name with .members.yaml: a fragment with `swarm.members[].range_delay_m`, for every robot.
+/// Writes FILE, the biases of pairs and modules. If the pairs determine the modules, or there are
+/// two robots, it also writes FILE's name with .members.yaml: a fragment with
+/// `swarm.members[].range_delay_m` for every robot.
 [[nodiscard]] Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options);
 
 }  // namespace crepes

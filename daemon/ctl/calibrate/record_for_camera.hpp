@@ -7,6 +7,7 @@
 
 namespace crepes {
 
+/// Options of the recording.
 struct RecordForCameraOptions {
   std::filesystem::path dir;     ///< a new data set
   std::filesystem::path socket;  ///< of the daemon's recordings

@@ -11,6 +11,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl demo`.
 struct DemoOptions {
   SimScenario scenario = SimScenario::kFour;
   int seed = 1;

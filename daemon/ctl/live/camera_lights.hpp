@@ -11,6 +11,7 @@
 
 namespace crepes {
 
+/// Exposure and gain of the camera of this name.
 struct NamedLight {
   std::string camera;
   CameraLight light;

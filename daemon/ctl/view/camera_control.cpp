@@ -28,7 +28,7 @@ Result<std::optional<Number>> number_in(const std::map<std::string, std::string>
 
 Result<void> reload(pid_t daemon) {
   if (::kill(daemon, SIGHUP) == 0) return {};
-  return fail(ErrorCode::kIo, fmt::format("the daemon cannot be told to reload: {}",
+  return fail(ErrorCode::kIo, fmt::format("the daemon cannot be asked to reload: {}",
                                           std::generic_category().message(errno)));
 }
 

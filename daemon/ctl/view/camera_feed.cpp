@@ -40,7 +40,7 @@ std::map<std::uint8_t, std::string> CameraFeed::exchange(Timestamp now,
   }
   connect(now);
   if (daemon_) {
-    ask(now, wanted);
+    request_picture(now, wanted);
     if (const auto received = receive(now, poses, events); !received)
       hang_up(received.error().message, now);
   }
@@ -48,9 +48,9 @@ std::map<std::uint8_t, std::string> CameraFeed::exchange(Timestamp now,
     next_coverage_ = now + kCoveragePeriod;
     coverage_ = read_coverage(socket_);
   }
-  if (std::string state = greeting(); state != told_) {
-    told_ = std::move(state);
-    for (const std::uint8_t camera : wanted) events[camera].insert(0, told_);
+  if (std::string state = greeting(); state != sent_state_) {
+    sent_state_ = std::move(state);
+    for (const std::uint8_t camera : wanted) events[camera].insert(0, sent_state_);
   }
   return events;
 }
@@ -76,7 +76,7 @@ void CameraFeed::hang_up(std::string reason, Timestamp now) {
 }
 
 /// The camera whose turn it is, if no answer is pending.
-void CameraFeed::ask(Timestamp now, const std::vector<std::uint8_t>& wanted) {
+void CameraFeed::request_picture(Timestamp now, const std::vector<std::uint8_t>& wanted) {
   if (asked_) {
     if (now - asked_->at > kPatience) reason_ = "the camera delivers no pictures: see Health";
     return;
@@ -98,13 +98,13 @@ Result<void> CameraFeed::receive(Timestamp now, const PoseHistory& poses,
     if (!*goes_on) return fail(ErrorCode::kIo, "the daemon hung up");
     const auto block = daemon_->next();
     if (!block) return tl::unexpected(block.error());
-    if (*block) take(**block, now, poses, events);
+    if (*block) handle_block(**block, now, poses, events);
   }
   return {};
 }
 
-void CameraFeed::take(const Block& block, Timestamp now, const PoseHistory& poses,
-                      std::map<std::uint8_t, std::string>& events) {
+void CameraFeed::handle_block(const Block& block, Timestamp now, const PoseHistory& poses,
+                              std::map<std::uint8_t, std::string>& events) {
   if (block.kind == "refused") return hang_up(block.content, now);
   if (block.kind == "config") {
     CheckedConfig checked = check_config_text(block.content, "the daemon's configuration");

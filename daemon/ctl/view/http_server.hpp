@@ -12,6 +12,7 @@
 
 namespace crepes {
 
+/// Where the server listens, and its limits.
 struct HttpSettings {
   std::string address = "127.0.0.1";  ///< numeric, IPv4 or IPv6
   std::uint16_t port = 8080;          ///< 0: a free one

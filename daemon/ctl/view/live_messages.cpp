@@ -90,8 +90,8 @@ std::string LiveMessages::link_event(bool is_silent) const {
 
 std::string LiveMessages::drain(Timestamp now) {
   std::string events;
-  if (told_silent_ != is_silent(now)) events += link_event(is_silent(now));
-  told_silent_ = is_silent(now);
+  if (reported_silent_ != is_silent(now)) events += link_event(is_silent(now));
+  reported_silent_ = is_silent(now);
   events += std::exchange(new_statuses_, {});
   return events + frame_event(std::exchange(new_poses_, {}));
 }

@@ -169,9 +169,9 @@ void Site::advance(HttpServer& server, Timestamp now) {
   }
   advance_cameras(server, now);
   std::string common;
-  if (std::string robots = robots_json(Json::object()); robots != told_robots_) {
+  if (std::string robots = robots_json(Json::object()); robots != sent_robots_) {
     common += stream_event("robots", robots);
-    told_robots_ = std::move(robots);
+    sent_robots_ = std::move(robots);
   }
   if (now >= next_heartbeat_) {
     common += ": still here\n\n";

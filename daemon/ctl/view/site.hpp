@@ -52,7 +52,7 @@ class Site {
   std::vector<DaemonAddress> daemons_;  ///< of the live feeds
   std::vector<CameraFeed> cameras_;     ///< of the live feeds
   std::filesystem::path config_;
-  std::string told_robots_;
+  std::string sent_robots_;
   Timestamp next_heartbeat_{};
 };
 

@@ -135,7 +135,7 @@ Result<void> view(const ViewOptions& options) {
   auto browser = open_browser(options, policy, url);
   if (!browser) return tl::unexpected(browser.error());
   if (options.on_ready) {
-    if (auto told = options.on_ready(url); !told) return told;
+    if (auto announced = options.on_ready(url); !announced) return announced;
   }
   const KeyReader keys;
   server->serve(kTick, [&] {

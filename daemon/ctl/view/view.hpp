@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl view`.
 struct ViewOptions {
   std::string listen = "127.0.0.1:8080";
   DaemonAddress daemon;

@@ -27,7 +27,7 @@ export class CameraPanel {
   constructor(store) {
     this.store = store;
     this.isShown = false;
-    this.isLearning = false; // what the cameras see
+    this.isLoading = false; // what the cameras see
     this.canvas = byId("camera-canvas");
     this.sheet = element("canvas"); // the picture alone, pixel by pixel
     this.camera = 0;
@@ -43,7 +43,7 @@ export class CameraPanel {
   reset(store) {
     this.store = store;
     this.close();
-    this.isLearning = false;
+    this.isLoading = false;
     this.camera = 0;
     this.picture = null;
     this.setCoverage({});
@@ -52,25 +52,25 @@ export class CameraPanel {
   /** Asks for pictures only while they are seen. */
   show(isShown, robot) {
     this.isShown = isShown;
-    const isWanted = (isShown || this.isLearning) && this.store.isLive && !document.hidden;
+    const isWanted = (isShown || this.isLoading) && this.store.isLive && !document.hidden;
     if (this.stop && (!isWanted || robot !== this.robot)) this.close();
     this.robot = robot;
     if (isWanted && !this.stop) this.open();
   }
 
   /** What the cameras see, for the scene: the daemon says it with its first picture. */
-  learn(robot) {
-    this.isLearning = this.store.isLive && this.store.cameras.length === 0;
+  loadCameras(robot) {
+    this.isLoading = this.store.isLive && this.store.cameras.length === 0;
     this.show(this.isShown, robot);
   }
 
   open() {
-    this.note("waiting for a picture");
+    this.setNote("waiting for a picture");
     this.stop = listen(`/camera?robot=${this.robot}&camera=${this.camera}`, (name, data) => {
       if (name === "camera") this.setState(data);
       if (name === "picture") this.setPicture(data);
       if (name === "coverage") this.setCoverage(data);
-    }, (error) => this.note(error.message));
+    }, (error) => this.setNote(error.message));
   }
 
   close() {
@@ -79,7 +79,7 @@ export class CameraPanel {
     this.times = [];
   }
 
-  note(text) {
+  setNote(text) {
     setText(byId("camera-note"), text);
   }
 
@@ -91,11 +91,11 @@ export class CameraPanel {
       select.replaceChildren(...names.map((name, i) => element("option", { value: String(i) }, name)));
       select.value = String(this.camera);
     }
-    this.note(state.reason || "");
+    this.setNote(state.reason || "");
     if (state.cameras.length > 0) this.store.cameras = state.cameras.map(({ field }) => field).filter(Boolean);
     this.store.changed();
-    if (this.isLearning && this.store.cameras.length > 0) {
-      this.isLearning = false;
+    if (this.isLoading && this.store.cameras.length > 0) {
+      this.isLoading = false;
       this.show(this.isShown, this.robot);
     }
     this.showLight();

@@ -72,17 +72,17 @@ function fillTable(table, head, rows) {
 /** Rate and age of a kind of measurement; an old one is marked. */
 const measuredCells = (rate, ageMs) => [[fixed(rate, 1)], [fixed(ageMs, 0), ageMs > 1000 * FRESH_SECONDS]];
 
-/** Measurements per second between two looks at the totals. */
+/** Measurements per second between two reports of the totals. */
 export class Rates {
   constructor() {
-    this.looks = new Map();
+    this.last = new Map();
   }
 
   /** Called after each STATUS; `seconds` is the wall's time. Adds rows to the store for charts and sparklines. */
-  look(store, seconds) {
+  addStatus(store, seconds) {
     for (const neighbor of store.status.neighbors || []) {
       const key = String(neighbor.peer);
-      const last = this.looks.get(key);
+      const last = this.last.get(key);
       if (last && seconds - last.seconds < 0.9) continue;
       const now = { seconds, counts: structuredClone(neighbor.measurements || {}), gated: allOf(neighbor, "gated") };
       const known = store.neighbor(key, neighbor.name);
@@ -91,7 +91,7 @@ export class Rates {
         known.gated = [...(known.gated || []).slice(-400), [t, Math.max(0, (now.gated - last.gated) / (seconds - last.seconds))]];
         known.rates = Object.fromEntries(Object.keys(now.counts).map((kind) => [kind, (verdicts(neighbor, kind, "fused") - (last.counts[kind]?.fused || 0)) / (seconds - last.seconds)]));
       }
-      this.looks.set(key, now);
+      this.last.set(key, now);
     }
     for (const sensor of store.status.sensors || []) {
       const rows = (store.sensorRates ||= new Map()).get(sensor.name) || [];

@@ -69,7 +69,7 @@ function onEvent(name, data) {
   if (name === "link") store.setLink(data);
   if (name === "status") {
     store.addStatus(data);
-    rates.look(store, wall());
+    rates.addStatus(store, wall());
   }
   if (name !== "frame") showLink();
 }
@@ -88,7 +88,7 @@ async function show(index) {
   for (const node of document.querySelectorAll("[data-live]")) node.hidden = !source.live;
   if (!source.live && document.body.dataset.panel === "camera") showPanel("scene");
   showCamera();
-  if (scene.settings.cameras) camera.learn(robot);
+  if (scene.settings.cameras) camera.loadCameras(robot);
   byId("speed-label").hidden = source.live;
   redraw();
   if (source.live) {
@@ -166,7 +166,7 @@ function drawTransport(t) {
 function noteOf(t) {
   if (!store.link.ok) return store.link.reason;
   if (store.neighbors.size === 0) return "no neighbors yet";
-  if (scene.settings.cameras && camera.isLearning && camera.state.reason) return `What the cameras see is not known: ${camera.state.reason}`;
+  if (scene.settings.cameras && camera.isLoading && camera.state.reason) return `What the cameras see is not known: ${camera.state.reason}`;
   if (scene.isLevel) return "";
   if (!store.isLive) return store.hasTruth ? "" : "Gravity is not known without --truth: the grid is the robot's own x-y plane.";
   return store.newest ? "Gravity is not known: the grid is the robot's own x-y plane." : "No poses yet: see Health for the reasons.";
@@ -327,7 +327,7 @@ function listenToPage() {
   });
   on("cameras", "change", ({ checked }) => {
     scene.settings.cameras = checked;
-    if (checked) camera.learn(robot);
+    if (checked) camera.loadCameras(robot);
   });
   on("truth", "change", ({ checked }) => { scene.settings.truth = checked; });
   on("focus", "change", ({ value }) => charts.setFocus(value));

@@ -23,7 +23,7 @@ export const KINDS = ["bearing", "peer_bearing", "range", "peer_range"];
 const RADIANS = Math.PI / 180;
 const CALIBRATION = [["own_gyro_bias_radps", 3, 1], ["own_accel_bias_mps2", 3, 1], ["gyro_bias_radps", 3, 1], ["accel_bias_mps2", 3, 1], ["range_bias_m", 1, 1],
   ["own_misalignment_deg", 3, RADIANS], ["misalignment_deg", 3, RADIANS]];
-export const FRESH_SECONDS = 1.5; // STATUS tells of a neighbor's measurements once a second
+export const FRESH_SECONDS = 1.5; // STATUS reports a neighbor's measurements once a second
 
 export const positionOf = (row) => row.slice(P, P + 3);
 export const quaternionOf = (row) => row.slice(Q, Q + 4);
@@ -123,8 +123,8 @@ export class Store {
   addRow(neighbor, row) {
     const last = neighbor.rows.at(-1);
     if (last && row[T] <= last[T]) return;
-    if (last && row[RESETS] !== last[RESETS]) this.tell("reset", `${neighbor.name}: its filter started anew`);
-    if (last && row[T] - last[T] > 1) this.tell("found", `${neighbor.name}: located again (${MODES[row[MODE]]})`);
+    if (last && row[RESETS] !== last[RESETS]) this.addEvent("reset", `${neighbor.name}: its filter started anew`);
+    if (last && row[T] - last[T] > 1) this.addEvent("found", `${neighbor.name}: located again (${MODES[row[MODE]]})`);
     neighbor.rows.push(row);
   }
 
@@ -161,7 +161,7 @@ export class Store {
     merge("clocks", clocks);
     for (const { peer, name } of this.status.neighbors) this.neighbor(String(peer), name);
     for (const { peer, ages_s: ages, measured } of neighbors) if (ages) this.addMeasured(this.neighbor(String(peer)), ages, measured, status.timestamp);
-    this.tellChanges(before, this.status);
+    this.addChanges(before, this.status);
     this.changed();
   }
 
@@ -206,31 +206,31 @@ export class Store {
     return fresh.sort((a, b) => b.t - a.t)[0] || null;
   }
 
-  tellChanges(before, after) {
+  addChanges(before, after) {
     if (!before.self) return;
-    if (after.uptime_s < before.uptime_s) this.tell("restart", `${after.name}: the daemon has started anew`);
+    if (after.uptime_s < before.uptime_s) this.addEvent("restart", `${after.name}: the daemon has started anew`);
     if (after.config && before.config) {
-      if (after.config.generation > before.config.generation) this.tell("reload", "the configuration was reloaded");
-      if (after.config.fault && after.config.fault !== before.config.fault) this.tell("fault", `reload refused: ${after.config.fault}`);
+      if (after.config.generation > before.config.generation) this.addEvent("reload", "the configuration was reloaded");
+      if (after.config.fault && after.config.fault !== before.config.fault) this.addEvent("fault", `reload refused: ${after.config.fault}`);
     }
     for (const sensor of after.sensors || []) {
       const was = (before.sensors || []).find(({ name }) => name === sensor.name);
-      if (was && was.ok !== sensor.ok) this.tell(sensor.ok ? "found" : "fault", `${sensor.name}: ${sensor.ok ? "works again" : sensor.message || "fault"}`);
+      if (was && was.ok !== sensor.ok) this.addEvent(sensor.ok ? "found" : "fault", `${sensor.name}: ${sensor.ok ? "works again" : sensor.message || "fault"}`);
     }
     for (const neighbor of after.neighbors) {
       const was = (before.neighbors || []).find(({ peer }) => peer === neighbor.peer);
-      if (was && was.state !== "none" && neighbor.state === "none") this.tell("lost", `${neighbor.name}: no pose (${neighbor.reason})`);
-      for (const fault of neighbor.faults || []) if (was && !(was.faults || []).includes(fault)) this.tell("fault", `${neighbor.name}: ${fault}`);
+      if (was && was.state !== "none" && neighbor.state === "none") this.addEvent("lost", `${neighbor.name}: no pose (${neighbor.reason})`);
+      for (const fault of neighbor.faults || []) if (was && !(was.faults || []).includes(fault)) this.addEvent("fault", `${neighbor.name}: ${fault}`);
     }
   }
 
   setLink(link) {
-    if (link.ok !== this.link.ok) this.tell(link.ok ? "found" : "lost", link.ok ? "the daemon answers" : link.reason);
+    if (link.ok !== this.link.ok) this.addEvent(link.ok ? "found" : "lost", link.ok ? "the daemon answers" : link.reason);
     this.link = link;
     this.changed();
   }
 
-  tell(kind, text) {
+  addEvent(kind, text) {
     this.events.unshift({ kind, text, time: new Date() });
     this.events.length = Math.min(this.events.length, MAX_EVENTS);
   }
