@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "estimator/core/time.hpp"
@@ -20,10 +21,19 @@ struct HiddenLight {
   BlinkEvidence evidence;
 };
 
+/// Where a board is, by the pose of its robot, with the phase in which it was blinking.
+struct ExpectedLight {
+  CodeMatch match;
+  Timestamp phase_learned{};
+  Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
+  double sigma_rad = 0.0;
+};
+
 /// Carries hidden lights by the gyro and their own motion, for a few seconds. A light that appears
 /// where one of them is expected continues its evidence. The more uncertain the direction has
-/// become and the nearer another one is expected, the likelier it is another. Bounded; what has
-/// been hidden longest is dropped first.
+/// become and the nearer another one is expected, the likelier it is another. Where the pose of its
+/// robot is known, a board is expected there instead, however long ago it was seen. Bounded; what
+/// has been hidden longest is dropped first.
 class HiddenLights {
  public:
   static constexpr std::size_t kCapacity = 32;
@@ -32,6 +42,8 @@ class HiddenLights {
   struct Return {
     BlinkEvidence evidence;
     double stranger = 0.0;  ///< the probability that it is another light
+    /// The one of `expected` that is here; null if its own past puts the light here.
+    const ExpectedLight* by_pose = nullptr;
   };
 
   /// The body turned: R_now_before.
@@ -40,8 +52,10 @@ class HiddenLights {
   /// to `unused`.
   void drop_old(Timestamp now, std::vector<BlinkEvidence>& unused);
   void add(HiddenLight light, std::vector<BlinkEvidence>& unused);
-  /// The hidden light that `u_B` continues; empty if none is expected there, or several are alike.
-  [[nodiscard]] std::optional<Return> take(const Eigen::Vector3d& u_B, Timestamp now);
+  /// The light that `u_B` continues, of those hidden and those `expected` by poses; empty if none
+  /// is expected there, or several are alike.
+  [[nodiscard]] std::optional<Return> take(const Eigen::Vector3d& u_B, Timestamp now,
+                                           std::span<const ExpectedLight> expected = {});
 
  private:
   std::vector<HiddenLight> lights_;
