@@ -228,6 +228,12 @@ struct NeighborStatus {
   std::vector<TeamFault> faults;        ///< what the team finds wrong with it
 };
 
+/// Lights that were named where and when their board was expected, before their blinking was read.
+struct PredictedIds {
+  std::uint64_t confirmed = 0;    ///< read afterwards
+  std::uint64_t unconfirmed = 0;  ///< not read as predicted within 0.3 s; no filter used them
+};
+
 /// The state of the estimator, for STATUS.
 struct EstimatorStatus {
   std::vector<NeighborStatus> neighbors;  ///< all members but this robot, ordered by id
@@ -236,6 +242,7 @@ struct EstimatorStatus {
   std::uint64_t refused_samples = 0;  ///< NaN, out of range, stamp that goes back, refused_imu
   ImuFaultCounts refused_imu{};       ///< of our IMU, by reason
   std::vector<TeamFault> faults;      ///< what the team finds wrong with us
+  PredictedIds predicted_ids;
 };
 
 }  // namespace crepes

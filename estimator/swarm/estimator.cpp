@@ -122,6 +122,7 @@ struct Estimator::State {
   [[nodiscard]] const ImuHistory* imu_of(RobotId robot) const;
   [[nodiscard]] GraphProblem graph_problem(const std::vector<NeighborEstimate>& own) const;
   [[nodiscard]] std::optional<TeamInterval> team_interval(Timestamp now);
+  [[nodiscard]] ExpectedBoard expected_board(const NeighborPose& pose) const;
 
   RobotId id;
   RobotState self;
@@ -138,6 +139,7 @@ struct Estimator::State {
   PeriodicTimer report_timer;
   PeriodicTimer graph_timer;
   Timestamp last_tick = kNever;
+  std::vector<ExpectedBoard> expected;  ///< by the poses of the last tick
   SwarmConfig swarm;
   FilterSettings filters;
   VisionConfig vision;
@@ -213,17 +215,31 @@ Outputs Estimator::State::handle(const SpotFrame& frame) {
     return {};
   }
   Outputs outputs;
-  outputs.bearings = trackers[frame.camera].step(frame);
+  BlinkTracker& tracker = trackers[frame.camera];
+  outputs.bearings = tracker.step(frame, expected);
   // IDs are read through any lens; a direction through a guessed one would be degrees off.
   if (!is_calibrated[frame.camera]) return {};
   // A robot that sees its own code sees itself in a mirror.
   std::erase_if(outputs.bearings,
                 [&](const Bearing& bearing) { return !neighbors.contains(bearing.neighbor); });
+  // What was named because a pose expects it there says nothing about the pose until it is read.
+  for (const Bearing& bearing : tracker.confirmed())
+    if (neighbors.contains(bearing.neighbor)) neighbors.at(bearing.neighbor).add(bearing);
   for (const Bearing& bearing : outputs.bearings) {
+    if (bearing.how != Naming::kRead) continue;
     neighbors.at(bearing.neighbor).add(bearing);
     composer.add(bearing);
   }
   return outputs;
+}
+
+ExpectedBoard Estimator::State::expected_board(const NeighborPose& pose) const {
+  const Eigen::Vector3d p_N_M = member_of(swarm, pose.neighbor).p_body_led;
+  return {.robot = pose.neighbor,
+          .stamp = pose.stamp,
+          .p_B_M = pose.T_B_N.pose * p_N_M,
+          .v_B_M = pose.v_B_N,
+          .covariance_m2 = pose.T_B_N.covariance.topLeftCorner<3, 3>()};
 }
 
 Outputs Estimator::State::handle(const ReceivedReport& received) {
@@ -303,12 +319,14 @@ Outputs Estimator::State::handle(const Tick& tick) {
 
   Outputs outputs;
   std::vector<NeighborEstimate> estimates;
+  expected.clear();
   for (auto& [robot, neighbor] : neighbors) {
     neighbor.tick(tick.stamp, self);
     append(neighbor.outcomes().drain_records(), outputs.records);
     if (auto estimate = neighbor.output().estimate()) estimates.push_back(*estimate);
     if (auto pose = neighbor.output().published()) {
       if (const auto tilt = self.tilt_at(pose->stamp)) pose->up_B = tilt->up_B;
+      expected.push_back(expected_board(*pose));
       outputs.poses.push_back(std::move(*pose));
     }
   }
@@ -364,6 +382,11 @@ EstimatorStatus Estimator::status() const {
     }
     one.faults = faults_of(robot);
     status.neighbors.push_back(std::move(one));
+  }
+  for (const BlinkTracker& tracker : state_->trackers) {
+    const PredictedIds ids = tracker.status().predicted_ids;
+    status.predicted_ids.confirmed += ids.confirmed;
+    status.predicted_ids.unconfirmed += ids.unconfirmed;
   }
   status.tilt = state_->self.tilt;
   status.unknown_senders = state_->unknown_senders;

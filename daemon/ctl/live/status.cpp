@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/ctl/live/full_status.hpp"
+#include "daemon/ctl/live/light_advice.hpp"
 #include "daemon/ctl/live/pose_advice.hpp"
 #include "daemon/ctl/text_table.hpp"
 
@@ -77,6 +78,17 @@ std::string advice_of(const client::Status& status) {
   return text;
 }
 
+/// How to change the cameras' exposure.
+std::string light_of(const client::Status& status) {
+  std::string text;
+  for (const auto& sensor : status.sensors) {
+    if (!sensor.counts.contains("background")) continue;
+    const std::string advice = light_advice(sensor.counts);
+    if (!advice.empty()) text += fmt::format("{}: {}\n", sensor.name, advice);
+  }
+  return text;
+}
+
 /// What the team finds wrong with a robot; on a healthy team this is empty.
 std::string faults_of(const client::Status& status) {
   std::string text;
@@ -128,9 +140,9 @@ std::string totals_of(const client::Status& status) {
 }  // namespace
 
 std::string status_text(const client::Status& status) {
-  return fmt::format("{}\n{}\n{}\n{}{}{}{}{}", head_of(status), sensors_of(status),
-                     neighbors_of(status), advice_of(status), faults_of(status), mesh_of(status),
-                     thinned_of(status), totals_of(status));
+  return fmt::format("{}\n{}\n{}\n{}{}{}{}{}{}", head_of(status), sensors_of(status),
+                     neighbors_of(status), advice_of(status), light_of(status), faults_of(status),
+                     mesh_of(status), thinned_of(status), totals_of(status));
 }
 
 Result<std::string> status(const StatusOptions& options) {
