@@ -99,7 +99,7 @@ struct TeamResidual {
   int refused = 0;  ///< likewise
   /// Of the mean of those that were fused, or of all if none was: residual^T S^-1 residual.
   double nis = 0.0;
-  int dimension = 0;                ///< 0: there was no residual
+  int dimension = 0;                 ///< 0: there was no residual
   std::array<double, 2> residual{};  ///< bearings [rad], ranges [m]; none for kGyro
   std::array<double, 2> sigma{};     ///< roots of S's diagonal
 };

@@ -8,7 +8,7 @@
 namespace crepes {
 namespace {
 
-constexpr double kMemory = 0.5;    // s
+constexpr double kMemory = 0.5;      // s
 constexpr double kLeastError = 0.3;  // m; nothing smaller is called wrong
 constexpr double kFarAway = 100.0;   // chi-square; ten sigmas
 constexpr double kFloor = 0.05;      // m; what an estimate is believed at best

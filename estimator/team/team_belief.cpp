@@ -235,7 +235,8 @@ TeamPose TeamBelief::team_pose(RobotId id, const TeamMember& member) const {
     covariance << P.block<1, 6>(row, biases[0]), P.block<1, 6>(row, biases[1]);
     return covariance;
   };
-  const Eigen::Matrix<double, kMotion, 1> with_clock = by_motion * P.block<kMotion, 1>(motion, clock);
+  const Eigen::Matrix<double, kMotion, 1> with_clock =
+      by_motion * P.block<kMotion, 1>(motion, clock);
   const Matrix9d carried = by_motion.lazyProduct(P.block<kMotion, kMotion>(motion, motion));
   Matrix9d of_motion = carried.lazyProduct(by_motion.transpose());
   of_motion += with_clock * by_clock.transpose() + by_clock * with_clock.transpose() +

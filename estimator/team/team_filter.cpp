@@ -251,9 +251,8 @@ void TeamFilter::add_members(const TeamInterval& interval, TeamSolution& solutio
   for (const auto& [id, robot] : belief_.robots) places[id] = TeamPlace::of(belief_, id);
   for (const auto& [id, robot] : belief_.robots) add_candidates_from(id);
   while (!candidates.empty()) {
-    const auto best = std::ranges::min_element(candidates, {}, [](const auto& candidate) {
-      return candidate.second.doubt();
-    });
+    const auto best = std::ranges::min_element(
+        candidates, {}, [](const auto& candidate) { return candidate.second.doubt(); });
     const auto [id, place] = *best;
     candidates.erase(best);
     places[id] = place;
@@ -275,10 +274,10 @@ void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const Team
   auto block = belief_.P.bottomRightCorner<FreeMotionAt::kMotion, FreeMotionAt::kMotion>();
   block = place.covariance;
   block.diagonal().head<3>().array() += std::pow(doubt * kStartPosition, 2);
-  block.diagonal().segment<3>(3).array() += (doubt * doubt - 1.0) * std::pow(TeamPlace::kSpeedSigma, 2);
+  block.diagonal().segment<3>(3).array() +=
+      (doubt * doubt - 1.0) * std::pow(TeamPlace::kSpeedSigma, 2);
   block.diagonal().tail<3>().array() += std::pow(doubt * kStartAttitude, 2);
-  if (const auto turn = trust_.turn_covariance(id))
-    block.bottomRightCorner<3, 3>() += *turn;
+  if (const auto turn = trust_.turn_covariance(id)) block.bottomRightCorner<3, 3>() += *turn;
   robot.bias_index = belief_.append_calibration(interval.settings.priors);
   robot.last_sighting = place.last_sighting;
   robot.since = belief_.stamp;

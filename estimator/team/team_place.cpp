@@ -51,8 +51,7 @@ double TeamPlace::doubt() const {
 TeamPose TeamPlace::pose(RobotId id, const TeamBelief& belief, const Priors& priors) const {
   constexpr int kOwn = TeamPose::kMotion;
   constexpr int kOther = kOwn + 6;
-  TeamPose pose{
-      .neighbor = id, .T_B_N = T_S_N, .v_B_N = v_S_N, .last_sighting = last_sighting};
+  TeamPose pose{.neighbor = id, .T_B_N = T_S_N, .v_B_N = v_S_N, .last_sighting = last_sighting};
   const int own = belief.robots.at(belief.self).bias_index;
   const double gyro = priors.gyro_bias_radps * priors.gyro_bias_radps;
   pose.covariance.topLeftCorner<kOwn, kOwn>() = covariance;

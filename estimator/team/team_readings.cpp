@@ -257,8 +257,7 @@ void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelie
           TeamReadings& readings, std::vector<TeamResidual>& residuals) {
   const Scene scene{interval, paths, belief};
   for (Sight& sight : readings.sights) {
-    residuals.push_back(
-        gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight));
+    residuals.push_back(gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight));
     for (const Bearing* z : sight.bearings) {
       for (const RobotId robot : {sight.observer, sight.neighbor}) {
         Timestamp& last = belief.robots.at(robot).last_sighting;

@@ -11,7 +11,7 @@
 namespace crepes {
 namespace {
 
-constexpr double kMaxPosition = 3.0;                     // m; a robot known worse is dropped
+constexpr double kMaxPosition = 3.0;                         // m; a robot known worse is dropped
 constexpr Duration kVerdictLife = std::chrono::seconds{20};  // then a camera is tried again
 constexpr Duration kProbation = std::chrono::seconds{1};
 constexpr Duration kLateProbation = std::chrono::seconds{3};
@@ -50,9 +50,9 @@ struct MisalignmentTest {
 /// A camera that may be turned has no prior that draws its estimate to zero.
 MisalignmentTest tested_without_prior(const TeamBelief& belief, const TeamCamera& camera,
                                       const Priors& priors) {
-  const Eigen::Matrix3d covariance = belief.P.block<3, 3>(camera.index, camera.index) +
-                                     std::pow(believed_misalignment(priors), 2) *
-                                         Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d covariance =
+      belief.P.block<3, 3>(camera.index, camera.index) +
+      std::pow(believed_misalignment(priors), 2) * Eigen::Matrix3d::Identity();
   const Eigen::Vector3d& m = camera.misalignment;
   return {.chi2 = m.dot(covariance.llt().solve(m)), .turn = m};
 }

@@ -180,8 +180,8 @@ struct Status {
   Totals queues;
   Totals network;
   std::optional<Mesh> mesh;
-  std::optional<Team> team;  ///< only if asked for
-  std::optional<Pair> pair;  ///< only if asked for
+  std::optional<Team> team;   ///< only if asked for
+  std::optional<Pair> pair;   ///< only if asked for
   bool is_truncated = false;  ///< parts are missing, because a datagram is short
 };
 

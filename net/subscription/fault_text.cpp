@@ -12,7 +12,8 @@ std::string text_of(const TeamFault& fault) {
   switch (fault.kind) {
     case TeamFault::Kind::kCameraTurned:
       return fmt::format(
-          "its camera is turned by {:.2f} +- {:.2f} deg against its calibration; calibrate it again",
+          "its camera is turned by {:.2f} +- {:.2f} deg against its calibration; calibrate it "
+          "again",
           kDegPerRad * fault.size, kDegPerRad * fault.sigma);
     case TeamFault::Kind::kCameraRefused:
       return "its camera contradicts what the others see and is left out; check its calibration "

@@ -50,7 +50,8 @@ struct SubscriptionRequest {
 [[nodiscard]] std::string pose_json(std::uint64_t sequence, RobotId self, std::string_view name,
                                     const NeighborPose& pose);
 /// `about` is kAll, kSensors or kNetwork. Omits the least important parts and sets
-/// `"truncated":true` when the whole would not fit. `"more":[ids]` lists neighbors that are omitted.
+/// `"truncated":true` when the whole would not fit. `"more":[ids]` lists neighbors that are
+/// omitted.
 [[nodiscard]] std::string status_json(const SystemStatus& status,
                                       StatusPart about = StatusPart::kAll);
 /// Everything about one neighbor; empty if the neighbor is unknown.

@@ -38,8 +38,8 @@ void put_estimate(Json& json, const char* key, double value, double sigma, doubl
 
 Json camera_json(const CameraMisalignment& camera) {
   Json json{{"p_body_camera", numbers(camera.p_B_C, 1.0, kValueDigits)}};
-  put_estimate(json, "misalignment_deg", camera.rotation,
-               camera.covariance.diagonal().cwiseSqrt(), kDegPerRad);
+  put_estimate(json, "misalignment_deg", camera.rotation, camera.covariance.diagonal().cwiseSqrt(),
+               kDegPerRad);
   put_estimate(json, "turned_deg", camera.rotation.norm(), camera.angle_sigma_rad(), kDegPerRad);
   json["state"] = name_of(camera.state);
   return json;

@@ -146,8 +146,7 @@ class NamingWatch {
 
   void add(RobotId observer, const TeamRecord& record) {
     if (observer == liar_) return;
-    const double t_s =
-        recording_of(swarm_.dataset, observer).robot.clock.true_s(record.stamp);
+    const double t_s = recording_of(swarm_.dataset, observer).robot.clock.true_s(record.stamp);
     if (std::ranges::any_of(record.calibrations,
                             [&](const RobotCalibration& c) { return c.robot == liar_; }))
       met_s_.try_emplace(observer, t_s);
@@ -235,10 +234,11 @@ Result<LiarTrial> run_liar_trial(const Swarm& swarm, const Liar& liar,
   const auto without = replay_scores(honest, options.replay, options.after_s);
   if (!without) return tl::unexpected(without.error());
   NamingWatch watch(corrupted, robot);
-  const auto with = replay_scores(
-      corrupted, options.replay, options.after_s,
-      {.on_report = corrupted_reports(liar.lie, robot),
-       .on_team = [&](RobotId observer, const TeamRecord& record) { watch.add(observer, record); }});
+  const auto with = replay_scores(corrupted, options.replay, options.after_s,
+                                  {.on_report = corrupted_reports(liar.lie, robot),
+                                   .on_team = [&](RobotId observer, const TeamRecord& record) {
+                                     watch.add(observer, record);
+                                   }});
   if (!with) return tl::unexpected(with.error());
   const auto alone = replay_scores(removed(honest, robot), options.replay, options.after_s);
   if (!alone) return tl::unexpected(alone.error());
@@ -300,8 +300,8 @@ std::string table_of(const std::vector<LiarTrial>& trials) {
                               static_cast<double>(t.naming.observers);
                      },
                      Pool::kMean});
-  columns.push_back({"named s", 1, [=](T t) { return if_named(t, t.naming.slowest_s); },
-                     Pool::kHighest});
+  columns.push_back(
+      {"named s", 1, [=](T t) { return if_named(t, t.naming.slowest_s); }, Pool::kHighest});
   columns.push_back({"since met s", 1,
                      [=](T t) { return if_named(t, t.naming.slowest_since_met_s); },
                      Pool::kHighest});

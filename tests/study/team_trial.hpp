@@ -42,9 +42,9 @@ struct TeamTrialOptions {
 
 /// What the honest robots said about the liar.
 struct Naming {
-  std::size_t observers = 0;  ///< that are honest
-  std::size_t named_by = 0;   ///< of these
-  double slowest_s = 0.0;     ///< from the recording's beginning, when the fault begins
+  std::size_t observers = 0;         ///< that are honest
+  std::size_t named_by = 0;          ///< of these
+  double slowest_s = 0.0;            ///< from the recording's beginning, when the fault begins
   double slowest_since_met_s = 0.0;  ///< from when its sensors were first estimated
   std::size_t false_names = 0;       ///< honest robots that an honest one named, each counted once
 };

@@ -82,13 +82,12 @@ void ask_team(client::Connection& daemon, Json& whole) {
   whole["team"] = (**brief)["team"];
   whole["team"]["robots"] = Json::array();
   for (const Json& id : ids) {
-    const auto part = ask(daemon, {.peer = id.get<std::uint16_t>(), .about = "team"},
-                          [&](const Json& json) {
-                            return json.contains("team") && json["team"].contains("robots") &&
-                                   json["team"]["robots"].size() == 1 &&
-                                   json["team"]["robots"][0]["robot"] == id &&
-                                   json["team"]["robots"][0].contains("calibration");
-                          });
+    const auto part =
+        ask(daemon, {.peer = id.get<std::uint16_t>(), .about = "team"}, [&](const Json& json) {
+          return json.contains("team") && json["team"].contains("robots") &&
+                 json["team"]["robots"].size() == 1 && json["team"]["robots"][0]["robot"] == id &&
+                 json["team"]["robots"][0].contains("calibration");
+        });
     if (part && *part) whole["team"]["robots"].push_back((**part)["team"]["robots"][0]);
   }
 }

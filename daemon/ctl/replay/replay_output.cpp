@@ -80,11 +80,11 @@ Result<ReplayOutput::PairFiles> ReplayOutput::create_pair(const fs::path& stem, 
 }
 
 Result<ReplayOutput::TeamFiles> ReplayOutput::create_team(const fs::path& stem) {
-  auto innovations = PartFile::create(fs::path(stem) += ".innovations.csv",
-                                      team_innovation_file_header() + '\n');
+  auto innovations =
+      PartFile::create(fs::path(stem) += ".innovations.csv", team_innovation_file_header() + '\n');
   if (!innovations) return tl::unexpected(innovations.error());
-  auto calibration = PartFile::create(fs::path(stem) += ".calibration.csv",
-                                      team_calibration_file_header() + '\n');
+  auto calibration =
+      PartFile::create(fs::path(stem) += ".calibration.csv", team_calibration_file_header() + '\n');
   if (!calibration) return tl::unexpected(calibration.error());
   return TeamFiles{.innovations = std::move(*innovations), .calibration = std::move(*calibration)};
 }

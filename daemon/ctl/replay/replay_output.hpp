@@ -50,9 +50,9 @@ struct ReplayReport {
 };
 
 /// Writes DIR/<observer>/<neighbor>.csv and .tum during the replay, and DIR/report.json at the end;
-/// with records also <neighbor>.innovations.csv and .calibration.csv, and those of the team. Files have their final names
-/// only after `finish`. Before, they end in ".part", and the results of an earlier replay are
-/// removed.
+/// with records also <neighbor>.innovations.csv and .calibration.csv, and those of the team. Files
+/// have their final names only after `finish`. Before, they end in ".part", and the results of an
+/// earlier replay are removed.
 class ReplayOutput {
  public:
   /// The name of each robot's directory.

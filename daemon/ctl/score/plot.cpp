@@ -150,9 +150,9 @@ std::string page_of(const PlotOptions& options, const std::vector<PairData>& pai
                         xml_escaped(pair.neighbor), xml_escaped(pair.observer), pair_charts(pair));
   }
   for (const TeamData& team : teams) {
-    html += fmt::format("<h2 id='{}'>The team as {} estimates it</h2>\n{}",
-                        xml_escaped(team_anchor(team)), xml_escaped(team.observer),
-                        team_charts(team));
+    html +=
+        fmt::format("<h2 id='{}'>The team as {} estimates it</h2>\n{}",
+                    xml_escaped(team_anchor(team)), xml_escaped(team.observer), team_charts(team));
   }
   return fmt::format("{}<script>{}</script></body></html>\n", html, kPlotScript);
 }

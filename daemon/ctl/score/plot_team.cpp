@@ -59,10 +59,10 @@ SvgChart residual_chart(const TeamData& team, const std::string& robot, TeamResi
     if (bin.dimension > 0.0) nis.push_back({middle, bin.nis / bin.dimension});
     if (bin.all > 0) share.push_back({middle, static_cast<double>(bin.refused) / bin.all});
   }
-  SvgChart chart({.title = fmt::format("{} of {}: {} fused, {} refused", name_of(kind),
-                                       robot, fused, refused),
-                  .x = "time [s]",
-                  .y = "NIS a dimension"});
+  SvgChart chart(
+      {.title = fmt::format("{} of {}: {} fused, {} refused", name_of(kind), robot, fused, refused),
+       .x = "time [s]",
+       .y = "NIS a dimension"});
   chart.set_gap(2.5 * kBin);
   chart.set_x_range(0.0, team.duration_s);
   chart.add_line(nis, "var(--accent)", "mean NIS of those fused");
@@ -88,8 +88,7 @@ std::optional<Quantity> quantity_named(const std::string& name) {
   return std::nullopt;
 }
 
-SvgChart calibration_chart(const TeamData& team, const std::string& robot,
-                           const Quantity& quantity,
+SvgChart calibration_chart(const TeamData& team, const std::string& robot, const Quantity& quantity,
                            const std::vector<const TeamCalibrationRow*>& rows) {
   SvgChart chart({.title = fmt::format("{}: {}", robot, quantity.title),
                   .x = "time [s]",
@@ -148,11 +147,9 @@ Result<std::vector<Row>> rows_if_any(Result<std::vector<Row>> rows) {
 
 Result<TeamData> read_team(const fs::path& results, const std::string& observer) {
   const fs::path stem = results / observer / kTeamStem;
-  auto innovations =
-      rows_if_any(read_team_innovation_file(fs::path(stem) += ".innovations.csv"));
+  auto innovations = rows_if_any(read_team_innovation_file(fs::path(stem) += ".innovations.csv"));
   if (!innovations) return tl::unexpected(innovations.error());
-  auto calibrations =
-      rows_if_any(read_team_calibration_file(fs::path(stem) += ".calibration.csv"));
+  auto calibrations = rows_if_any(read_team_calibration_file(fs::path(stem) += ".calibration.csv"));
   if (!calibrations) return tl::unexpected(calibrations.error());
   return TeamData{.observer = observer,
                   .innovations = std::move(*innovations),

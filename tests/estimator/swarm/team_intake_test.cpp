@@ -48,7 +48,8 @@ class Intake : public testing::Test {
 };
 
 int lag_ms(const FilterSettings& settings) {
-  return static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(settings.lag).count());
+  return static_cast<int>(
+      std::chrono::duration_cast<std::chrono::milliseconds>(settings.lag).count());
 }
 
 TEST_F(Intake, IntervalsFollowEachOtherWithoutAGap) {

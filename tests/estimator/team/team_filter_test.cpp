@@ -553,8 +553,7 @@ TEST(TeamFilter, RobotsBeyondItsSizeAreHonestOverSeeds) {
         // By a camera that is misaligned; its estimate knows how well it is calibrated.
         const Pose turn{Eigen::Vector3d::Zero(), so3_exp(team.misalignment(edge.from))};
         edge.T_from_to.pose = turn * edge.T_from_to.pose;
-        const Eigen::Matrix3d of_turn =
-            std::pow(radians(0.17), 2) * Eigen::Matrix3d::Identity();
+        const Eigen::Matrix3d of_turn = std::pow(radians(0.17), 2) * Eigen::Matrix3d::Identity();
         const Eigen::Matrix3d arm = hat(edge.T_from_to.pose.p);
         edge.T_from_to.covariance.topLeftCorner<3, 3>() += arm * of_turn * arm.transpose();
         edge.T_from_to.covariance.bottomRightCorner<3, 3>() += of_turn;

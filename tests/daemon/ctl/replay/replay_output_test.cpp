@@ -182,7 +182,8 @@ TEST(ReplayOutput, WritesTheTeamOfEachObserver) {
   const fs::path file = scratch.path() / "r1/team.innovations.csv";
   {
     auto output = ReplayOutput::create(scratch.path(), kNames, ReplayOutput::Detail::kRecords);
-    output->write(RobotId{1}, Records{.measurements = {}, .calibrations = {}, .team = {a_team_record()}});
+    output->write(RobotId{1},
+                  Records{.measurements = {}, .calibrations = {}, .team = {a_team_record()}});
     ASSERT_TRUE(output->finish({}));
   }
   EXPECT_EQ(read_team_innovation_file(file)->size(), 2U);
@@ -193,9 +194,8 @@ TEST(ReplayOutput, WritesTheTeamOfEachObserver) {
 
 TEST(ReplayOutput, RefusesARobotWhoseFilesWouldBeTheTeams) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
-  const auto output =
-      ReplayOutput::create(scratch.path(), {{RobotId{1}, "team"}, {RobotId{2}, "r2"}},
-                           ReplayOutput::Detail::kRecords);
+  const auto output = ReplayOutput::create(
+      scratch.path(), {{RobotId{1}, "team"}, {RobotId{2}, "r2"}}, ReplayOutput::Detail::kRecords);
   ASSERT_FALSE(output);
   EXPECT_NE(output.error().message.find("named 'team'"), std::string::npos);
 }
