@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/team_solution.hpp"
 
 namespace crepes {
 
@@ -162,9 +163,18 @@ struct CalibrationRecord {
   std::array<double, kSize> sigma{};
 };
 
+/// What the team's filter found over an interval that ends at `stamp`.
+struct TeamRecord {
+  Timestamp stamp{};
+  std::vector<TeamResidual> residuals;
+  std::vector<RobotCalibration> calibrations;
+  std::vector<TeamFault> faults;
+};
+
 struct Records {
   std::vector<MeasurementRecord> measurements;
   std::vector<CalibrationRecord> calibrations;
+  std::vector<TeamRecord> team{};
 };
 
 using VerdictCounts = std::array<std::uint64_t, kVerdictCount>;
@@ -186,6 +196,25 @@ using ImuFaultCounts = std::array<std::uint64_t, kImuFaultCount>;
   return kNames[static_cast<std::size_t>(fault)];
 }
 
+/// How well measurements of a kind agree with what was expected of them.
+struct ResidualStatus {
+  std::optional<double> nis;  ///< mean for each dimension, of those fused recently; honest: 1
+  std::uint64_t fused = 0;
+  std::uint64_t refused = 0;
+};
+
+/// A robot as the team's filter knows it.
+struct TeamRobotStatus {
+  RobotCalibration calibration;
+  std::array<ResidualStatus, kTeamResidualKindCount> residuals{};  ///< of what it measured
+  std::vector<TeamFault> faults;
+};
+
+struct TeamStatus {
+  Timestamp stamp{};  ///< of the latest solution
+  std::vector<TeamRobotStatus> robots;
+};
+
 struct NeighborStatus {
   RobotId neighbor{};
   std::string name;
@@ -194,6 +223,9 @@ struct NeighborStatus {
   std::array<VerdictCounts, kMeasurementKindCount> measurements{};  ///< [kind][verdict]
   /// When the newest of a kind was taken, whatever its outcome.
   std::array<std::optional<Timestamp>, kMeasurementKindCount> newest{};
+  /// Mean NIS for each dimension, of about the last fifty that were fused, by kind.
+  std::array<std::optional<double>, kMeasurementKindCount> nis{};
+  std::optional<CalibrationRecord> calibration;  ///< of its filter
   /// Measured minus expected, own and the neighbor's ranges: the mean of about the last sixteen
   /// [m].
   std::optional<double> range_residual_m;
@@ -210,6 +242,7 @@ struct EstimatorStatus {
   std::uint64_t refused_samples = 0;  ///< NaN, out of range, stamp that goes back, refused_imu
   ImuFaultCounts refused_imu{};       ///< of our IMU, by reason
   std::vector<TeamFault> faults;      ///< what the team finds wrong with us
+  std::optional<TeamStatus> team;
 };
 
 }  // namespace crepes

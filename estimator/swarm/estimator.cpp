@@ -17,6 +17,7 @@
 #include "estimator/swarm/report_composer.hpp"
 #include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/team_intake.hpp"
+#include "estimator/swarm/team_log.hpp"
 #include "estimator/vision/blink_tracker.hpp"
 
 namespace crepes {
@@ -142,7 +143,7 @@ struct Estimator::State {
   FilterSettings filters;
   VisionConfig vision;
   bool keeps_records = false;
-  std::vector<TeamFault> faults;  ///< of the latest team solution
+  TeamLog team_log;
   std::uint64_t unknown_senders = 0;
   std::uint64_t refused_samples = 0;
 };
@@ -177,7 +178,7 @@ void Estimator::State::reconfigure(const EstimatorSettings& settings) {
   graph_enabled = settings.solves_graph;
   uses_team_filter = settings.uses_team_filter;
   team_size = settings.team_size;
-  if (!runs_team_filter()) faults.clear();
+  if (!runs_team_filter()) team_log.clear();
   report_timer = PeriodicTimer(period_of(settings.report_rate_hz));
   graph_timer = PeriodicTimer(period_of(settings.graph_rate_hz));
 }
@@ -251,8 +252,8 @@ Outputs Estimator::State::handle(const GraphSolution& solution) {
 
 Outputs Estimator::State::handle(const TeamSolution& solution) {
   constexpr Duration kRefusal = std::chrono::milliseconds{300};  // some solutions
-  faults = solution.faults;
-  const bool is_gyro_false = std::ranges::any_of(faults, [this](const TeamFault& fault) {
+  team_log.add(solution);
+  const bool is_gyro_false = std::ranges::any_of(solution.faults, [this](const TeamFault& fault) {
     return fault.robot == id && fault.kind == TeamFault::Kind::kGyro;
   });
   if (is_gyro_false) {
@@ -260,15 +261,19 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
     tilt_filter.restart();
   }
   const auto bias_of = [&](RobotId robot) {
-    const auto found = std::ranges::find(solution.biases, robot, &ImuBiasEstimate::robot);
-    return found == solution.biases.end() ? ImuBiasEstimate{} : *found;
+    const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
+    return found == solution.calibrations.end() ? ImuBiasEstimate{} : found->imu;
   };
   for (const TeamPose& pose : solution.poses) {
     const auto neighbor = neighbors.find(pose.neighbor);
     if (neighbor != neighbors.end())
       neighbor->second.add_team_pose(solution.stamp, pose, bias_of(id), bias_of(pose.neighbor));
   }
-  return {};
+  Outputs outputs;
+  if (keeps_records)
+    outputs.records.team.push_back(
+        {solution.stamp, solution.residuals, solution.calibrations, solution.faults});
+  return outputs;
 }
 
 const ImuHistory* Estimator::State::imu_of(RobotId robot) const {
@@ -348,13 +353,8 @@ void Estimator::keep_records() {
 
 EstimatorStatus Estimator::status() const {
   EstimatorStatus status;
-  const auto faults_of = [this](RobotId robot) {
-    std::vector<TeamFault> of_robot;
-    std::ranges::copy_if(state_->faults, std::back_inserter(of_robot),
-                         [robot](const TeamFault& fault) { return fault.robot == robot; });
-    return of_robot;
-  };
-  status.faults = faults_of(state_->id);
+  status.faults = state_->team_log.faults_of(state_->id);
+  status.team = state_->team_log.status();
   for (const auto& [robot, neighbor] : state_->neighbors) {
     NeighborStatus one = neighbor.status();
     for (const BlinkTracker& tracker : state_->trackers) {
@@ -362,7 +362,7 @@ EstimatorStatus Estimator::status() const {
       const auto found = decodes.find(robot);
       if (found != decodes.end()) one.id_decodes += found->second;
     }
-    one.faults = faults_of(robot);
+    one.faults = state_->team_log.faults_of(robot);
     status.neighbors.push_back(std::move(one));
   }
   status.tilt = state_->self.tilt;

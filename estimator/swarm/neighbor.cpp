@@ -152,6 +152,7 @@ NeighborStatus Neighbor::status() const {
   status.reason = reason_;
   status.pose = publisher_.published();
   intake_.outcomes().write_to(status);
+  if (!hypotheses_.empty()) status.calibration = hypotheses_.leader().heaviest().calibration();
   status.refused_imu = body_.guard.refused();
   if (!body_.imu.empty()) status.newest_imu = body_.imu.newest().stamp;
   return status;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/team/gyro_check.hpp"
 #include "estimator/team/team_belief.hpp"
 
 namespace crepes {
@@ -14,13 +15,14 @@ namespace crepes {
 class TeamTrust {
  public:
   /// Robots that must leave the belief: without IMU, known too badly, or contradicted by most
-  /// cameras that see them. Where as many agree, the robot that came last is in the wrong.
+  /// cameras that see them. Where as many agree, the robot that came last is in the wrong. And
+  /// robots whose camera was refused for so long that it is tried again.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
-  /// Robots whose gyroscope contradicts what their cameras see over the interval. All in `belief`
-  /// have an IMU over it.
+  /// Robots whose gyroscope has contradicted for some intervals what their cameras see.
   [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval,
-                                                 const TeamBelief& belief);
+                                                 const TeamBelief& belief,
+                                                 const std::map<RobotId, GyroCheck>& checks);
 
   /// Robots with a camera that is turned, newly. Such a robot has a wrong attitude too. It must
   /// start anew with a camera that may be turned, so that the others' measurements determine it. If
@@ -38,7 +40,7 @@ class TeamTrust {
 
   /// How uncertain the misalignment of its cameras is, and likewise its attitude, in its body's
   /// axes [rad^2]. None if its cameras are as they were calibrated.
-  [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot, Timestamp now) const;
+  [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot) const;
   /// A realigned robot's cameras contradicted the others after that, too.
   [[nodiscard]] bool is_refused(RobotId robot) const { return verdicts_.at(robot).is_refused; }
   /// How many times less certain a robot starts that was contradicted of late.
@@ -55,15 +57,16 @@ class TeamTrust {
     double rate_radps = 0.0;         ///< how wrong the gyroscope was then
   };
   struct Verdict {
-    Timestamp since{};
+    Timestamp shown{};  ///< when its camera was last found turned; after a while it may be repaired
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
     int count = 0;  ///< how often its cameras were found turned
     bool is_refused = false;
     bool is_withdrawn = false;
   };
+  void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
   void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
   [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
-  [[nodiscard]] bool is_realigned(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool is_realigned(RobotId robot) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] int recent_losses(RobotId robot, Timestamp now) const;
 
@@ -73,8 +76,14 @@ class TeamTrust {
   std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
 };
 
+/// What is known of all robots' sensors. A camera is turned if its misalignment is significant, and
+/// beyond what a calibration leaves.
+[[nodiscard]] std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief,
+                                                            const Priors& priors);
+
 /// Cameras that are turned or refused, robots most of whose ranges are refused, and clocks that are
-/// off.
-[[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief, const Priors& priors);
+/// off. `calibrations` are those of `belief`.
+[[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief,
+                                               const std::vector<RobotCalibration>& calibrations);
 
 }  // namespace crepes
