@@ -4,16 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "daemon/ctl/json_line.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr int kLeastSightings = 3;       // of a cell
 constexpr double kWholePicture = 0.9;    // of the cells inside the circle
@@ -75,8 +71,11 @@ void CameraCoverage::add(const SpotFrame& frame) {
       return static_cast<std::size_t>(
           std::clamp(static_cast<int>(pixel / static_cast<double>(size) * cells), 0, cells - 1));
     };
-    ++sightings_.at(cell(uv->y(), camera_.resolution[1], kRows))
-          .at(cell(uv->x(), camera_.resolution[0], kColumns));
+    const std::size_t row = cell(uv->y(), camera_.resolution[1], kRows);
+    const std::size_t column = cell(uv->x(), camera_.resolution[0], kColumns);
+    if (++sightings_.at(row).at(column) == kLeastSightings)
+      farthest_px_ =
+          std::max(farthest_px_, radius_px(static_cast<int>(row), static_cast<int>(column)));
     boards_.insert(bearing.neighbor);
   }
   if (bearings.empty()) return;
@@ -84,12 +83,15 @@ void CameraCoverage::add(const SpotFrame& frame) {
   last_seen_ = frame.stamp;
 }
 
+double CameraCoverage::radius_px(int row, int column) const {
+  const double u = ((column + 0.5) / kColumns - 0.5) * camera_.resolution[0];
+  const double v = ((row + 0.5) / kRows - 0.5) * camera_.resolution[1];
+  return std::hypot(u, v);
+}
+
 bool CameraCoverage::is_inside(int row, int column) const {
-  const double width = camera_.resolution[0];
-  const double height = camera_.resolution[1];
-  const double u = (column + 0.5) / kColumns * width - 0.5 * width;
-  const double v = (row + 0.5) / kRows * height - 0.5 * height;
-  return std::hypot(u, v) < 0.5 * std::min(width, height);
+  const double nearer = 0.5 * std::min(camera_.resolution[0], camera_.resolution[1]);
+  return radius_px(row, column) < std::max(nearer, farthest_px_ + 1.0);
 }
 
 bool CameraCoverage::is_seen(int row, int column) const {
@@ -170,18 +172,6 @@ std::string coverage_text(const CameraCoverage& coverage) {
       std::string(static_cast<std::size_t>(kBar - done), '.'), 100.0 * coverage.share());
   for (const std::string& line : coverage.missing()) text += "- " + line + "\n";
   return text;
-}
-
-std::string coverage_json(const CameraCoverage& coverage) {
-  Json json{{"share", coverage.share()},   {"picture", coverage.picture()},
-            {"seen_s", coverage.seen_s()}, {"boards", Json::array()},
-            {"cells", Json::array()},      {"missing", coverage.missing()}};
-  const Eigen::Vector3d rate = coverage.rate_rms_radps();
-  json["rate_rms_radps"] = {rate.x(), rate.y(), rate.z()};
-  for (const RobotId id : coverage.boards()) json["boards"].push_back(id.value);
-  for (int row = 0; row < CameraCoverage::kRows; ++row)
-    json["cells"].push_back(line_of(coverage, row));
-  return json_line(json);
 }
 
 }  // namespace crepes

@@ -18,25 +18,17 @@ using namespace std::chrono_literals;
 /// The coverage on standard output: a terminal that is redrawn, or lines.
 class CoverageView {
  public:
-  explicit CoverageView(bool json) : json_(json) {
-    if (!json) screen_.emplace();
-  }
-  [[nodiscard]] bool is_terminal() const { return screen_ && screen_->is_terminal(); }
+  [[nodiscard]] bool is_terminal() const { return screen_.is_terminal(); }
   void show(const CameraCoverage& coverage) {
-    const Duration period = is_terminal() ? 200ms : json_ ? 1s : 5s;
+    const Duration period = is_terminal() ? 200ms : 5s;
     if (clock_.now() < next_) return;
     next_ = clock_.now() + period;
-    if (json_) {
-      print(coverage_json(coverage));
-    } else {
-      screen_->show(coverage_text(coverage) + "\nq: calibrate with what there is\n");
-    }
+    screen_.show(coverage_text(coverage) + "\nq: calibrate with what there is\n");
   }
 
  private:
-  bool json_;
   MonotonicClock clock_;
-  std::optional<LiveScreen> screen_;
+  LiveScreen screen_;
   Timestamp next_ = Timestamp::min();
 };
 
@@ -45,7 +37,8 @@ class CoverageView {
 Result<std::filesystem::path> record_for_camera(const RecordForCameraOptions& options) {
   std::optional<CameraCoverage> coverage;
   std::optional<Error> fault;
-  std::optional<CoverageView> view(std::in_place, options.json);
+  std::optional<CoverageView> view;
+  if (!options.is_quiet) view.emplace();
   const KeyReader keys;
   RecordOptions recording;
   recording.dir = options.dir;
@@ -67,11 +60,11 @@ Result<std::filesystem::path> record_for_camera(const RecordForCameraOptions& op
       for (const SpotFrame& frame : spot_frames(rows)) coverage->add(frame);
   };
   recording.is_enough = [&] {
-    if (coverage) view->show(*coverage);
+    if (coverage && view) view->show(*coverage);
     return fault || keys.next() == 'q' || (coverage && coverage->share() >= 1.0);
   };
   const Result<RecordSummary> recorded = record(recording);
-  const bool is_terminal = view->is_terminal();
+  const bool is_terminal = view && view->is_terminal();
   view.reset();
   if (fault) return tl::unexpected(*fault);
   if (!recorded) return tl::unexpected(recorded.error());
