@@ -115,9 +115,10 @@ void add_range(CommandLine& line, CLI::App* calibrate) {
                   "after the first row, distances from antenna to antenna; with turning: ID in a "
                   "segment that robot turned slowly about its antenna");
   sub->add_option(
-      "--distance", options.distances,
-      "ROBOT,ROBOT=METERS, as in r1,r2=5.00: both rested for the whole recording; may be "
-      "repeated");
+         "--distance", options.distances,
+         "ROBOT,ROBOT=METERS, as in r1,r2=5.00: both rested for the whole recording; may be "
+         "repeated")
+      ->allow_extra_args(false);
   sub->add_option("--out", options.out,
                   "biases of pairs and modules, YAML; a fragment of crepesd.yaml with delays and "
                   "noise is written beside it as NAME.members.yaml")
@@ -158,9 +159,11 @@ void add_camera(CommandLine& line, CLI::App* calibrate) {
       "--grid", command.grid,
       "the target is a flat grid of LEDs, rows x columns as in 5x7; ROBOT_DIR may be any folder of "
       "pictures, and no IMU is needed");
-  sub->add_option("--pitch", command.pitch_m, "with --grid: from LED to LED [m]")
-      ->needs(grid)
-      ->check(CLI::Range(0.001, 10.0));
+  CLI::Option* pitch =
+      sub->add_option("--pitch", command.pitch_m, "with --grid: from LED to LED [m]")
+          ->check(CLI::Range(0.001, 10.0));
+  pitch->needs(grid);
+  grid->needs(pitch);
   add_json_flag(sub, options.json);
   line.run(sub, [&command] {
     return finish(calibrate_camera_with_progress(command), command.options.json);
