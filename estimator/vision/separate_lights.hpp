@@ -1,6 +1,7 @@
 /// Every light of a picture by itself, as the LEDs of a calibration grid.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "estimator/core/measurements.hpp"

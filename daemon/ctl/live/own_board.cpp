@@ -3,7 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <iterator>
+#include <utility>
 
 #include "daemon/ctl/setup/led.hpp"
 #include "drivers/base/monotonic_clock.hpp"

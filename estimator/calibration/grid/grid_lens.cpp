@@ -1,5 +1,8 @@
 #include "estimator/calibration/grid/grid_lens.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "estimator/calibration/camera_start.hpp"
 #include "estimator/vision/double_sphere.hpp"
 #include "estimator/vision/kannala_brandt.hpp"
