@@ -54,23 +54,6 @@ std::string key_warning(const NetSettings& settings) {
                      ids.size() - signing, ids.size());
 }
 
-AirTotals air_totals(const PeerLink& link, Timestamp now) {
-  AirTotals totals{
-      .at = now,
-      .sent = link.counters()[MeshCounter::kSent] + link.counters()[MeshCounter::kForwarded],
-      .sent_bytes =
-          link.counters()[MeshCounter::kSentBytes] + link.counters()[MeshCounter::kForwardedBytes],
-      .received = link.counters()[MeshCounter::kReceived],
-      .received_bytes = link.counters()[MeshCounter::kReceivedBytes],
-      .lost = 0,
-      .of_peers = {}};
-  for (const PeerTraffic& traffic : link.traffic(now)) {
-    totals.lost += traffic.lost;
-    totals.of_peers[traffic.peer] = traffic.received + traffic.lost;
-  }
-  return totals;
-}
-
 /// The net thread's state.
 class NetLoop {
  public:
@@ -124,7 +107,7 @@ class NetLoop {
   void every_second() {
     next_second_ = clock_.now() + std::chrono::seconds{1};
     key_monitor_.update(link_);
-    const AirTotals before = std::exchange(air_totals_, air_totals(link_, clock_.now()));
+    const AirTotals before = std::exchange(air_totals_, link_.air_totals(clock_.now()));
     air_ = air_share(before, air_totals_, settings_.send.broadcasts);
     notify_service();
   }

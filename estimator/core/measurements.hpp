@@ -46,6 +46,14 @@ struct BasicBearing {
   double sigma_rad = 0.0;                           ///< one sigma across the direction
 };
 
+/// The lever arms that readings of a pair refer to: rings of LEDs and antennas, in each one's body.
+struct PairMounting {
+  Eigen::Vector3d p_B_M = Eigen::Vector3d::Zero();  ///< our LED ring
+  Eigen::Vector3d p_B_U = Eigen::Vector3d::Zero();  ///< our antenna
+  Eigen::Vector3d p_N_M = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_N_Q = Eigen::Vector3d::Zero();
+};
+
 /// The direction of up. Gravity determines roll and pitch only.
 template <class Time>
 struct BasicTilt {
@@ -160,6 +168,7 @@ struct ImuBiasEstimate {
 
 /// A robot whose sensors contradict the rest of the team.
 struct TeamFault {
+  /// What is wrong.
   enum class Kind : std::uint8_t {
     kCameraTurned,   ///< its bearings are used with the misalignment that the team found
     kCameraRefused,  ///< it contradicts the team whatever its misalignment

@@ -116,7 +116,7 @@ struct Estimator::State {
   Outputs handle(const Tick& tick);
 
   [[nodiscard]] bool runs_team_filter() const {
-    return graph_enabled && uses_team_filter && filters.profile == Profile::kTight;
+    return graph_enabled && uses_team_filter && filters.traits.has_team_filter;
   }
   /// Null without samples.
   [[nodiscard]] const ImuHistory* imu_of(RobotId robot) const;
@@ -202,7 +202,7 @@ Outputs Estimator::State::handle(const UwbRange& range) {
   }
   UwbRange corrected = range;
   corrected.range_m -= delay_between(swarm, id, range.neighbor);
-  neighbor->second.add_range(corrected);
+  neighbor->second.add(corrected);
   composer.add(corrected);
   return {};
 }
@@ -220,7 +220,7 @@ Outputs Estimator::State::handle(const SpotFrame& frame) {
   std::erase_if(outputs.bearings,
                 [&](const Bearing& bearing) { return !neighbors.contains(bearing.neighbor); });
   for (const Bearing& bearing : outputs.bearings) {
-    neighbors.at(bearing.neighbor).add_bearing(bearing);
+    neighbors.at(bearing.neighbor).add(bearing);
     composer.add(bearing);
   }
   return outputs;
@@ -244,7 +244,7 @@ Outputs Estimator::State::handle(const ReceivedReport& received) {
 Outputs Estimator::State::handle(const GraphSolution& solution) {
   for (const GraphPose& pose : solution.poses) {
     const auto neighbor = neighbors.find(pose.neighbor);
-    if (neighbor != neighbors.end()) neighbor->second.add_graph_pose(solution.stamp, pose);
+    if (neighbor != neighbors.end()) neighbor->second.add(StampedGraphPose{solution.stamp, pose});
   }
   return {};
 }
@@ -266,7 +266,7 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
   for (const TeamPose& pose : solution.poses) {
     const auto neighbor = neighbors.find(pose.neighbor);
     if (neighbor != neighbors.end())
-      neighbor->second.add_team_pose(solution.stamp, pose, bias_of(id), bias_of(pose.neighbor));
+      neighbor->second.add(TeamEstimate{solution.stamp, pose, bias_of(id), bias_of(pose.neighbor)});
   }
   return {};
 }

@@ -33,6 +33,7 @@ class Estimator {
   Estimator& operator=(const Estimator&) = delete;
   ~Estimator();
 
+  /// Handles one event, and returns what follows from it.
   [[nodiscard]] Outputs step(const Event& event);
   /// Applies other settings with the same `self` and `cameras`. Filters keep their state, unless
   /// the profile or a mounting changes. Members may be added and removed. If `vision` or a code

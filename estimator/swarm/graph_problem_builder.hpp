@@ -16,6 +16,7 @@ class GraphProblemBuilder {
   /// The IMU of a robot, own or as it reports it; null where there is none.
   using ImuOf = std::function<const ImuHistory*(RobotId)>;
 
+  /// Keeps the estimates of a report for the next problem.
   void add_report(const Report& report);
 
   /// Edges at `stamp`: own estimates, which are at `stamp` already, then those of others not older

@@ -1,7 +1,5 @@
 #include "estimator/swarm/outcome_log.hpp"
 
-#include <algorithm>
-
 namespace crepes {
 namespace {
 
@@ -11,16 +9,20 @@ bool is_range(MeasurementKind kind) {
 
 }  // namespace
 
-void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion) {
+void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion,
+                     const SensorReading& reading) {
   ++counts_[static_cast<std::size_t>(kind)][static_cast<std::size_t>(fusion.verdict)];
-  std::optional<Timestamp>& newest = newest_[static_cast<std::size_t>(kind)];
-  newest = std::max(newest.value_or(stamp), stamp);
+  // Of alternatives, which have the same stamp, the one that was fused.
+  std::optional<NewestReading>& newest = newest_[static_cast<std::size_t>(kind)];
+  if (!newest || stamp > newest->stamp ||
+      (stamp == newest->stamp && newest->verdict != Verdict::kFused))
+    newest = NewestReading{stamp, fusion.verdict, reading};
   if (is_range(kind) && fusion.dimension > 0) {
     constexpr double kMemory = 16.0;  // measurements
     const double mean = range_residual_m_.value_or(fusion.residual[0]);
     range_residual_m_ = mean + (fusion.residual[0] - mean) / kMemory;
   }
-  if (keeps_records_) records_.measurements.push_back({neighbor_, stamp, kind, fusion});
+  if (keeps_records_) records_.measurements.push_back({neighbor_, stamp, kind, fusion, reading});
 }
 
 void OutcomeLog::add(std::optional<CalibrationRecord> calibration) {

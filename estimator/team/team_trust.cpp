@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 #include "estimator/team/gyro_check.hpp"
 
 namespace crepes {
@@ -46,10 +47,10 @@ struct MisalignmentTest {
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< its significant components
 };
 
-/// The estimate is drawn to zero by its prior, so a turn shows long before the estimate is large:
-/// the difference of two estimates, the later of which knows more, has the difference of their
-/// covariances (Hausman 1978). In the axes of that difference, what was measured alone has the mean
-/// m P0 / (P0 - P) and the variance P P0 / (P0 - P).
+/// The prior draws the estimate to zero, so a turn is significant long before the estimate is
+/// large. The difference of two estimates, the second of which uses more data, has the difference
+/// of their covariances (Hausman 1978). In the axes of that difference, the data alone give the
+/// mean m P0 / (P0 - P) and the variance P P0 / (P0 - P).
 MisalignmentTest tested(const TeamBelief& belief, const TeamCamera& camera, const Priors& priors) {
   constexpr double kObserved =
       1e-4;  // of the prior's variance; an axis that taught less is unknown
@@ -154,7 +155,8 @@ void add_range_fault(const TeamBelief& belief, RobotId id, std::vector<TeamFault
     faults.push_back({id, TeamFault::Kind::kRanges, sum_m / contradicted});
 }
 
-/// Trusted robots measure other distances to it than it does to them, and its place fits its own.
+/// Whether the robot's place agrees with the ranges that it measured, but not with those that
+/// trusted robots measured to it.
 bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {
   return std::ranges::any_of(belief.ranges, [&](const auto& entry) {
     const auto& [pair, range] = entry;
@@ -168,12 +170,6 @@ bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {
   });
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// Clocks that differ from most others, this robot's among them.
 void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) {
   if (belief.robots.size() < 3) return;
@@ -183,8 +179,10 @@ void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) 
     ahead_s.push_back(robot.clock_s);
     variances.push_back(belief.P(robot.clock_index(), robot.clock_index()));
   }
-  const double most_s = median(ahead_s);
-  const double variance = median(variances);
+  std::vector<double> sorted_s = ahead_s;
+  const double most_s = quantile(sorted_s, 0.5);
+  std::vector<double> sorted_variances = variances;
+  const double variance = quantile(sorted_variances, 0.5);
   for (std::size_t i = 0; const auto& [id, robot] : belief.robots) {
     const double size_s = robot.clock_s - most_s;
     const double sigma_s = std::sqrt(variances[i++] + variance);
@@ -208,14 +206,15 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval,
     doubt.found = belief.stamp;
     doubt.rate_radps = found.rate_radps;
     robots.push_back(id);
-    // What its camera was found guilty of may have been the gyroscope's fault.
+    // The gyroscope may have caused what its camera was blamed for.
     if (const auto verdict = verdicts_.find(id); verdict != verdicts_.end())
       verdict->second.is_withdrawn = true;
   }
   return robots;
 }
 
-/// Of late: what it has strained may still look as if its camera were turned.
+/// Whether its gyroscope was recently false. The states that it has disturbed may still look as if
+/// its camera were turned.
 bool TeamTrust::is_strained(RobotId robot, Timestamp now) const {
   const auto doubt = gyro_doubts_.find(robot);
   return doubt != gyro_doubts_.end() && doubt->second.found &&
@@ -260,7 +259,8 @@ std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamB
   return turned;
 }
 
-/// Whoever was found turned before and once, was found so while this one strained the team.
+/// Withdraws the verdict of robots that were convicted once before: this robot had disturbed the
+/// states on which they were judged.
 void TeamTrust::convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance) {
   Verdict& verdict = verdicts_[robot];
   verdict.is_refused = is_realigned(robot, now);

@@ -25,11 +25,11 @@ struct JoinedArcs {
   }
 };
 
-/// Joins the blobs of a ring that is seen aslant, or has many LEDs: where its LEDs touch they are
-/// arcs, which have no center of an LED to offer, but all of their pixels are near one ellipse.
+/// Joins the blobs of a ring that is seen at a slant or has many LEDs. Where LEDs touch, they
+/// appear as arcs. An arc shows no centers of LEDs, but all of its pixels are near one ellipse.
 ///
-/// It takes a single LED, which tells how wide an arc is, an arc, light on most of the ellipse and
-/// darkness within.
+/// A ring needs at least one single LED, which shows how wide an arc is, and at least one arc. Most
+/// of the ellipse must be lit, and its inside dark.
 class ArcJoiner {
  public:
   ArcJoiner();

@@ -152,7 +152,7 @@ void BlinkTracker::predict(Timestamp stamp) {
       imu_.empty() ? Eigen::Quaterniond::Identity() : imu_.rotation(stamp, *now_);
   const double dt = to_seconds(stamp - *now_);
   const double q = kAccelDensity * kAccelDensity;
-  hidden_.turn(R_now_before);
+  hidden_.rotate_frame(R_now_before);
   for (Track& track : tracks_) {
     track.u_B = (R_now_before * (track.u_B + track.rate_B * dt)).normalized();
     track.rate_B = R_now_before * track.rate_B;
@@ -263,7 +263,7 @@ void BlinkTracker::observe(Track& track, const Sighting& sighting, Timestamp sta
   ++track.hits;
 
   decoder_.observe_lit(track.evidence, sighting.exposed, phases_);
-  decoder_.learn(track.evidence, sighting.exposed, phases_);
+  decoder_.update_phase(track.evidence, sighting.exposed, phases_);
   if (!was_assigned && track.evidence.assigned)
     ++counts_.decodes[decoder_.code_id(*track.evidence.assigned)];
   if (was_assigned && !track.evidence.assigned) ++counts_.lost_ids;
@@ -302,7 +302,7 @@ void BlinkTracker::keep_or_forget(Track& track) {
 
 /// Continues what was hidden, unless that board is in sight elsewhere.
 void BlinkTracker::resume(Track& track, const Sighting& sighting, Timestamp stamp) {
-  auto hidden = hidden_.take(sighting.u_B, stamp);
+  auto hidden = hidden_.extract_match(sighting.u_B, stamp);
   if (!hidden) return;
   track.evidence = std::move(hidden->evidence);
   decoder_.resume(track.evidence, sighting.exposed, hidden->stranger);

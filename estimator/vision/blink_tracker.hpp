@@ -1,4 +1,4 @@
-/// Spots of successive frames of one camera to bearings of identified robots.
+/// Turns the spots of successive frames of one camera into bearings of identified robots.
 #pragma once
 
 #include <Eigen/Core>

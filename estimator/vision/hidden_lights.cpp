@@ -38,7 +38,7 @@ double density_of(const HiddenLight& light, const Eigen::Vector3d& u_B, Timestam
 
 }  // namespace
 
-void HiddenLights::turn(const Eigen::Quaterniond& R_now_before) {
+void HiddenLights::rotate_frame(const Eigen::Quaterniond& R_now_before) {
   for (HiddenLight& light : lights_) {
     light.u_B = R_now_before * light.u_B;
     light.rate_B = R_now_before * light.rate_B;
@@ -67,7 +67,8 @@ void HiddenLights::add(HiddenLight light, std::vector<BlinkEvidence>& unused) {
 }
 
 /// Bayes:  p(light) = p / (n + sum p),  p the densities of hidden lights, n that of others.
-std::optional<HiddenLights::Return> HiddenLights::take(const Eigen::Vector3d& u_B, Timestamp now) {
+std::optional<HiddenLights::Return> HiddenLights::extract_match(const Eigen::Vector3d& u_B,
+                                                                Timestamp now) {
   double sum = kStrangers / kField;
   double most = 0.0;
   auto likeliest = lights_.end();

@@ -153,7 +153,7 @@ void BlinkEvidence::forget() {
   expected.reset();
 }
 
-void PhaseMemory::learn(const CodeMatch& match, Timestamp now) {
+void PhaseMemory::update(const CodeMatch& match, Timestamp now) {
   if (match.code >= phases_.size()) phases_.resize(match.code + 1);
   if (!phases_[match.code]) ++known_;
   phases_[match.code] = {match.phase, now};
@@ -395,10 +395,11 @@ void IdDecoder::count_dark_run(BlinkEvidence& evidence, Timestamp stamp) const {
   forget_old(evidence, stamp + 2 * window_);  // what it showed was read otherwise
 }
 
-void IdDecoder::learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const {
+void IdDecoder::update_phase(const BlinkEvidence& evidence, Timestamp now,
+                             PhaseMemory& known) const {
   if (!is_identified(evidence)) return;
   const Duration enough = kPeriodsToLearn * codes_[evidence.assigned->code].period;
-  if (now - evidence.assigned_since >= enough) known.learn(*evidence.assigned, now);
+  if (now - evidence.assigned_since >= enough) known.update(*evidence.assigned, now);
 }
 
 /// So many steps a phase may be off that was known `age` ago.

@@ -50,6 +50,7 @@ class PacketSeal {
   /// Seals a datagram of `encode_peer_message`. Of those with equal first 18 bytes, only one may
   /// ever be sealed: two would reveal each other.
   [[nodiscard]] std::vector<std::uint8_t> seal(std::span<const std::uint8_t> plain) const;
+  /// The datagram before it was sealed, or why it cannot be opened.
   [[nodiscard]] tl::expected<std::vector<std::uint8_t>, UnsealError> open(
       std::span<const std::uint8_t> sealed) const;
 

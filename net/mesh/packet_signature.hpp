@@ -2,7 +2,7 @@
 ///
 /// A signed datagram has the bit `kSignedMark` in its version. It ends with the 64 bytes of the
 /// signature of all bytes before: version, sender, session, sequence number and contents. A seal
-/// is put around it. Whoever has the swarm's key and no robot's own cannot make one.
+/// is put around it. The swarm's key alone is not sufficient to make one.
 #pragma once
 
 #include <array>
@@ -41,6 +41,7 @@ struct RobotKey {
 [[nodiscard]] RobotKey robot_key_of(std::span<const std::uint8_t, 32> seed);
 /// Whether the public part belongs to the seed.
 [[nodiscard]] bool is_whole(const RobotKey& key);
+/// The public part of a key.
 [[nodiscard]] PublicKey public_key_of(const RobotKey& key);
 
 /// Base64, 44 characters.
@@ -48,6 +49,7 @@ struct RobotKey {
 /// Empty for a text that is not a key, and for points that make every signature valid.
 [[nodiscard]] std::optional<PublicKey> parse_public_key(std::string_view text);
 
+/// Signs the datagrams of this robot.
 class PacketSigner {
  public:
   static constexpr std::size_t kOverhead = 64;  ///< bytes that signing adds

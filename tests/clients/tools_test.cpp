@@ -115,14 +115,14 @@ TEST_F(Tools, CheckARobotFromSensorsToCalibration) {
   std::ofstream(file) << write_config(other);
 
   const Ending text = ask("check", {"--for", "1"});
-  const Json told = Json::parse(ask("check", {"--json", "--config", file}).output);
+  const Json reported = Json::parse(ask("check", {"--json", "--config", file}).output);
 
   for (const char* part : {"cam0 spots", "r2: known to", "r2 sees our board", "not sealed",
                            "crepesctl keygen", "gravity measures", "r2 is"})
     EXPECT_NE(text.output.find(part), std::string::npos) << part << "\n" << text.output;
   std::vector<std::string> sections;
   bool is_rate_named = false;
-  for (const Json& finding : told["findings"]) {
+  for (const Json& finding : reported["findings"]) {
     if (sections.empty() || sections.back() != finding["about"])
       sections.push_back(finding["about"]);
     is_rate_named |= finding["about"] == "rates" && finding["verdict"] == "doubt" &&
@@ -130,7 +130,7 @@ TEST_F(Tools, CheckARobotFromSensorsToCalibration) {
   }
   EXPECT_EQ(sections, (std::vector<std::string>{"sensors", "rates", "clocks", "exposure", "board",
                                                 "mesh", "calibration"}));
-  EXPECT_TRUE(is_rate_named) << told.dump(2);
+  EXPECT_TRUE(is_rate_named) << reported.dump(2);
 }
 
 class OneRobot : public LiveDaemon {};
@@ -139,8 +139,9 @@ TEST_F(OneRobot, IsCheckedAndTheMissingOneIsAFault) {
   Config config = pair_config(1, mesh_port_);
   config.cameras[0].calibration.calibrated = false;
   const Runtime runtime(config, machine_);
-  EXPECT_TRUE(Client(config).await_status(
-      [](const Json& status) { return tells(sensor_of(status, "cam0 spots"), "not calibrated"); }));
+  EXPECT_TRUE(Client(config).await_status([](const Json& status) {
+    return mentions(sensor_of(status, "cam0 spots"), "not calibrated");
+  }));
 
   const Ending ending =
       crepesctl({"check", "--port", std::to_string(config.subscription.port), "--for", "1"});

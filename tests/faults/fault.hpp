@@ -153,7 +153,7 @@ struct Fault {
   RobotId robot{};
   double from_s = 0.0;  ///< true time
   double to_s = 0.0;
-  double rate = 1.0;       ///< of what `KindOf::rate` tells
+  double rate = 1.0;       ///< as `KindOf::rate` describes it
   std::uint64_t seed = 0;  ///< of its own details
 
   [[nodiscard]] bool lasts_at(double true_s) const { return true_s >= from_s && true_s < to_s; }

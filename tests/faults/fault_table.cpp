@@ -7,6 +7,8 @@
 #include <map>
 #include <sstream>
 
+#include "estimator/core/quantile.hpp"
+
 namespace crepes::faults {
 namespace {
 
@@ -52,12 +54,6 @@ void add(const LogEntry& entry, std::map<std::string_view, Row>& rows) {
   row.recovery_s.push_back(entry.recovery_s);
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::ranges::sort(values);
-  return values[values.size() / 2];
-}
-
 }  // namespace
 
 std::string log_line(const Verdict& verdict) {
@@ -87,10 +83,12 @@ std::string table_of(const std::vector<std::string>& logs) {
       broken, trials);
   for (const KindOf& kind : kKinds) {
     const Row& row = rows[kind.name];
+    std::vector<double> sorted_s = row.recovery_s;
+    const double median_s = sorted_s.empty() ? 0.0 : upper_median(sorted_s);
     const double worst_s = row.recovery_s.empty() ? 0.0 : *std::ranges::max_element(row.recovery_s);
     table += fmt::format("| {} | {} | {} | {} | {:.2f} | {:.2f} | {:.1f} | {:.1f} | {:.1f} |\n",
                          kind.name, row.tried, row.alone, row.broken, row.worst_m, row.beyond_s,
-                         row.heap_mb, median(row.recovery_s), worst_s);
+                         row.heap_mb, median_s, worst_s);
   }
   return table;
 }

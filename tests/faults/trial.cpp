@@ -124,7 +124,7 @@ void measure(const std::vector<Fault>& faults, const Traces& traces, const Trace
   }
 }
 
-/// What a copy of the process tells.
+/// What a copy of the process reports.
 std::string to_text(const Verdict& verdict) {
   std::string text = fmt::format("{} {} {} {} {}\n", verdict.worst_m, verdict.beyond_s,
                                  verdict.recovery_s, verdict.heap_growth, verdict.hash);

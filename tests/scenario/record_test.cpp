@@ -232,7 +232,7 @@ TEST_F(Record, FailsWithAFullDiskAndTheDaemonDoesNotNotice) {
   }));
 }
 
-TEST_F(Record, DropsTheNewestForAToolThatDoesNotReadAndTellsHowMany) {
+TEST_F(Record, DropsTheNewestForAToolThatDoesNotReadAndReportsHowMany) {
   const Config config = recorded_config(1);
   RecordQueue events{100, Overflow::kDropNewest};
   std::deque<PictureTap> pictures;

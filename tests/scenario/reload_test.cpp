@@ -133,7 +133,7 @@ TEST_F(Reload, TakesTheKeyThatHasTakenTheOldOnesPlace) {
   ASSERT_TRUE(one.reconfigure(configs[0]));
   for (const Config& config : configs) {
     EXPECT_TRUE(Client(config).await_status([](const Json& status) {
-      return tells(sensor_of(status, "mesh"), "net.key_file") &&
+      return mentions(sensor_of(status, "mesh"), "net.key_file") &&
              status["network"].value("refused_seal_broken", 0) > 50;
     }));
   }
@@ -184,7 +184,7 @@ TEST_F(Reload, ExcludesALostRobotByOneLine) {
   std::swap(mistaken.swarm.members.at(0).public_key, mistaken.swarm.members.at(1).public_key);
   ASSERT_TRUE(one.reconfigure(mistaken));
   EXPECT_TRUE(client.await_status([](const Json& status) {
-    return tells(sensor_of(status, "mesh"), "public_key") &&
+    return mentions(sensor_of(status, "mesh"), "public_key") &&
            status["network"].value("refused_signature_wrong", 0) > 50;
   }));
 }
@@ -197,7 +197,7 @@ TEST_F(Reload, SendsNothingWhileItsKeyCannotBeRead) {
   Client client(config);
 
   const auto fault = client.await_status([](const Json& status) {
-    return tells(sensor_of(status, "mesh"), "No such file") &&
+    return mentions(sensor_of(status, "mesh"), "No such file") &&
            sensor_of(status, "imu").value("counts", Json::object()).value("samples", 0) > 50;
   });
   ASSERT_TRUE(fault);
@@ -247,9 +247,9 @@ TEST_F(Reload, OpensOtherPortsOfMeshSubscriptionAndSensors) {
   ASSERT_TRUE(runtime.reconfigure(wanted));
 
   EXPECT_TRUE(Client(wanted).await_status([](const Json& status) {
-    return tells(sensor_of(status, "mesh"), "nosuch0") &&
-           tells(sensor_of(status, "imu"), "/nowhere/imu") &&
-           tells(sensor_of(status, "uwb"), "/nowhere/uwb");
+    return mentions(sensor_of(status, "mesh"), "nosuch0") &&
+           mentions(sensor_of(status, "imu"), "/nowhere/imu") &&
+           mentions(sensor_of(status, "uwb"), "/nowhere/uwb");
   }));
 }
 
@@ -279,7 +279,7 @@ class NotifySocket {
   std::string heard_;
 };
 
-TEST_F(Reload, HappensOnSighupAndSystemdIsTold) {
+TEST_F(Reload, HappensOnSighupAndSystemdIsNotified) {
   const ScratchDirectory folder = ScratchDirectory::create({}).value();
   const auto file = folder.path() / "crepesd.yaml";
   Config config = pair_config(1, mesh_port_);

@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "estimator/calibration/camera_batch.hpp"
-#include "estimator/calibration/camera_start.hpp"
-#include "estimator/calibration/jet_geometry.hpp"
+#include "estimator/calibration/batch/jet_geometry.hpp"
+#include "estimator/calibration/camera/camera_batch.hpp"
+#include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 #include "tests/support/calibration_recording.hpp"
 
 namespace crepes {

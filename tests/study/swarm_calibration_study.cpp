@@ -9,7 +9,7 @@
 #include "daemon/ctl/calibrate/swarm_recording.hpp"
 #include "drivers/sim/ring_renderer.hpp"
 #include "drivers/sim/seeded_noise.hpp"
-#include "estimator/calibration/swarm_batch.hpp"
+#include "estimator/calibration/swarm/swarm_batch.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 #include "tests/study/replay_scores.hpp"

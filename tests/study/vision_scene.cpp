@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 #include "estimator/vision/blink_tracker.hpp"
 #include "estimator/vision/codebook.hpp"
@@ -17,7 +18,6 @@ namespace {
 constexpr std::size_t kBoards = 4;
 constexpr double kFrame_s = 0.005;
 constexpr double kNear_px = 2.0;
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr Timestamp kStart{std::chrono::seconds{100}};
 
 CameraCalibration fisheye(double row_delay_s = 0.0) {
@@ -62,17 +62,16 @@ class Stage {
     std::uniform_real_distribution<double> turn(0.0, 2.0 * std::numbers::pi);
     for (Way& way : ways_)
       for (double& phase : way.phases) phase = turn(random_);
-    for (std::size_t i = 0; i < kBoards; ++i)
-      ways_[i].azimuth = (-45.0 + 30.0 * double(i)) * kDegree;
+    for (std::size_t i = 0; i < kBoards; ++i) ways_[i].azimuth = radians(-45.0 + 30.0 * double(i));
   }
 
   [[nodiscard]] double yaw(double t_s) const {
     const double w = 2.0 * std::numbers::pi * scene_.turns_hz;
-    return scene_.peak_rate_dps * kDegree / w * std::sin(w * t_s);
+    return radians(scene_.peak_rate_dps) / w * std::sin(w * t_s);
   }
   [[nodiscard]] double yaw_rate(double t_s) const {
     const double w = 2.0 * std::numbers::pi * scene_.turns_hz;
-    return scene_.peak_rate_dps * kDegree * std::cos(w * t_s);
+    return radians(scene_.peak_rate_dps) * std::cos(w * t_s);
   }
   /// The board in the body.
   [[nodiscard]] Pose T_B_M(std::size_t board, double t_s) const {

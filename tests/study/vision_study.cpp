@@ -6,6 +6,7 @@
 #include <random>
 #include <string_view>
 
+#include "estimator/core/quantile.hpp"
 #include "tests/study/vision_scene.hpp"
 
 namespace crepes::study {
@@ -91,13 +92,9 @@ std::vector<VisionScene> scenes(std::uint64_t seed) {
   };
 }
 
-double quantile(std::vector<double> values, double part) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1))];
-}
-
 void print(const VisionScene& scene, const VisionScore& score) {
+  std::vector<double> errors_px = score.errors_px;
+  if (errors_px.empty()) errors_px.push_back(0.0);
   std::printf("%-28s %6zu  %6.2f  %5zu  %6zu  %8.2f  %6.2f  %6.2f  %5zu  %5.2f\n",
               scene.name.c_str(), score.lit,
               100.0 * static_cast<double>(score.identified) /
@@ -105,8 +102,7 @@ void print(const VisionScene& scene, const VisionScore& score) {
               score.wrong, score.astray,
               static_cast<double>(score.false_spots) /
                   static_cast<double>(std::max<std::size_t>(1, score.pictures)),
-              quantile(score.errors_px, 0.5), quantile(score.errors_px, 0.99), score.never,
-              score.slowest_s);
+              quantile(errors_px, 0.5), quantile(errors_px, 0.99), score.never, score.slowest_s);
   std::fflush(stdout);
 }
 

@@ -157,7 +157,7 @@ PoseTrace trace_of(double error_m, double sigma_m, double from_s = 4.0, double t
   return trace;
 }
 
-TEST(FaultTrial, TellsBrokenPromises) {
+TEST(FaultTrial, ReportsBrokenPromises) {
   const Pair pair{RobotId{1}, RobotId{2}};
   const auto fault = [](Kind kind) {
     return std::vector<Fault>{{.kind = kind, .robot = RobotId{2}, .from_s = 5.0, .to_s = 8.0}};
@@ -189,7 +189,7 @@ TEST(FaultTrial, TellsBrokenPromises) {
   EXPECT_EQ(count(Kind::kReboot, ghost), 1U);
 }
 
-TEST(FaultTrial, TellsTheTimeToRecover) {
+TEST(FaultTrial, ReportsTheTimeToRecover) {
   PoseTrace trace = trace_of(0.5, 0.1, 4.0, 9.0);
   NeighborPose pose;
   for (double t = 9.0; t < 14.0; t += 0.02) trace.add(pose, Pose{}, t);

@@ -10,7 +10,7 @@
 #include "daemon/ctl/calibrate/camchain.hpp"
 #include "daemon/ctl/calibrate/camera_report.hpp"
 #include "drivers/dataset/robot_folder.hpp"
-#include "estimator/calibration/camera_start.hpp"
+#include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {

@@ -14,8 +14,8 @@
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/dataset/robot_folder.hpp"
-#include "estimator/calibration/allan_deviation.hpp"
-#include "estimator/calibration/imu_calibration.hpp"
+#include "estimator/calibration/imu/allan_deviation.hpp"
+#include "estimator/calibration/imu/imu_calibration.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {

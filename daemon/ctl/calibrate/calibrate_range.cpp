@@ -16,7 +16,7 @@
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/dataset/robot_folder.hpp"
-#include "estimator/calibration/range_calibration.hpp"
+#include "estimator/calibration/range/range_calibration.hpp"
 
 namespace crepes {
 namespace {

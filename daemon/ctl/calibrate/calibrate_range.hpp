@@ -11,6 +11,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl calibrate range`.
 struct CalibrateRangeOptions {
   std::filesystem::path swarm_dir;
   std::filesystem::path tape{};          ///< empty: `distances` alone

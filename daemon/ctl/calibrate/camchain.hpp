@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "estimator/calibration/camera_state.hpp"
-#include "estimator/calibration/lens_conversion.hpp"
+#include "estimator/calibration/camera/camera_state.hpp"
+#include "estimator/calibration/camera/lens_conversion.hpp"
 #include "estimator/core/camera_calibration.hpp"
 
 namespace crepes {

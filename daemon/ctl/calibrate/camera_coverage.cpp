@@ -4,12 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "daemon/ctl/json_line.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr int kLeastSightings = 3;       // of a cell
 constexpr double kWholePicture = 0.9;    // of the cells inside the circle
@@ -172,6 +176,18 @@ std::string coverage_text(const CameraCoverage& coverage) {
       std::string(static_cast<std::size_t>(kBar - done), '.'), 100.0 * coverage.share());
   for (const std::string& line : coverage.missing()) text += "- " + line + "\n";
   return text;
+}
+
+std::string coverage_json(const CameraCoverage& coverage) {
+  Json json{{"share", coverage.share()},   {"picture", coverage.picture()},
+            {"seen_s", coverage.seen_s()}, {"boards", Json::array()},
+            {"cells", Json::array()},      {"missing", coverage.missing()}};
+  const Eigen::Vector3d rate = coverage.rate_rms_radps();
+  json["rate_rms_radps"] = {rate.x(), rate.y(), rate.z()};
+  for (const RobotId id : coverage.boards()) json["boards"].push_back(id.value);
+  for (int row = 0; row < CameraCoverage::kRows; ++row)
+    json["cells"].push_back(line_of(coverage, row));
+  return json_line(json);
 }
 
 }  // namespace crepes

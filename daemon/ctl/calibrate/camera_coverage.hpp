@@ -14,8 +14,8 @@
 
 namespace crepes {
 
-/// Counts where in the picture identified boards were seen, for how long, and how the body turned
-/// meanwhile. Needs no more than a guess of the lens.
+/// Counts where in the picture identified boards were seen and for how long, and how the body
+/// turned at that time. A guess of the lens is sufficient.
 class CameraCoverage {
  public:
   static constexpr int kRows = 10;
@@ -30,9 +30,9 @@ class CameraCoverage {
   /// Whether light can fall on this cell: its center is in the circle that touches the nearer
   /// border of the picture, or no further out than a cell that was seen.
   [[nodiscard]] bool is_inside(int row, int column) const;
-  /// Whether a board was seen there some times.
+  /// Whether a board was seen there several times.
   [[nodiscard]] bool is_seen(int row, int column) const;
-  /// Seen cells over those inside.
+  /// The share of the cells inside that were seen.
   [[nodiscard]] double picture() const;
   /// Root mean square about each axis of the body.
   [[nodiscard]] Eigen::Vector3d rate_rms_radps() const;
@@ -40,7 +40,8 @@ class CameraCoverage {
   [[nodiscard]] double seen_s() const { return seen_s_; }
   [[nodiscard]] const std::set<RobotId>& boards() const { return boards_; }
 
-  /// 0 to 1, of what it has least. With 1 the recording is expected to be enough.
+  /// Progress of the requirement that is furthest from being met, 0 to 1. With 1 the recording is
+  /// expected to be sufficient.
   [[nodiscard]] double share() const;
   /// What to do, one sentence each; empty with a share of 1.
   [[nodiscard]] std::vector<std::string> missing() const;
@@ -68,5 +69,8 @@ class CameraCoverage {
 
 /// For a terminal: the picture's cells, the turns, a bar, and what is missing.
 [[nodiscard]] std::string coverage_text(const CameraCoverage& coverage);
+/// The same as one JSON line. `cells` has a string for each row of the picture: a hash for a cell
+/// that was seen, a dot for one that was not yet, a blank outside the image circle.
+[[nodiscard]] std::string coverage_json(const CameraCoverage& coverage);
 
 }  // namespace crepes

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "estimator/calibration/camera_batch.hpp"
-#include "estimator/calibration/lens_conversion.hpp"
+#include "estimator/calibration/camera/camera_batch.hpp"
+#include "estimator/calibration/camera/lens_conversion.hpp"
 
 namespace crepes {
 

@@ -13,7 +13,7 @@
 #include "daemon/ctl/calibrate/camchain.hpp"
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
-#include "estimator/calibration/imu_calibration.hpp"
+#include "estimator/calibration/imu/imu_calibration.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 

@@ -6,15 +6,17 @@
 #include <string>
 #include <vector>
 
-#include "estimator/calibration/range_calibration.hpp"
+#include "estimator/calibration/range/range_calibration.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
 
+/// Two robots and the distance between them.
 struct TapedPair {
   RobotPair pair;
   double distance_m = 0.0;  ///< antenna to antenna
 };
+/// A part of a recording in which a distance is constant.
 struct TapeSegment {
   double from_s = 0.0;  ///< after the recording's first row
   double to_s = 0.0;

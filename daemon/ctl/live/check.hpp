@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl check`.
 struct CheckOptions {
   DaemonAddress daemon;
   std::filesystem::path config;  ///< the daemon's configuration, for its rates; may be empty
@@ -20,6 +21,7 @@ struct CheckOptions {
   bool json = false;
 };
 
+/// The findings as text, and whether one is a fault.
 struct CheckReport {
   std::string text;
   bool is_good = false;  ///< no fault was found; doubts do not count

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "estimator/calibration/camera_solver.hpp"
+#include "estimator/calibration/camera/camera_solver.hpp"
+#include "estimator/calibration/camera/residual_map.hpp"
 #include "estimator/calibration/grid/grid_fit.hpp"
-#include "estimator/calibration/residual_map.hpp"
 
 namespace crepes {
 

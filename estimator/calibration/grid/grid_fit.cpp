@@ -11,7 +11,7 @@
 #include <array>
 #include <cmath>
 
-#include "estimator/calibration/jet_geometry.hpp"
+#include "estimator/calibration/batch/jet_geometry.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {

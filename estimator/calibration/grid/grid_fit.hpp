@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/calibration/camera_problem.hpp"
+#include "estimator/calibration/camera/camera_problem.hpp"
 #include "estimator/calibration/grid/grid_lens.hpp"
 #include "estimator/calibration/grid/grid_order.hpp"
 #include "estimator/core/pose.hpp"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/calibration/camera_start.hpp"
+#include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/vision/double_sphere.hpp"
 #include "estimator/vision/kannala_brandt.hpp"
 

@@ -190,7 +190,7 @@ TEST_F(ConfigSources, RefusesToAddMembersToThoseThatAllRobotsShare) {
   EXPECT_EQ(faults(), "crepesd.d/a.yaml:3: swarm.members: swarm.yaml has no member 3");
 }
 
-TEST_F(ConfigSources, TellsWhatIsWrongWithAMembersFileOnce) {
+TEST_F(ConfigSources, ReportsWhatIsWrongWithAMembersFileOnce) {
   const auto faults_with = [this](const std::string& members) {
     write("swarm.yaml", members);
     write("crepesd.yaml",
@@ -220,7 +220,7 @@ TEST_F(ConfigSources, FindsTheKeyBesideTheFileThatNamesIt) {
   EXPECT_TRUE(fs::equivalent(load().net.key_file, path("mesh.key")));
 }
 
-TEST_F(ConfigSources, TellsWhatIsWrongWithTheKey) {
+TEST_F(ConfigSources, ReportsWhatIsWrongWithTheKey) {
   write("crepesd.yaml", kBase);
   write("crepesd.d/20-key.yaml", "net:\n  key_file: mesh.key\n");
 
@@ -376,7 +376,7 @@ TEST_F(CalibrationReference, ReadsBasaltsFileForCameraAndImu) {
   EXPECT_EQ(config.imu.noise.accelerometer_noise_density, 0.016);
 }
 
-TEST_F(CalibrationReference, TellsWhatIsWrongWithItOnce) {
+TEST_F(CalibrationReference, ReportsWhatIsWrongWithItOnce) {
   write_camera("    calibration: imu.yaml\n");
   EXPECT_EQ(faults(),
             "crepesd.yaml:8: cameras[0].calibration: has no camera \"cam0\"; see "

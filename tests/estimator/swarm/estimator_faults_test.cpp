@@ -146,15 +146,16 @@ void expect_unknown_for(NoPoseReason reason, const Fault& fault) {
   EXPECT_LE(trials.after.dishonest_share(), 0.01);
 }
 
-TEST(EstimatorFaults, AnImuThatHangsTakesThePoseAwayAndIsTold) {
+TEST(EstimatorFaults, AnImuThatHangsTakesThePoseAwayAndIsReported) {
   expect_unknown_for(NoPoseReason::kNoOwnImu, [] { return Conditions{.own_imu = frozen()}; });
 }
 
-TEST(EstimatorFaults, APeersImuThatHangsTakesThePoseAwayAndIsTold) {
+TEST(EstimatorFaults, APeersImuThatHangsTakesThePoseAwayAndIsReported) {
   expect_unknown_for(NoPoseReason::kNoPeerImu, [] { return Conditions{.peer_imu = frozen()}; });
 }
 
-/// Three quarters of a second of an accelerometer that reads the end of its range: no pose, told.
+/// Three quarters of a second of an accelerometer that reads the end of its range: no pose, and a
+/// reason.
 template <bool kOwn>
 void saturate(EstimatorPair& pair, std::uint64_t seed) {
   Conditions with;
@@ -166,7 +167,7 @@ void saturate(EstimatorPair& pair, std::uint64_t seed) {
   EXPECT_EQ(pair.status().reason, kOwn ? NoPoseReason::kNoOwnImu : NoPoseReason::kNoPeerImu);
 }
 
-TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsTold) {
+TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsReported) {
   EXPECT_LE(Trials(saturate<true>).slowest_return, 500ms);
   EXPECT_LE(Trials(saturate<false>).slowest_return, 500ms);
 }

@@ -137,7 +137,7 @@ TEST_F(BlinkTrackerTest, KeepsItsBoardsWhileItTurnsFiveHundredDegreesASecond) {
   EXPECT_GT(right, 100);
 }
 
-TEST_F(BlinkTrackerTest, TellsCrossingBoardsApart) {
+TEST_F(BlinkTrackerTest, DistinguishesCrossingBoards) {
   boards_ = {{0, [](double t) { return Eigen::Vector3d(5.0, -2.0 + 0.8 * t, 0.0); }},
              {1, [](double t) { return Eigen::Vector3d(5.0, 2.0 - 0.8 * t, 0.02); }}};
   int right = 0;
@@ -301,15 +301,15 @@ TEST_F(BlinkTrackerTest, RefusesAndCountsWhatMakesNoSense) {
 }
 
 /// A board that shines always but in one slot, seen by a camera that turns to and fro by up to 2.6
-/// rad/s; rows are exposed one after the other, or all at once if `row_us` is 0. `told_us` is what
-/// the tracker believes. The error of its bearings [px], root mean square.
-double error_of_a_turning_camera(double row_us, double told_us, std::uint32_t seed) {
+/// rad/s. Rows are exposed one after the other, or all at once if `row_us` is 0. `configured_us` is
+/// the tracker's setting. Returns the root mean square error of the bearings [px].
+double error_of_a_turning_camera(double row_us, double configured_us, std::uint32_t seed) {
   constexpr double kTurn = 2.6;
   constexpr double kPace = 4.0;  // rad/s
   constexpr double kNoise = 0.03;
   CameraCalibration config = BlinkTrackerTest::camera();
   config.T_cam_imu.p.setZero();
-  config.rolling_shutter_us_per_row = told_us;
+  config.rolling_shutter_us_per_row = configured_us;
   const CameraModel model = *CameraModel::from(config);
   const IdLibrary library = *IdLibrary::from(BlinkTrackerTest::swarm());
   BlinkTracker tracker(config, model, VisionConfig{}, library);
@@ -355,7 +355,7 @@ TEST(BlinkTracker, TurnsWhatARollingShutterSawToTheStampOfTheFrame) {
 
     EXPECT_LT(error_of_a_turning_camera(4.4, 4.4, seed), 1.1 * global) << "seed " << seed;
     EXPECT_LT(error_of_a_turning_camera(-4.4, -4.4, seed), 1.1 * global) << "bottom row first";
-    EXPECT_GT(error_of_a_turning_camera(4.4, 0.0, seed), 5.0 * global) << "nobody told it";
+    EXPECT_GT(error_of_a_turning_camera(4.4, 0.0, seed), 5.0 * global) << "it is not configured";
     EXPECT_GT(error_of_a_turning_camera(4.4, -4.4, seed), 10.0 * global) << "the wrong way round";
   }
 }
