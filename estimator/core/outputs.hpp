@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/team_solution.hpp"
 
 namespace crepes {
 
@@ -183,10 +184,19 @@ struct CalibrationRecord {
   std::array<double, kSize> sigma{};
 };
 
+/// What the team's filter found over an interval that ends at `stamp`.
+struct TeamRecord {
+  Timestamp stamp{};
+  std::vector<TeamResidual> residuals;
+  std::vector<RobotCalibration> calibrations;
+  std::vector<TeamFault> faults;
+};
+
 /// The outcome of each measurement, and calibrations over time.
 struct Records {
   std::vector<MeasurementRecord> measurements;
   std::vector<CalibrationRecord> calibrations;
+  std::vector<TeamRecord> team{};
 };
 
 using VerdictCounts = std::array<std::uint64_t, kVerdictCount>;
@@ -209,6 +219,25 @@ using ImuFaultCounts = std::array<std::uint64_t, kImuFaultCount>;
   return kNames[static_cast<std::size_t>(fault)];
 }
 
+/// How well measurements of a kind agree with what was expected of them.
+struct ResidualStatus {
+  std::optional<double> nis;  ///< mean for each dimension, of those fused recently; honest: 1
+  std::uint64_t fused = 0;
+  std::uint64_t refused = 0;
+};
+
+/// A robot as the team's filter knows it.
+struct TeamRobotStatus {
+  RobotCalibration calibration;
+  std::array<ResidualStatus, kTeamResidualKindCount> residuals{};  ///< of what it measured
+  std::vector<TeamFault> faults;
+};
+
+struct TeamStatus {
+  Timestamp stamp{};  ///< of the latest solution
+  std::vector<TeamRobotStatus> robots;
+};
+
 /// The state of one neighbor, for STATUS.
 struct NeighborStatus {
   RobotId neighbor{};
@@ -219,6 +248,9 @@ struct NeighborStatus {
   /// Of each kind, whatever its outcome.
   std::array<std::optional<NewestReading>, kMeasurementKindCount> newest{};
   PairMounting mounting;
+  /// Mean NIS for each dimension, of about the last fifty that were fused, by kind.
+  std::array<std::optional<double>, kMeasurementKindCount> nis{};
+  std::optional<CalibrationRecord> calibration;  ///< of its filter
   /// Measured minus expected, own and the neighbor's ranges: the mean of about the last sixteen
   /// [m].
   std::optional<double> range_residual_m;
@@ -226,6 +258,12 @@ struct NeighborStatus {
   ImuFaultCounts refused_imu{};         ///< its IMU's samples, by reason
   std::uint64_t id_decodes = 0;         ///< tracks decoded to this robot's ID
   std::vector<TeamFault> faults;        ///< what the team finds wrong with it
+};
+
+/// Lights that were named where and when their board was expected, before their blinking was read.
+struct PredictedIds {
+  std::uint64_t confirmed = 0;    ///< read afterwards
+  std::uint64_t unconfirmed = 0;  ///< not read as predicted within 0.3 s; no filter used them
 };
 
 /// The state of the estimator, for STATUS.
@@ -236,6 +274,8 @@ struct EstimatorStatus {
   std::uint64_t refused_samples = 0;  ///< NaN, out of range, stamp that goes back, refused_imu
   ImuFaultCounts refused_imu{};       ///< of our IMU, by reason
   std::vector<TeamFault> faults;      ///< what the team finds wrong with us
+  PredictedIds predicted_ids;
+  std::optional<TeamStatus> team;
 };
 
 }  // namespace crepes

@@ -37,7 +37,7 @@ RelativePoseEdge propagated_edge(RobotId from, const NeighborEstimate& estimate,
   const double dt = to_seconds(stamp - estimate.stamp);
   covariance.diagonal().head<3>().array() += kSpeedError * kSpeedError * dt * dt;
   covariance.diagonal().tail<3>().array() += kTurnError * kTurnError * dt * dt;
-  return {from, estimate.neighbor, {motion.T_B_N, covariance}, motion.v_B_N};
+  return {from, estimate.neighbor, {motion.T_B_N, covariance}, motion.v_B_N, estimate.stamp};
 }
 
 }  // namespace
@@ -58,7 +58,8 @@ GraphProblem GraphProblemBuilder::build(Timestamp stamp, RobotId self,
                                         const ImuOf& imu_of) const {
   GraphProblem problem{.stamp = stamp, .self = self, .edges = {}};
   for (const NeighborEstimate& estimate : own) {
-    problem.edges.push_back({self, estimate.neighbor, estimate.T_B_N, estimate.v_B_N});
+    problem.edges.push_back(
+        {self, estimate.neighbor, estimate.T_B_N, estimate.v_B_N, estimate.stamp});
   }
   for (const auto& [pair, estimate] : estimates_) {
     if (std::chrono::abs(stamp - estimate.stamp) > kMaxEstimateAge) continue;

@@ -157,6 +157,7 @@ NeighborStatus Neighbor::status() const {
   status.pose = publisher_.published();
   intake_.outcomes().write_to(status);
   status.mounting = mounting_;
+  if (!hypotheses_.empty()) status.calibration = hypotheses_.leader().heaviest().calibration();
   status.refused_imu = body_.guard.refused();
   if (!body_.imu.empty()) status.newest_imu = body_.imu.newest().stamp;
   return status;

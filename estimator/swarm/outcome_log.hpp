@@ -22,13 +22,14 @@ class OutcomeLog {
   void add(std::optional<CalibrationRecord> calibration);
   [[nodiscard]] bool keeps_records() const { return keeps_records_; }
 
-  /// Fills in `measurements`, `newest` and `range_residual_m`.
+  /// Fills in `measurements`, `newest`, `nis` and `range_residual_m`.
   void write_to(NeighborStatus& status) const;
 
  private:
   RobotId neighbor_;
   std::array<VerdictCounts, kMeasurementKindCount> counts_{};
   std::array<std::optional<NewestReading>, kMeasurementKindCount> newest_{};
+  std::array<std::optional<double>, kMeasurementKindCount> nis_{};
   std::optional<double> range_residual_m_;
   bool keeps_records_ = false;
   Records records_;

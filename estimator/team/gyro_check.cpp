@@ -163,10 +163,10 @@ struct CameraTurn {
   }
 };
 
-std::optional<GyroContradiction> contradiction(std::span<const Change> changes) {
+GyroCheck check_of(std::span<const Change> changes) {
   const CameraTurn turn(changes);
   std::ptrdiff_t unlikely = 0;
-  double sum = 0.0;
+  GyroCheck check;
   LeastSquares rate(kAnyRate);
   for (const Change& change : changes) {
     const Eigen::Vector2d residual = change.residual(turn.R);
@@ -174,31 +174,30 @@ std::optional<GyroContradiction> contradiction(std::span<const Change> changes) 
     const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
     const double chi2 = residual.dot(S.llt().solve(residual));
     unlikely += chi2 > kUnlikely ? 1 : 0;
-    sum += chi2;
+    check.chi2 += chi2;
+    check.dimension += 2;
     rate.add(residual, S, change.by_rate());
   }
   const Eigen::Vector3d mean = rate.mean();
   const double explained = rate.weighed.dot(mean);
   const bool is_common = unlikely >= 2 && 2 * unlikely > std::ssize(changes);
-  if (!is_common || explained <= kExplained * sum) return std::nullopt;
-  return GyroContradiction{.chi2 = explained, .rate_radps = mean.norm()};
+  if (is_common && explained > kExplained * check.chi2)
+    check.contradiction = {.chi2 = explained, .rate_radps = mean.norm()};
+  return check;
 }
 
 }  // namespace
 
-std::map<RobotId, GyroContradiction> gyro_contradictions(const TeamInterval& interval,
-                                                         const TeamTrajectories& paths,
-                                                         const TeamBelief& belief) {
+std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
+                                         const TeamTrajectories& paths, const TeamBelief& belief) {
   std::map<RobotId, std::vector<Change>> changes;
   for (const Sight& sight : all_sights(interval, belief)) {
     if (const auto change = change_of(interval, paths, belief, sight))
       changes[sight.observer].push_back(*change);
   }
-  std::map<RobotId, GyroContradiction> contradictions;
-  for (const auto& [robot, seen] : changes) {
-    if (const auto found = contradiction(seen)) contradictions.emplace(robot, *found);
-  }
-  return contradictions;
+  std::map<RobotId, GyroCheck> checks;
+  for (const auto& [robot, seen] : changes) checks.emplace(robot, check_of(seen));
+  return checks;
 }
 
 }  // namespace crepes

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 
 #include "estimator/team/team_readings.hpp"
 
@@ -14,10 +15,17 @@ struct GyroContradiction {
   double rate_radps = 0.0;  ///< the difference
 };
 
-/// Most of the robots that such a robot sees, and at least two, must agree on the rate. Their
-/// places and a constant misalignment of the camera cancel. The uncertainty of velocities and of
-/// the gyroscope is included.
-[[nodiscard]] std::map<RobotId, GyroContradiction> gyro_contradictions(
-    const TeamInterval& interval, const TeamTrajectories& paths, const TeamBelief& belief);
+struct GyroCheck {
+  double chi2 = 0.0;  ///< of all that its cameras see, by what its gyroscope reads
+  int dimension = 0;  ///< of `chi2`
+  std::optional<GyroContradiction> contradiction;
+};
+
+/// Of each robot that sees others long enough. Most of the robots that it sees, and at least two,
+/// must agree on a rate that contradicts its gyroscope. Their places and a constant misalignment of
+/// the camera cancel. The uncertainty of velocities and of the gyroscope is included.
+[[nodiscard]] std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
+                                                       const TeamTrajectories& paths,
+                                                       const TeamBelief& belief);
 
 }  // namespace crepes

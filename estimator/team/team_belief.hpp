@@ -5,6 +5,7 @@
 #include <map>
 
 #include "estimator/core/pose.hpp"
+#include "estimator/core/team_solution.hpp"
 #include "estimator/team/team_interval.hpp"
 #include "estimator/team/team_state.hpp"
 
@@ -43,6 +44,8 @@ struct TeamBelief {
   /// The same at the keyframe by this robot's clock. `member` carries it there from its own
   /// clock's.
   [[nodiscard]] TeamPose team_pose(RobotId id, const TeamMember& member) const;
+  /// What is known of a robot's sensors.
+  [[nodiscard]] RobotCalibration calibration(RobotId id) const;
   /// Of the position of `to` relative to `from`.
   [[nodiscard]] Eigen::Matrix3d position_covariance(RobotId from, RobotId to) const;
 

@@ -3,7 +3,9 @@
 
 #include <vector>
 
+#include "estimator/team/estimate_check.hpp"
 #include "estimator/team/team_belief.hpp"
+#include "estimator/team/team_place.hpp"
 #include "estimator/team/team_readings.hpp"
 #include "estimator/team/team_trust.hpp"
 
@@ -35,18 +37,20 @@ class TeamFilter {
   using Stage = TeamReadings::Stage;
 
   void remove_members(const TeamInterval& interval);
+  [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval);
   void append_cameras(const TeamInterval& interval);
   /// False if the covariance has become singular.
   [[nodiscard]] bool correct(const TeamInterval& interval);
   [[nodiscard]] bool correct(const TeamInterval& interval, Stage stage, TeamReadings readings);
   [[nodiscard]] std::vector<bool> corrected_states(Stage stage) const;
   void add_members(const TeamInterval& interval, TeamSolution& solution);
-  void add_member(const TeamInterval& interval, RobotId id, const GaussianPose& T_S_N,
-                  const Eigen::Vector3d& v_S_N);
+  void add_member(const TeamInterval& interval, RobotId id, const TeamPlace& place);
   void report(const TeamInterval& interval, TeamSolution& solution) const;
 
   TeamBelief belief_;
   TeamTrust trust_;
+  EstimateCheck estimates_;
+  std::vector<TeamResidual> residuals_;  ///< of the interval
 };
 
 }  // namespace crepes

@@ -46,9 +46,9 @@ struct TeamReadings {
 [[nodiscard]] std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& belief);
 
 /// Drops readings that are too unlikely. Counts how each camera and pair agrees, and when a robot
-/// was last seen.
+/// was last seen. Appends what was found to `residuals`.
 void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelief& belief,
-          TeamReadings& readings);
+          TeamReadings& readings, std::vector<TeamResidual>& residuals);
 
 /// One row a sight and one a pair's ranges: the mean of what was not gated.
 [[nodiscard]] std::vector<TeamRow> linearized(const TeamInterval& interval,

@@ -43,7 +43,8 @@ struct TeamCamera {
   Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< u_measured = Exp(m) u
   int index = 0;
   std::map<RobotId, Agreement> agreement{};  ///< of its bearings, by the robot that it sees
-  bool is_refused = false;                   ///< it contradicted the others after that, too
+  bool is_free = false;     ///< it may be turned: its prior allowed for any misalignment
+  bool is_refused = false;  ///< it contradicted the others after that, too
 };
 
 /// What is known of one robot.

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/team/gyro_check.hpp"
 #include "estimator/team/team_belief.hpp"
 
 namespace crepes {
@@ -14,13 +15,14 @@ namespace crepes {
 class TeamTrust {
  public:
   /// Robots that must be removed from the belief: they have no IMU, are too uncertain, or are
-  /// contradicted by most cameras that see them. In a tie, the robot that came last is removed.
+  /// contradicted by most cameras that see them. In a tie, the robot that came last is removed. Also
+  /// robots whose camera was refused for so long that it is tried again.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
-  /// Robots whose gyroscope contradicts what their cameras see over the interval. All in `belief`
-  /// have an IMU over it.
+  /// Robots whose gyroscope has contradicted for some intervals what their cameras see.
   [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval,
-                                                 const TeamBelief& belief);
+                                                 const TeamBelief& belief,
+                                                 const std::map<RobotId, GyroCheck>& checks);
 
   /// Robots of which a camera was newly found turned. Their attitude is wrong too. They must be
   /// restarted with an uncertain misalignment, so that the others' measurements determine it. If
@@ -39,7 +41,7 @@ class TeamTrust {
 
   /// Covariance of the misalignment of its cameras, which is also that of its attitude, in body
   /// axes [rad^2]. Empty if its cameras are as calibrated.
-  [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot, Timestamp now) const;
+  [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot) const;
   /// Whether a robot's cameras contradicted the others again after they were realigned.
   [[nodiscard]] bool is_refused(RobotId robot) const { return verdicts_.at(robot).is_refused; }
   /// The factor on the start's sigmas of a robot that was recently contradicted.
@@ -56,15 +58,16 @@ class TeamTrust {
     double rate_radps = 0.0;         ///< how wrong the gyroscope was then
   };
   struct Verdict {
-    Timestamp since{};
+    Timestamp shown{};  ///< when its camera was last found turned; after a while it may be repaired
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
     int count = 0;  ///< how often its cameras were found turned
     bool is_refused = false;
     bool is_withdrawn = false;
   };
+  void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
   void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
   [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
-  [[nodiscard]] bool is_realigned(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool is_realigned(RobotId robot) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] int recent_losses(RobotId robot, Timestamp now) const;
 
@@ -74,8 +77,14 @@ class TeamTrust {
   std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
 };
 
+/// The calibration of each robot. A camera is turned if its misalignment is significant and beyond
+/// what a calibration leaves.
+[[nodiscard]] std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief,
+                                                            const Priors& priors);
+
 /// Faults to report: cameras that are turned or refused, robots of which most ranges are refused,
-/// and wrong clocks.
-[[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief, const Priors& priors);
+/// and wrong clocks. `calibrations` are those of `belief`.
+[[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief,
+                                               const std::vector<RobotCalibration>& calibrations);
 
 }  // namespace crepes

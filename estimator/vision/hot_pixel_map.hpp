@@ -14,7 +14,7 @@ namespace crepes {
 /// forgotten after a few pictures in which it is dark. The number of pixels is bounded.
 class HotPixelMap {
  public:
-  static constexpr int kKnown = 400;  ///< pictures: 2 s at 200 Hz
+  static constexpr int kKnown = 250;  ///< pictures: 1.3 s at 200 Hz, 8.3 s at 30 Hz
   static constexpr std::size_t kMaxSuspects = 8192;
 
   /// Nothing is allocated later.

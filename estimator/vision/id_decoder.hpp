@@ -42,6 +42,9 @@ struct BlinkEvidence {
   /// mean.
   double earlier_markov = 0.0;
   std::optional<std::size_t> expected;  ///< the code that it was last, if `score` has its phase
+  double foretold = 0.0;                ///< posterior probability of `expected` until it is decided
+  /// Until then it may be named before it is read. Set where it appears after an absence.
+  std::optional<Timestamp> predictable_until;
 
   /// Returns to the initial state. Allocated memory is kept.
   void forget();
@@ -92,7 +95,7 @@ class IdDecoder {
   void observe_dark(BlinkEvidence& evidence, Timestamp stamp) const;
   /// The light of `evidence` was hidden, and one is seen at `now` where it is expected. What it
   /// showed becomes the prior: it is the same light in its phase, or, with probability `stranger`,
-  /// any other. Without a code it has to be decided anew.
+  /// any other. It has to be decided anew.
   void resume(BlinkEvidence& evidence, Timestamp now, double stranger) const;
   /// Whether the evidence is worth keeping for resume().
   [[nodiscard]] static bool is_worth_keeping(const BlinkEvidence& evidence);
@@ -101,8 +104,14 @@ class IdDecoder {
 
   /// The robot whose board the track is; empty while undecided or in doubt.
   [[nodiscard]] std::optional<RobotId> id_of(const BlinkEvidence& evidence) const;
+  /// The robot whose board is expected here and blinks as expected so far, while id_of() is still
+  /// empty: for 0.3 s after an absence. It is to be read in this time.
+  [[nodiscard]] std::optional<RobotId> predicted_id(const BlinkEvidence& evidence,
+                                                    Timestamp now) const;
   [[nodiscard]] static bool is_identified(const BlinkEvidence& evidence);
   [[nodiscard]] RobotId code_id(const CodeMatch& match) const { return codes_[match.code].id; }
+  /// The index of the robot's code; empty without one.
+  [[nodiscard]] std::optional<std::size_t> code_of(RobotId robot) const;
   /// The probability that the assigned board is lit at `stamp`; empty while none is assigned.
   [[nodiscard]] std::optional<double> lit_probability(const BlinkEvidence& evidence,
                                                       Timestamp stamp) const;

@@ -44,7 +44,7 @@ enum led_fault {
 /// How a board blinks: slot i of a period is lit when bit i of `pattern` is set, for lit_ticks,
 /// and dark for dark_ticks otherwise.
 ///
-/// A pattern has 8 to 32 slots of lit_ticks = dark_ticks, 2 to 50 ms. A duty code has two, the
+/// A pattern has 8 to 32 slots of lit_ticks = dark_ticks, 2 to 70 ms. A duty code has two, the
 /// first of them lit, each at least 0.5 ms and together 10 to 200 ms.
 struct led_settings {
   uint16_t robot_id;  ///< 1 to 65534; 0: never set, the board stays dark

@@ -129,6 +129,45 @@ struct Status {
     double airtime_of_all = 0.0;
   };
 
+  /// A value with its one sigma; a scalar has one component.
+  struct Estimate {
+    std::vector<double> value;
+    std::vector<double> sigma;
+  };
+  /// How well measurements of a kind agree with what was expected of them.
+  struct Residual {
+    std::optional<double> nis;  ///< mean normalized innovation squared for each dimension
+    std::uint64_t fused = 0;
+    std::uint64_t refused = 0;
+  };
+  struct Camera {
+    std::vector<double> p_body_camera;  ///< [m]
+    std::string state;                  ///< "calibrated", "turned" or "left_out"
+    std::map<std::string, Estimate> estimates;
+  };
+  /// A robot as the team's filter knows it.
+  struct TeamRobot {
+    std::uint16_t robot = 0;
+    std::string name;
+    bool trusted = false;
+    std::map<std::string, double> nis;          ///< by kind
+    std::map<std::string, Residual> residuals;  ///< by kind; only if asked for this robot
+    std::map<std::string, Estimate> calibration;
+    std::vector<Camera> cameras;
+    std::vector<std::string> faults;
+  };
+  struct Team {
+    std::optional<double> age_s;  ///< of the newest solution; empty without one
+    std::vector<TeamRobot> robots;
+  };
+  /// What a neighbor's own filter knows of the sensors.
+  struct Pair {
+    std::uint16_t peer = 0;
+    std::string name;
+    std::map<std::string, Residual> residuals;
+    std::map<std::string, Estimate> calibration;
+  };
+
   std::uint16_t self = 0;
   std::string name;
   double uptime_s = 0.0;
@@ -141,6 +180,8 @@ struct Status {
   Totals queues;
   Totals network;
   std::optional<Mesh> mesh;
+  std::optional<Team> team;  ///< only if asked for
+  std::optional<Pair> pair;  ///< only if asked for
   bool is_truncated = false;  ///< parts are missing, because a datagram is short
 };
 
@@ -161,7 +202,8 @@ struct Answer {
 };
 
 /// A request for STATUS that is repeated every `period_s`: of everything as far as it fits, of one
-/// neighbor, or of one part ("sensors" or "network").
+/// neighbor, or of one part: "sensors", "network", "team" (of `peer` in full, if there is one) or
+/// "pair" of `peer`.
 struct Poll {
   std::optional<std::uint16_t> peer{};
   std::string about{};

@@ -8,6 +8,7 @@
 #include "net/subscription/fault_text.hpp"
 #include "net/subscription/json_parts.hpp"
 #include "net/subscription/subscription_json.hpp"
+#include "net/subscription/team_json.hpp"
 
 namespace crepes {
 namespace {
@@ -50,6 +51,14 @@ void put_refused_imu(Json& json, const ImuFaultCounts& counts) {
 /// Adds `faults` if there are any, as sentences about a robot that has a name.
 void put_faults(Json& json, const std::vector<TeamFault>& faults) {
   for (const TeamFault& fault : faults) json["faults"].push_back(text_of(fault));
+}
+
+Json head_json(const SystemStatus& status) {
+  Json json{{"class", "STATUS"},
+            {"self", status.self.value},
+            {"name", truncated_utf8(status.name, kMaxName)}};
+  put(json, "uptime_s", status.uptime_s, 6);
+  return json;
 }
 
 Json neighbor_json(const NeighborStatus& neighbor) {
@@ -145,14 +154,6 @@ Json clock_json(const ClockStatus& clock) {
   return json;
 }
 
-Json head_json(const SystemStatus& status) {
-  Json json{{"class", "STATUS"},
-            {"self", status.self.value},
-            {"name", truncated_utf8(status.name, kMaxName)}};
-  put(json, "uptime_s", status.uptime_s, 6);
-  return json;
-}
-
 Json config_json(const SystemStatus& status) {
   Json json{{"generation", status.config.generation}};
   put(json, "age_s", status.config_age_s, 5);
@@ -180,8 +181,11 @@ void put_network(Json& json, const SystemStatus& status) {
   json["queues"] = Json::object();
   for (const QueueStatus& queue : status.queues)
     put_total(json["queues"], queue.name, queue.dropped);
-  json["estimator"] = totals_json({{"unknown_senders", status.estimator.unknown_senders},
-                                   {"refused_samples", status.estimator.refused_samples}});
+  json["estimator"] =
+      totals_json({{"unknown_senders", status.estimator.unknown_senders},
+                   {"refused_samples", status.estimator.refused_samples},
+                   {"ids_confirmed", status.estimator.predicted_ids.confirmed},
+                   {"ids_unconfirmed", status.estimator.predicted_ids.unconfirmed}});
   put_refused_imu(json["estimator"], status.estimator.refused_imu);
   json["mesh"] = mesh_json(status.mesh);
   json["network"] = totals_json(status.network);
@@ -270,6 +274,32 @@ std::string fitted(Json status) {
   return text;
 }
 
+/// The robot's name, if it is a member.
+std::optional<std::string> member_name(const SystemStatus& status, RobotId robot) {
+  if (robot == status.self) return status.name;
+  const auto& neighbors = status.estimator.neighbors;
+  const auto neighbor = std::ranges::find(neighbors, robot, &NeighborStatus::neighbor);
+  if (neighbor == neighbors.end()) return std::nullopt;
+  return neighbor->name;
+}
+
+/// STATUS with those robots of the team that `wanted` accepts.
+template <class Wanted>
+Json team_part_json(const SystemStatus& status, TeamDetail detail, const Wanted& wanted) {
+  Json json = head_json(status);
+  Json& team = json["team"] = Json::object();
+  if (!status.estimator.team) return json;
+  put(team, "age_s", to_seconds(status.stamp - status.estimator.team->stamp), 3);
+  team["robots"] = Json::array();
+  for (const TeamRobotStatus& robot : status.estimator.team->robots) {
+    const RobotId id = robot.calibration.robot;
+    if (wanted(id))
+      team["robots"].push_back(team_robot_json(
+          robot, member_name(status, id).value_or(std::string()), status.self, detail));
+  }
+  return json;
+}
+
 }  // namespace
 
 std::string status_json(const SystemStatus& status, StatusPart about) {
@@ -310,6 +340,44 @@ std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId 
   const auto clock = std::ranges::find(status.clocks, peer, &ClockStatus::peer);
   if (clock != status.clocks.end()) json["clocks"].push_back(clock_json(*clock));
   return fitted(std::move(json));
+}
+
+std::string team_status_json(const SystemStatus& status) {
+  Json json = team_part_json(status, TeamDetail::kBrief, [](RobotId) { return true; });
+  std::string text = dump(json);
+  Json more = Json::array();
+  while (text.size() > kMaxSubscriptionDatagram && !json["team"]["robots"].empty()) {
+    more.insert(more.begin(), json["team"]["robots"].back()["robot"]);
+    drop_last(json["team"], "robots");
+    json["more"] = more;
+    json["truncated"] = true;
+    text = dump(json);
+  }
+  return text;
+}
+
+std::optional<std::string> team_status_json(const SystemStatus& status, RobotId robot) {
+  if (!member_name(status, robot)) return std::nullopt;
+  Json json =
+      team_part_json(status, TeamDetail::kFull, [robot](RobotId id) { return id == robot; });
+  std::string text = dump(json);
+  while (text.size() > kMaxSubscriptionDatagram) {  // four cameras, or several faults
+    json["truncated"] = true;
+    Json& only = json["team"]["robots"][0];
+    if (only["calibration"].erase("gyro_scale") == 0 && !drop_last(only["calibration"], "cameras"))
+      only.erase("faults");
+    text = dump(json);
+  }
+  return text;
+}
+
+std::optional<std::string> pair_status_json(const SystemStatus& status, RobotId peer) {
+  const auto& neighbors = status.estimator.neighbors;
+  const auto neighbor = std::ranges::find(neighbors, peer, &NeighborStatus::neighbor);
+  if (neighbor == neighbors.end()) return std::nullopt;
+  Json json = head_json(status);
+  json["pair"] = pair_filter_json(*neighbor);
+  return dump(json);
 }
 
 }  // namespace crepes

@@ -22,7 +22,8 @@ class SightingsByBoard {
       const RobotId id = bearings[i].neighbor;
       const auto same = std::ranges::count(bearings, id, &Bearing::neighbor);
       const auto uv = model.project(T_C_B.q * bearings[i].u_B);
-      if (same == 1 && uv) found_[id].push_back({.stamp = stamp, .board = 0, .uv = *uv});
+      const bool was_read = bearings[i].how == Naming::kRead;
+      if (same == 1 && was_read && uv) found_[id].push_back({.stamp = stamp, .board = 0, .uv = *uv});
     }
   }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "daemon/ctl/live/light_advice.hpp"
 #include "daemon/ctl/live/pose_advice.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "estimator/core/constants.hpp"
@@ -184,35 +185,20 @@ void check_clocks(const RobotObservation& seen, Section section) {
 }
 
 void check_picture(const SensorLine& spots, Section& section) {
-  constexpr std::uint64_t kBright = 60;  // gray levels of the darkest part of the picture
-  constexpr std::uint64_t kWhite = 250;
-  constexpr std::uint64_t kClutter = 30;  // spots in a frame
-  constexpr std::uint64_t kMargin = 20;   // gray levels above the threshold
   const std::uint64_t background = total(spots.counts, "background");
   const std::uint64_t brightest = total(spots.counts, "brightest");
-  const std::uint64_t faintest = total(spots.counts, "faintest");
-  const std::uint64_t threshold = total(spots.counts, "threshold");
   const std::string text =
-      fmt::format("{}: background {}, threshold {}, brightest light {}, faintest {}", spots.name,
-                  background, threshold, brightest, faintest);
-  if (background > kBright) {
-    section.doubt(text,
-                  "the picture is too bright: shorten exposure_us (crepesctl exposure), check "
-                  "the infrared filter");
-  } else if (brightest == 0) {
-    section.doubt(fmt::format("{}: background {}, no light in view", spots.name, background),
-                  "put another robot's board in view, at the longest distance that you need");
-  } else if (total(spots.counts, "spots") > kClutter) {
-    section.doubt(fmt::format("{}, {} lights", text, total(spots.counts, "spots")),
-                  "lamps, windows or mirrors are in view: shorten exposure_us");
-  } else if (brightest < kWhite) {
-    section.doubt(text, "no board is white: lengthen exposure_us, or raise gain");
-  } else if (faintest < threshold + kMargin) {
-    section.doubt(text,
-                  "the faintest light is nearly lost: if it is a board, lengthen exposure_us; "
-                  "if not, shorten it");
-  } else {
+      brightest == 0
+          ? fmt::format("{}: background {}, no light in view", spots.name, background)
+          : fmt::format(
+                "{}: background {}, threshold {}, brightest light {}, faintest {}, {} lights",
+                spots.name, background, total(spots.counts, "threshold"), brightest,
+                total(spots.counts, "faintest"), total(spots.counts, "spots"));
+  const std::string advice = light_advice(spots.counts);
+  if (advice.empty()) {
     section.good(text);
+  } else {
+    section.doubt(text, advice);
   }
 }
 

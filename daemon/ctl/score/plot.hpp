@@ -17,7 +17,7 @@ struct PlotOptions {
 /// Writes one HTML page that needs no other file. For every ordered pair it shows errors with
 /// 3-sigma bands (without truth the sigmas), modes over time, and the age of the outputs. If replay
 /// wrote records (--debug-innovations), it also shows the innovations of each kind and the
-/// estimated biases. Returns the page's path. A missing or faulty file is an error that names it;
+/// estimated biases, and for every observer the residuals and calibrations of its team. Returns the page's path. A missing or faulty file is an error that names it;
 /// only records may be missing.
 [[nodiscard]] Result<std::filesystem::path> plot(const PlotOptions& options);
 

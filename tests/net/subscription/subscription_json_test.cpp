@@ -93,6 +93,10 @@ TEST(SubscriptionJson, ReadsAPollOfEverythingOfOneNeighborOrOfAPart) {
   EXPECT_EQ(poll_of(R"({"class":"POLL","peer":3})").peer, RobotId{3});
   EXPECT_EQ(poll_of(R"({"class":"POLL","about":"sensors"})").about, StatusPart::kSensors);
   EXPECT_EQ(poll_of(R"({"class":"POLL","about":"network"})").about, StatusPart::kNetwork);
+  EXPECT_EQ(poll_of(R"({"class":"POLL","about":"team"})").about, StatusPart::kTeam);
+  EXPECT_FALSE(poll_of(R"({"class":"POLL","about":"team"})").peer.has_value());
+  EXPECT_EQ(poll_of(R"({"class":"POLL","about":"team","peer":1})").peer, RobotId{1});
+  EXPECT_EQ(poll_of(R"({"class":"POLL","about":"pair","peer":3})").about, StatusPart::kPair);
 }
 
 TEST(SubscriptionJson, ReadsTheCookieOfAnyRequest) {
@@ -118,6 +122,7 @@ TEST(SubscriptionJson, NamesTheErrorInARequest) {
   EXPECT_NE(message_of(R"({"class":"WATCH","cookie":7})").find("cookie"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"POLL","peer":"r2"})").find("peer"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"POLL","about":"love"})").find("about"), std::string::npos);
+  EXPECT_NE(message_of(R"({"class":"POLL","about":"pair"})").find("peer"), std::string::npos);
 }
 
 TEST(SubscriptionJson, RefusesHugeAndDeepRequestsUnparsed) {

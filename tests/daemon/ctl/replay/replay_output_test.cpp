@@ -11,6 +11,7 @@
 #include "daemon/ctl/demo/scratch_directory.hpp"
 #include "drivers/dataset/pose_file.hpp"
 #include "drivers/dataset/record_file.hpp"
+#include "drivers/dataset/team_record_file.hpp"
 
 namespace crepes {
 namespace {
@@ -92,6 +93,111 @@ TEST(RecordFile, ReadsBackWhatItWrote) {
   ASSERT_TRUE(calibrations) << calibrations.error().message;
   EXPECT_EQ(calibrations->front().value, a_calibration().value);
   EXPECT_EQ(calibrations->front().sigma, a_calibration().sigma);
+}
+
+const RobotNames kNames{{RobotId{1}, "r1"}, {RobotId{2}, "r2"}};
+
+TeamRecord a_team_record() {
+  TeamRecord record{.stamp = Timestamp{Duration{123'456'789'012}},
+                    .residuals = {},
+                    .calibrations = {},
+                    .faults = {}};
+  record.residuals = {{.observer = RobotId{2},
+                       .neighbor = RobotId{1},
+                       .kind = TeamResidual::Kind::kBearing,
+                       .camera = 1,
+                       .fused = 9,
+                       .refused = 2,
+                       .nis = 3.25,
+                       .dimension = 2,
+                       .residual = {0.1, -0.3},
+                       .sigma = {0.02, 0.06}},
+                      {.observer = RobotId{1},
+                       .neighbor = RobotId{1},
+                       .kind = TeamResidual::Kind::kGyro,
+                       .fused = 1,
+                       .nis = 5.5,
+                       .dimension = 6}};
+  RobotCalibration& robot = record.calibrations.emplace_back();
+  robot.robot = RobotId{2};
+  robot.clock_s = 0.003;
+  robot.clock_sigma_s = 0.001;
+  robot.cameras.push_back(
+      {.rotation = {0.1, 0.2, 0.3}, .covariance = 0.25 * Eigen::Matrix3d::Identity()});
+  return record;
+}
+
+TEST(TeamRecordFile, ReadsBackWhatItWrote) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  std::string innovations = team_innovation_file_header() + "\n";
+  append_team_innovation_rows(innovations, a_team_record(), kNames);
+  std::string calibration = team_calibration_file_header() + "\n";
+  append_team_calibration_rows(calibration, a_team_record(), kNames);
+  std::ofstream(scratch.path() / "i.csv") << innovations;
+  std::ofstream(scratch.path() / "c.csv") << calibration;
+
+  const auto residuals = read_team_innovation_file(scratch.path() / "i.csv");
+  const auto quantities = read_team_calibration_file(scratch.path() / "c.csv");
+
+  ASSERT_TRUE(residuals) << residuals.error().message;
+  ASSERT_EQ(residuals->size(), 2U);
+  const TeamInnovationRow& bearing = residuals->at(0);
+  EXPECT_EQ(bearing.stamp, a_team_record().stamp);
+  EXPECT_EQ(bearing.observer, "r2");
+  EXPECT_EQ(bearing.neighbor, "r1");
+  EXPECT_EQ(bearing.residual.kind, TeamResidual::Kind::kBearing);
+  EXPECT_EQ(bearing.residual.camera, 1);
+  EXPECT_EQ(bearing.residual.fused, 9);
+  EXPECT_EQ(bearing.residual.refused, 2);
+  EXPECT_EQ(bearing.residual.residual, a_team_record().residuals[0].residual);
+  EXPECT_EQ(bearing.residual.sigma, a_team_record().residuals[0].sigma);
+  EXPECT_EQ(residuals->at(1).residual.kind, TeamResidual::Kind::kGyro);
+  EXPECT_EQ(residuals->at(1).residual.dimension, 6);
+  ASSERT_TRUE(quantities) << quantities.error().message;
+  ASSERT_EQ(quantities->size(), 8U);
+  EXPECT_EQ(quantities->at(6).quantity, "clock");
+  EXPECT_EQ(quantities->at(6).dimension, 1);
+  EXPECT_EQ(quantities->at(6).value[0], 0.003);
+  EXPECT_EQ(quantities->at(6).sigma[0], 0.001);
+  EXPECT_EQ(quantities->at(7).quantity, "camera0");
+  EXPECT_EQ(quantities->at(7).dimension, 3);
+  EXPECT_EQ(quantities->at(7).value, (std::array{0.1, 0.2, 0.3}));
+  EXPECT_EQ(quantities->at(7).sigma, (std::array{0.5, 0.5, 0.5}));
+}
+
+TEST(TeamRecordFile, RefusesAKindThatIsNone) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  std::string text = team_innovation_file_header() + "\n";
+  append_team_innovation_rows(text, a_team_record(), kNames);
+  text.replace(text.find("bearing"), 4, "pear");
+  std::ofstream(scratch.path() / "i.csv") << text;
+  const auto read = read_team_innovation_file(scratch.path() / "i.csv");
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().message.find("i.csv:2: unknown kind"), std::string::npos)
+      << read.error().message;
+}
+
+TEST(ReplayOutput, WritesTheTeamOfEachObserver) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const fs::path file = scratch.path() / "r1/team.innovations.csv";
+  {
+    auto output = ReplayOutput::create(scratch.path(), kNames, ReplayOutput::Detail::kRecords);
+    output->write(RobotId{1}, Records{.measurements = {}, .calibrations = {}, .team = {a_team_record()}});
+    ASSERT_TRUE(output->finish({}));
+  }
+  EXPECT_EQ(read_team_innovation_file(file)->size(), 2U);
+  EXPECT_EQ(read_team_calibration_file(scratch.path() / "r1/team.calibration.csv")->size(), 8U);
+  ASSERT_TRUE(ReplayOutput::create(scratch.path(), kNames)->finish({}));
+  EXPECT_FALSE(fs::exists(file));
+}
+
+TEST(ReplayOutput, RefusesARobotWhoseFilesWouldBeTheTeams) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const auto output =
+      ReplayOutput::create(scratch.path(), {{RobotId{1}, "team"}, {RobotId{2}, "r2"}},
+                           ReplayOutput::Detail::kRecords);
+  ASSERT_FALSE(output);
+  EXPECT_NE(output.error().message.find("named 'team'"), std::string::npos);
 }
 
 TEST(RecordFile, RefusesAKindThatIsNone) {

@@ -91,9 +91,28 @@ class Plot : public testing::Test {
                       .residual = {0.1},
                       .sigma = {0.1}}});
       records.calibrations.push_back({.neighbor = RobotId{2}, .stamp = pose.stamp});
+      records.team.push_back(team_record(pose.stamp));
       output.write(RobotId{1}, records);
     }
     ASSERT_TRUE(output.finish({}));
+  }
+
+  /// r2's bearings to r1, and its camera.
+  static TeamRecord team_record(Timestamp stamp) {
+    TeamRecord record{.stamp = stamp, .residuals = {}, .calibrations = {}, .faults = {}};
+    record.residuals.push_back({.observer = RobotId{2},
+                                .neighbor = RobotId{1},
+                                .kind = TeamResidual::Kind::kBearing,
+                                .fused = 3,
+                                .refused = 1,
+                                .nis = 1.5,
+                                .dimension = 2,
+                                .residual = {1e-3, -1e-3},
+                                .sigma = {1e-3, 2e-3}});
+    RobotCalibration& robot = record.calibrations.emplace_back();
+    robot.robot = RobotId{2};
+    robot.cameras.emplace_back();
+    return record;
   }
 
   [[nodiscard]] std::filesystem::path results() const { return swarm_.dir() / "out"; }
@@ -122,7 +141,11 @@ TEST_F(Plot, DrawsErrorsInnovationsAndBiasesOnOnePage) {
   EXPECT_NE(html.find("gyro bias of the observer"), std::string::npos);
   EXPECT_NE(html.find("age of the state"), std::string::npos);
   EXPECT_NE(html.find(">predicted<"), std::string::npos);
-  EXPECT_EQ(count_of(html, "<svg"), 1U + 6U + 2U + 1U + 7U + 1U);
+  EXPECT_NE(html.find("The team as r1 estimates it"), std::string::npos);
+  EXPECT_NE(html.find("bearing of r2: 33 fused, 11 refused"), std::string::npos);
+  EXPECT_NE(html.find("r2: misalignment of camera 0"), std::string::npos);
+  constexpr std::size_t kOfTeam = 1U + 5U;  // residuals; biases, delay, clock, camera
+  EXPECT_EQ(count_of(html, "<svg"), 1U + 6U + 2U + 1U + 7U + 1U + kOfTeam);
   EXPECT_EQ(count_of(html, "<svg"), count_of(html, "</svg>"));
   EXPECT_EQ(count_of(html, "nan"), 0U);
   EXPECT_EQ(count_of(html, "<script>"), 1U);
