@@ -78,6 +78,35 @@ TEST(ToolsInJson, TellWhatAReplayGaveAndWhatItRefused) {
   EXPECT_EQ(object_of({"plot", out, "--json"})["page"], out + "/plot.html");
 }
 
+/// The one object of a calibration that could not begin.
+void expect_refused(const std::vector<std::string>& arguments, const std::string& how,
+                    const std::string& reason) {
+  std::vector<std::string> words{"calibrate"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  words.insert(words.end(), {"--out", "/tmp/none.yaml", "--json"});
+  const Ending ending = crepesctl(words);
+  EXPECT_EQ(ending.how, how) << ending.errors;
+  const std::vector<Json> told = objects_in(ending);
+  ASSERT_EQ(told.size(), 1U) << ending.output;
+  EXPECT_EQ(told[0]["ok"], false);
+  ASSERT_EQ(told[0]["reasons"].size(), 1U);
+  EXPECT_NE(told[0]["reasons"][0].get<std::string>().find(reason), std::string::npos)
+      << told[0]["reasons"][0];
+  EXPECT_NE(ending.errors.find(reason), std::string::npos) << ending.errors;
+}
+
+TEST(ToolsInJson, SayWhyACalibrationCouldNotBegin) {
+  const std::string none = "/nonexistent/recording";
+  expect_refused({"camera", none}, "exit code 1", none);
+  expect_refused({"camera", none, "--model", "fisheye"}, "exit code 2", "'fisheye'");
+  expect_refused({"camera", none, "--grid", "5", "--pitch", "0.05"}, "exit code 2", "'5'");
+  expect_refused({"camera", none, "--grid", "5x7", "--pitch", "0.05"}, "exit code 1", none);
+  expect_refused({"imu", none}, "exit code 1", none);
+  expect_refused({"range", none}, "exit code 2", "--distance");
+  expect_refused({"range", none, "--distance", "r1,r2=5.00"}, "exit code 1", none);
+  expect_refused({"swarm", none}, "exit code 1", none);
+}
+
 TEST(ToolsInJson, TellWhereAKeyIs) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
   const std::string file = scratch.path() / "mesh.key";

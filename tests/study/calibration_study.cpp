@@ -127,7 +127,11 @@ Score trial(std::uint64_t seed, const simulated::HandHeld& hand) {
   return score;
 }
 
-double median(std::vector<double> values) { return values.empty() ? 0.0 : upper_median(values); }
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  std::ranges::sort(values);
+  return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+}
 
 std::vector<double> column(const std::vector<Score>& scores, double Score::*value) {
   std::vector<double> values;

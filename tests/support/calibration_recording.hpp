@@ -174,9 +174,10 @@ struct HandHeld {
   int boards = 2;
   bool is_chair = false;  ///< turned about the vertical alone
   double noise_px = 0.16;
-  double dark_share = 0.25;    ///< of the sightings
-  double moved_m = 0.0;        ///< how far the first board is moved at half time
-  bool hides_quarter = false;  ///< nothing falls on the lower left quarter
+  double dark_share = 0.25;                 ///< of the sightings
+  double moved_m = 0.0;                     ///< how far the first board is moved at half time
+  bool hides_quarter = false;               ///< nothing falls on the lower left quarter
+  std::optional<CameraConstants> camera{};  ///< without boards; empty: drawn
 };
 
 /// A robot before boards: what a calibration is given, and the truth.
@@ -247,6 +248,7 @@ inline CameraRecording hand_held(std::uint64_t seed, const HandHeld& hand, const
   truth.q_C_B = Eigen::Quaterniond(R_C_B) * so3_exp(dice.vector(0.07));
   truth.p_B_C = Eigen::Vector3d(0.06, 0.0, 0.01) + dice.vector(0.003);
   truth.shift_s = dice.uniform(-0.005, 0.005);
+  if (hand.camera) truth = *hand.camera;
   recording.errors = draw_errors(dice, 0.002, 0.01, 0.05);
   const Path path = hand_path(dice, hand);
   for (int b = 0; b < hand.boards; ++b) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "daemon/ctl/calibrate/calibration_report.hpp"
@@ -17,6 +18,7 @@ struct CalibrateImuOptions {
   double gravity_mps2 = kNominalGravityMps2;
   bool rest = false;  ///< the recording is of an hour at rest: noise alone
   bool json = false;
+  std::function<void(double)> on_progress{};  ///< 0..1; optional
 };
 
 /// Writes FILE, a fragment with the section `imu`, and FILE's name with .kalibr.yaml, which is

@@ -27,7 +27,8 @@ class CameraCoverage {
   void add(const ImuSample& sample);
   void add(const SpotFrame& frame);
 
-  /// Whether light can fall on this cell: its center is within the image circle.
+  /// Whether light can fall on this cell: its center is in the circle that touches the nearer
+  /// border of the picture, or no further out than a cell that was seen.
   [[nodiscard]] bool is_inside(int row, int column) const;
   /// Whether a board was seen there several times.
   [[nodiscard]] bool is_seen(int row, int column) const;
@@ -49,6 +50,8 @@ class CameraCoverage {
   CameraCoverage(const CameraCalibration& camera, const CameraModel& model,
                  const IdLibrary& library, const Config& config);
 
+  /// Of a cell's center, from the picture's.
+  [[nodiscard]] double radius_px(int row, int column) const;
   /// Of a quarter of the picture: the first or second half of the rows and columns.
   [[nodiscard]] double picture_of(bool is_low, bool is_right) const;
 
@@ -56,6 +59,7 @@ class CameraCoverage {
   CameraModel model_;
   BlinkTracker tracker_;
   std::array<std::array<int, kColumns>, kRows> sightings_{};
+  double farthest_px_ = 0.0;  ///< radius of the outermost cell that was seen
   std::set<RobotId> boards_;
   std::optional<Timestamp> last_seen_;
   double seen_s_ = 0.0;

@@ -16,12 +16,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// The coverage on standard output, a terminal that is redrawn or lines, and once a second in a
-/// file for the page of `crepesctl view`.
+/// The coverage on standard output, a terminal that is redrawn or lines, unless it is quiet; and
+/// once a second in a file for the page of `crepesctl view`.
 class CoverageView {
  public:
-  CoverageView(bool json, const std::filesystem::path& socket) : json_(json), file_(socket) {
-    if (!json) screen_.emplace();
+  CoverageView(bool is_quiet, const std::filesystem::path& socket) : file_(socket) {
+    if (!is_quiet) screen_.emplace();
   }
   [[nodiscard]] bool is_terminal() const { return screen_ && screen_->is_terminal(); }
   void show(const CameraCoverage& coverage) {
@@ -31,13 +31,9 @@ class CoverageView {
       const auto written = file_.write(coverage_json(coverage));
       page_ = written ? "" : "crepesctl view does not show this: " + written.error().message + "\n";
     }
-    if (now < next_) return;
-    next_ = now + (is_terminal() ? 200ms : json_ ? 1s : 5s);
-    if (json_) {
-      print(coverage_json(coverage));
-    } else {
-      screen_->show(coverage_text(coverage) + page_ + keys_text());
-    }
+    if (!screen_ || now < next_) return;
+    next_ = now + (is_terminal() ? 200ms : 5s);
+    screen_->show(coverage_text(coverage) + page_ + keys_text());
   }
 
   /// `?` shows what the signs mean.
@@ -55,7 +51,6 @@ class CoverageView {
            "cells over the camera's picture.\n";
   }
 
-  bool json_;
   CoverageFile file_;
   MonotonicClock clock_;
   std::optional<LiveScreen> screen_;
@@ -70,7 +65,7 @@ class CoverageView {
 Result<std::filesystem::path> record_for_camera(const RecordForCameraOptions& options) {
   std::optional<CameraCoverage> coverage;
   std::optional<Error> fault;
-  std::optional<CoverageView> view(std::in_place, options.json, options.socket);
+  std::optional<CoverageView> view(std::in_place, options.is_quiet, options.socket);
   const KeyReader keys;
   RecordOptions recording;
   recording.dir = options.dir;

@@ -41,14 +41,13 @@ double held_out_rms(const CameraSolution& solution, const std::vector<double>& m
   return count > 0.0 ? std::sqrt(sum / count) : 0.0;
 }
 
-/// RMS over the image circle of what a body direction's pixel errs by: lens and rotation.
+/// RMS over a circle of this radius of what a body direction's pixel errs by: lens and rotation.
 double lens_sigma_px(const CameraConstants& constants, const Eigen::MatrixXd& covariance,
-                     const CameraBatchSettings& settings) {
+                     double circle) {
   constexpr int kDirections = 200;
   constexpr double kGoldenAngle = 2.399963229728653;
   constexpr double kStep = 1e-6;
   const Eigen::Matrix<double, 9, 9> P = covariance.topLeftCorner<9, 9>();
-  const double circle = 0.5 * std::min(settings.width, settings.height);
   double sum = 0.0;
   int count = 0;
   for (int k = 0; k < kDirections; ++k) {
@@ -102,7 +101,9 @@ void describe(const CameraSolution& solution, const CameraBatchSettings& setting
   }
   result.spot_sigma_px = solution.sigma_px;
   result.outliers = solution.outliers;
-  result.lens_sigma_px = lens_sigma_px(result.constants, solution.covariance, settings);
+  result.lens_sigma_px = lens_sigma_px(
+      result.constants, solution.covariance,
+      image_circle_px(sightings, result.constants.lens.tail<2>(), settings.width, settings.height));
   result.map =
       map_of(sightings, solution.residuals, solution.sigma_px, settings.width, settings.height);
 }

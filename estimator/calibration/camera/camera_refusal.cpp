@@ -67,12 +67,13 @@ void check_quarters(std::span<const BoardSighting> sightings, const CameraBatchS
 void check_rim(const CameraSolution& solution, std::span<const BoardSighting> sightings,
                const CameraBatchSettings& settings, CameraBatchResult& result) {
   constexpr double kLeast = 50.0;
-  const double circle = 0.5 * std::min(settings.width, settings.height);
+  const Eigen::Vector2d center = solution.state.constants.lens.tail<2>();
+  const double circle = image_circle_px(sightings, center, settings.width, settings.height);
   std::array<double, 2> square{};
   std::array<double, 2> count{};
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     if (is_outlier(solution.residuals[i], solution.sigma_px)) continue;
-    const double r = (sightings[i].uv - solution.state.constants.lens.tail<2>()).norm();
+    const double r = (sightings[i].uv - center).norm();
     const std::size_t ring = r > kRim * circle ? 1 : 0;
     square[ring] += solution.residuals[i].uv.squaredNorm();
     count[ring] += 1.0;

@@ -9,6 +9,17 @@ double ResidualMap::Cell::rms_px() const {
   return count == 0 ? 0.0 : std::sqrt(square_px2 / (2.0 * static_cast<double>(count)));
 }
 
+double image_circle_px(std::span<const BoardSighting> sightings, const Eigen::Vector2d& center,
+                       int width, int height) {
+  const double nearer = 0.5 * std::min(width, height);
+  if (sightings.empty()) return nearer;
+  std::vector<double> radii;
+  for (const BoardSighting& sighting : sightings) radii.push_back((sighting.uv - center).norm());
+  const auto rim = radii.begin() + static_cast<std::ptrdiff_t>(99 * (radii.size() - 1) / 100);
+  std::ranges::nth_element(radii, rim);
+  return std::max(nearer, *rim);
+}
+
 ResidualMap map_of(std::span<const BoardSighting> sightings,
                    std::span<const SightingResidual> residuals, double sigma_px, int width,
                    int height) {

@@ -30,6 +30,11 @@ struct ResidualMap {
   }
 };
 
+/// The radius of the part of the picture that the lens shows [px]: to the nearer border, or as far
+/// as spots were seen, all but one in a hundred.
+[[nodiscard]] double image_circle_px(std::span<const BoardSighting> sightings,
+                                     const Eigen::Vector2d& center, int width, int height);
+
 /// Outliers are not counted.
 [[nodiscard]] ResidualMap map_of(std::span<const BoardSighting> sightings,
                                  std::span<const SightingResidual> residuals, double sigma_px,

@@ -37,11 +37,27 @@ bool is_late(const UwbRange& range, double late_path_db) {
   return range.received_dbm - range.first_path_dbm > late_path_db;
 }
 
-std::vector<double> errors_of(const TapedRanges& taped, double late_path_db) {
-  std::vector<double> errors;
-  for (const UwbRange& range : taped.ranges)
-    if (!is_late(range, late_path_db)) errors.push_back(range.range_m - taped.distance_m);
-  return errors;
+/// Measured less taped, of the ranges that came by a direct path.
+struct RangeErrors {
+  std::vector<double> errors_m;
+  std::vector<double> headings_rad;  ///< empty if nobody turned
+};
+
+RangeErrors errors_of(const TapedRanges& taped, const LatePathLimits& late_path_db) {
+  const auto limit_of = [&](RobotId measuring) {
+    const auto found = late_path_db.find(measuring);
+    return found == late_path_db.end() ? RangeNoise{}.late_path_db : found->second;
+  };
+  const double limit_a = limit_of(taped.pair.a);
+  const double limit_b = limit_of(taped.pair.b);
+  RangeErrors found;
+  for (std::size_t i = 0; i < taped.ranges.size(); ++i) {
+    const UwbRange& range = taped.ranges[i];
+    if (is_late(range, range.neighbor == taped.pair.a ? limit_b : limit_a)) continue;
+    found.errors_m.push_back(range.range_m - taped.distance_m);
+    if (!taped.headings_rad.empty()) found.headings_rad.push_back(taped.headings_rad[i]);
+  }
+  return found;
 }
 
 SegmentBias bias_of(const TapedRanges& taped, const std::vector<double>& errors) {
@@ -70,8 +86,30 @@ void check_rest(const SegmentBias& segment, const std::vector<double>& errors,
         place_of(segment), number_text(change, 2)));
 }
 
-void add_segment(const TapedRanges& taped, const RangeNoise& noise, RangeCalibration& found) {
-  const std::vector<double> errors = errors_of(taped, noise.late_path_db);
+/// The mean over all directions of a module that turned.
+void add_turn(const TapedRanges& taped, const RangeErrors& errors, RangeCalibration& found) {
+  const auto pattern = fit_turn_pattern(errors.errors_m, errors.headings_rad);
+  const std::string place =
+      "ids " + name_of(taped.pair) + ", segment " + std::to_string(taped.segment + 1);
+  if (!pattern) {
+    found.refusals.push_back(place + ": robot " + std::to_string(taped.turning.value) +
+                             " did not turn by 360 deg; turn it slowly and all the way");
+    return;
+  }
+  found.patterns.push_back({taped.turning, taped.pair, *pattern});
+  found.segments.push_back({.pair = taped.pair,
+                            .segment = taped.segment,
+                            .bias_m = pattern->mean_m,
+                            .scatter_m = pattern->scatter_m,
+                            .used = pattern->used,
+                            .late = taped.ranges.size() - errors.errors_m.size(),
+                            .outliers = errors.errors_m.size() - pattern->used});
+}
+
+void add_segment(const TapedRanges& taped, const LatePathLimits& late_path_db,
+                 RangeCalibration& found) {
+  const RangeErrors direct = errors_of(taped, late_path_db);
+  const std::vector<double>& errors = direct.errors_m;
   if (errors.size() < kLeastRanges) {
     found.refusals.push_back(fmt::format(
         "{}: {} ranges by a direct path of {}; at least {} are needed: longer, and without anybody "
@@ -79,6 +117,7 @@ void add_segment(const TapedRanges& taped, const RangeNoise& noise, RangeCalibra
         place_of(taped), errors.size(), taped.ranges.size(), kLeastRanges));
     return;
   }
+  if (!taped.headings_rad.empty()) return add_turn(taped, direct, found);
   SegmentBias segment = bias_of(taped, errors);
   check_rest(segment, errors, found);
   if (std::abs(segment.bias_m) > kMost_m)
@@ -247,10 +286,11 @@ void describe_noise(std::span<const TapedRanges> taped, RangeCalibration& found)
 
 }  // namespace
 
-RangeCalibration calibrate_ranges(std::span<const TapedRanges> taped, const RangeNoise& noise) {
+RangeCalibration calibrate_ranges(std::span<const TapedRanges> taped,
+                                  const LatePathLimits& late_path_db) {
   RangeCalibration found;
   if (taped.empty()) found.refusals.emplace_back("the tape names no pair");
-  for (const TapedRanges& part : taped) add_segment(part, noise, found);
+  for (const TapedRanges& part : taped) add_segment(part, late_path_db, found);
   if (!found.refusals.empty()) return found;
   fit_pairs(found);
   fit_modules(found);

@@ -1,11 +1,13 @@
 /// Biases of UWB modules from ranges between robots at rest at known distances.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "estimator/calibration/range/turn_pattern.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/sensor_noise.hpp"
 
@@ -23,8 +25,13 @@ struct TapedRanges {
   RobotPair pair;
   std::size_t segment = 0;  ///< counted from 0, in the order of the tape
   double distance_m = 0.0;  ///< by tape, antenna to antenna
-  std::vector<UwbRange> ranges;
+  std::vector<UwbRange> ranges{};
+  RobotId turning{};                   ///< turned slowly about its antenna meanwhile; 0: nobody
+  std::vector<double> headings_rad{};  ///< then its heading at each range, from 0 on
 };
+
+/// `uwb.late_path_db` of the robots that measure. Who is missing has the default.
+using LatePathLimits = std::map<RobotId, double>;
 
 /// measured = distance + bias
 struct SegmentBias {
@@ -49,8 +56,16 @@ struct ModuleBias {
   double sigma_m = 0.0;
 };
 
+/// A module that turned before another one.
+struct ModulePattern {
+  RobotId id{};
+  RobotPair pair;
+  TurnPattern pattern;
+};
+
 struct RangeCalibration {
   std::vector<SegmentBias> segments;
+  std::vector<ModulePattern> patterns;
   std::vector<PairBias> pairs;         ///< by pair
   std::vector<ModuleBias> modules;     ///< empty where the pairs do not determine them
   double noise_m = 0.0;                ///< of a single range, without outliers
@@ -65,7 +80,9 @@ struct RangeCalibration {
 /// what the directions of arrival add, which differs between rests and is estimated from them
 /// (a variance component). Modules by weighted least squares over all pairs; a pair then has the
 /// sum of its modules.
+///
+/// A module that turned has its mean over all directions in that segment, and a pattern.
 [[nodiscard]] RangeCalibration calibrate_ranges(std::span<const TapedRanges> taped,
-                                                const RangeNoise& noise);
+                                                const LatePathLimits& late_path_db);
 
 }  // namespace crepes

@@ -86,6 +86,14 @@ double pair_delay_sigma(const SwarmBatchResult& result, std::size_t a, std::size
   return std::sqrt(std::max(0.0, P(i, i) + P(j, j) + 2.0 * P(i, j)));
 }
 
+double remaining_range_bias(const SwarmBatchResult& result, std::size_t robot) {
+  constexpr double kLeast_m = 0.01;  // what directions of arrival change
+  double worst = kLeast_m;
+  for (std::size_t other = 0; other < result.robots.size(); ++other)
+    if (other != robot) worst = std::max(worst, pair_delay_sigma(result, robot, other));
+  return worst;
+}
+
 SwarmBatchResult calibrate_swarm(std::vector<RobotRecord> records,
                                  const std::vector<RobotConstants>& guess, const SwarmStart& start,
                                  const SwarmBatchSettings& settings) {

@@ -54,6 +54,10 @@ struct SwarmBatchResult {
 /// One sigma of what two modules' delays together lengthen their ranges by.
 [[nodiscard]] double pair_delay_sigma(const SwarmBatchResult& result, std::size_t a, std::size_t b);
 
+/// One sigma of what a robot's ranges are still off by once the delays are in force: that of its
+/// worst pair, and at least what directions of arrival change [m].
+[[nodiscard]] double remaining_range_bias(const SwarmBatchResult& result, std::size_t robot);
+
 /// `guess`: the configuration in force, by robot. See `SwarmProblem` for what is unknown.
 [[nodiscard]] SwarmBatchResult calibrate_swarm(std::vector<RobotRecord> records,
                                                const std::vector<RobotConstants>& guess,

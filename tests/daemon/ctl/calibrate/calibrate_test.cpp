@@ -251,13 +251,13 @@ TEST_F(Calibrate, LiveRecordsUntilTheCameraHasSeenEnoughAndThenCalibrates) {
   Result<fs::path> folder = fail(ErrorCode::kIo, "not recorded");
   {
     const FakeDaemon daemon(socket, config(), recording.imu, frames_of(recording));
-    folder = record_for_camera({.dir = scratch_.path() / "live", .socket = socket, .json = true});
+    folder =
+        record_for_camera({.dir = scratch_.path() / "live", .socket = socket, .is_quiet = true});
   }
   const std::string lines = testing::internal::GetCapturedStdout();
 
   ASSERT_TRUE(folder) << folder.error().message;
-  const auto first = nlohmann::json::parse(lines.substr(0, lines.find('\n')));
-  EXPECT_EQ(first["cells"].size(), static_cast<std::size_t>(CameraCoverage::kRows));
+  EXPECT_EQ(lines, "");  // with --json, the result is the only object
   const auto report = calibrate_camera({.robot_dir = *folder,
                                         .out = etc() / "camchain-imucam.yaml",
                                         .fov_deg = {},
@@ -270,8 +270,9 @@ TEST_F(Calibrate, LiveRecordsUntilTheCameraHasSeenEnoughAndThenCalibrates) {
 }
 
 TEST_F(Calibrate, LiveSaysWhenThereIsNoDaemon) {
-  const auto folder = record_for_camera(
-      {.dir = scratch_.path() / "live", .socket = scratch_.path() / "none.socket", .json = true});
+  const auto folder = record_for_camera({.dir = scratch_.path() / "live",
+                                         .socket = scratch_.path() / "none.socket",
+                                         .is_quiet = true});
   ASSERT_FALSE(folder);
   EXPECT_NE(folder.error().message.find("is crepesd running"), std::string::npos);
 }
@@ -338,6 +339,11 @@ class CalibrateRange : public Calibrate {
                             .tape = scratch_.path() / "tape.yaml",
                             .out = etc() / "ranges.yaml"});
   }
+  [[nodiscard]] Result<CalibrationReport> run_with(
+      const std::vector<std::string>& distances) const {
+    return calibrate_range(
+        {.swarm_dir = scratch_.path(), .distances = distances, .out = etc() / "ranges.yaml"});
+  }
   /// What the command is for: the fragment where the daemon reads it.
   [[nodiscard]] Config config_with_fragment() const {
     fs::copy_file(etc() / "ranges.members.yaml", etc() / "crepesd.d" / "30-ranges.yaml");
@@ -391,6 +397,39 @@ TEST_F(CalibrateRange, GivesEachOfTwoRobotsHalfOfTheirBias) {
   EXPECT_NEAR(config.swarm.members[0].range_delay_m, 0.175, 0.01);
   EXPECT_EQ(config.swarm.members[0].range_delay_m, config.swarm.members[1].range_delay_m);
   EXPECT_EQ(config.swarm.members[2].range_delay_m, 0.0);
+}
+
+TEST_F(CalibrateRange, TakesDistancesFromTheCommandLineByNameOrId) {
+  write_swarm(3);
+
+  const auto report = run_with({"r1,r2=3.00", "3,r2=4.00", "1,3=5.00"});
+
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_TRUE(report->reasons.empty()) << report->reasons.front();
+  const Config config = config_with_fragment();
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(config.swarm.members[i].range_delay_m, kDelays.at(i + 1), 0.01) << i;
+  EXPECT_NE(report->text.find("ranges.members.yaml"), std::string::npos);
+}
+
+TEST_F(CalibrateRange, SaysWhatIsWrongWithADistance) {
+  write_swarm(2);
+  for (const std::string text : {"r1=3.0", "r1,r9=3.0", "r1,r1=3.0", "r1,r2=far", "r1,r2=-3"}) {
+    const auto report = run_with({text});
+    ASSERT_FALSE(report) << text;
+    EXPECT_EQ(report.error().code, ErrorCode::kUsage);
+    EXPECT_NE(report.error().message.find(text), std::string::npos) << report.error().message;
+  }
+}
+
+TEST_F(CalibrateRange, WritesTheNoiseThatTheRangesHave) {
+  write_swarm(3);
+
+  ASSERT_TRUE(run());
+
+  const RangeNoise noise = config_with_fragment().uwb.noise;
+  EXPECT_NEAR(noise.noise_m, 0.05, 0.005);
+  EXPECT_LT(noise.bias_drift_m, 0.03);
 }
 
 /// Robots that fly in view of each other, with configurations that are a little off.

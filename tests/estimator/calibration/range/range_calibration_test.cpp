@@ -133,5 +133,60 @@ TEST(RobustMean, IsNotMovedByATenthOfOutliers) {
   EXPECT_NEAR(static_cast<double>(mean.used), 900.0, 5.0);
 }
 
+/// One module turns before another by a circle and a half, and its range follows its heading.
+TapedRanges turned(std::uint64_t seed, double turn_rad) {
+  simulated::Dice dice(seed);
+  TapedRanges part{.pair = {robot(1), robot(2)}, .segment = 0, .distance_m = 3.0};
+  part.turning = robot(2);
+  for (int i = 0; i < 1500; ++i) {
+    const double heading = turn_rad * i / 1500.0;
+    double range = 3.0 + 0.2 + 0.03 * std::cos(heading - 1.0) + dice.normal(kNoise_m);
+    if (dice.uniform(0.0, 1.0) < 0.03) range += 2.0;
+    part.ranges.push_back({.range_m = range, .first_path_dbm = -81.0, .received_dbm = -79.0});
+    part.headings_rad.push_back(heading);
+  }
+  return part;
+}
+
+TEST(RangeCalibration, FindsHowTheRangeFollowsAModuleThatTurns) {
+  const std::vector<TapedRanges> taped{turned(1, 9.0)};
+
+  const RangeCalibration found = calibrate_ranges(taped, {});
+
+  ASSERT_TRUE(found.refusals.empty()) << found.refusals.front();
+  ASSERT_EQ(found.patterns.size(), 1U);
+  EXPECT_EQ(found.patterns[0].id, robot(2));
+  const TurnPattern& pattern = found.patterns[0].pattern;
+  EXPECT_NEAR(pattern.rms_m, 0.03 / std::sqrt(2.0), 0.005);
+  EXPECT_NEAR(pattern.deviation_m[1], 0.03 * std::cos(0.785 - 1.0), 0.006);
+  EXPECT_NEAR(pattern.deviation_m[5], 0.03 * std::cos(3.927 - 1.0), 0.006);
+  EXPECT_NEAR(found.pairs[0].bias_m, 0.2, 0.006);  // free of the direction
+}
+
+TEST(RangeCalibration, RefusesATurnThatIsNoneAllAround) {
+  const std::vector<TapedRanges> taped{turned(1, 4.0)};
+
+  const RangeCalibration found = calibrate_ranges(taped, {});
+
+  ASSERT_EQ(found.refusals.size(), 1U);
+  EXPECT_NE(found.refusals[0].find("did not turn by 360 deg"), std::string::npos);
+}
+
+TEST(RangeCalibration, TakesTheLatePathLimitOfTheRobotThatMeasured) {
+  Taped data = taped(1, 2);
+  for (std::size_t i = 0; i < data.ranges[0].ranges.size(); ++i) {
+    UwbRange& range = data.ranges[0].ranges[i];
+    range.neighbor = i % 2 == 0 ? robot(1) : robot(2);
+    range.first_path_dbm = range.received_dbm - 6.0;
+    if (i % 2 == 0) range.range_m += 1.0;  // measured by robot 2: a late path
+  }
+  data.ranges.resize(1);
+
+  const RangeCalibration found = calibrate_ranges(data.ranges, {{robot(1), 8.0}, {robot(2), 5.0}});
+
+  ASSERT_EQ(found.segments.size(), 1U);
+  EXPECT_EQ(found.segments[0].late, 450U);
+}
+
 }  // namespace
 }  // namespace crepes
