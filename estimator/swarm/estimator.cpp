@@ -147,6 +147,7 @@ struct Estimator::State {
   bool keeps_records = false;
   TeamLog team_log;
   std::uint64_t unknown_senders = 0;
+  std::uint64_t used_samples = 0;
   std::uint64_t refused_samples = 0;
 };
 
@@ -191,6 +192,7 @@ Outputs Estimator::State::handle(const ImuSample& sample) {
       ++refused_samples;
       continue;
     }
+    ++used_samples;
     self.tilt = tilt_filter.tilt();
     for (BlinkTracker& tracker : trackers) tracker.add_imu(believed);
   }
@@ -250,7 +252,7 @@ Outputs Estimator::State::handle(const ReceivedReport& received) {
     return {};
   }
   neighbor->second.add_report(received, self);
-  graph_builder.add_report(received.report);
+  graph_builder.add_report(received.report, swarm);
   if (!runs_team_filter()) return {};
   const ImuHistory& imu = neighbor->second.robot_state().imu;
   const double w = imu.empty() ? 0.0 : imu.newest().gyro_radps.norm();
@@ -339,7 +341,7 @@ Outputs Estimator::State::handle(const Tick& tick) {
     outputs.report = composer.compose(tick.stamp, self, estimates);
   }
   if (outputs.report && runs_team_filter()) {
-    graph_builder.add_report(*outputs.report);
+    graph_builder.add_report(*outputs.report, swarm);
     team_intake.add_own_report(*outputs.report, swarm, filters);
   }
   if (graph_enabled && !self.imu.empty() && graph_timer.is_due(tick.stamp)) {
@@ -368,6 +370,8 @@ void Estimator::keep_records() {
   state_->keeps_records = true;
   for (auto& [robot, neighbor] : state_->neighbors) neighbor.outcomes().keep_records();
 }
+
+std::uint64_t Estimator::used_samples() const { return state_->used_samples; }
 
 EstimatorStatus Estimator::status() const {
   EstimatorStatus status;
