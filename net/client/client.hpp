@@ -108,10 +108,10 @@ struct Status {
     std::string name;
     double rate_hz = 0.0;
     bool ok = false;
-    bool calibrated = true;  ///< false: a camera whose lens is a guess
-    std::string message;     ///< what is wrong, and what to do
+    std::string message;  ///< what is wrong, and what to do
     Totals faults;
     Totals counts;
+    bool calibrated = true;  ///< false: a camera whose lens is a guess
   };
   /// The neighbor's clock minus ours.
   struct Clock {

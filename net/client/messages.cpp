@@ -104,10 +104,10 @@ Status::Sensor sensor_from(const json& object) {
   return {object.at("name").get<std::string>(),
           object.value("rate_hz", 0.0),
           object.value("ok", false),
-          object.value("calibrated", true),
           object.value("message", ""),
           totals_from(object, "faults"),
-          totals_from(object, "counts")};
+          totals_from(object, "counts"),
+          object.value("calibrated", true)};
 }
 
 Status::Clock clock_from(const json& object) {

@@ -17,9 +17,9 @@ struct SensorStatus {
   std::string name;
   double rate_hz = 0.0;
   bool ok = false;
-  bool is_calibrated = true;  ///< false: a camera whose lens is a guess
-  std::string message;        ///< the fault and its remedy
+  std::string message;  ///< the fault and its remedy
   SensorTotals totals{};
+  bool is_calibrated = true;  ///< false: a camera whose lens is a guess
 };
 
 /// The drops of one queue.
