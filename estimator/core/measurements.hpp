@@ -36,6 +36,12 @@ struct BasicUwbRange {
   double received_dbm = 0.0;
 };
 
+/// How the light of a bearing got its ID.
+enum class Naming : std::uint8_t {
+  kRead,       ///< from its blinking, up to this frame
+  kPredicted,  ///< it is where and when the board is expected; its blinking is still to be read
+};
+
 /// The direction in which a robot's camera sees the LED ring of `neighbor`.
 template <class Time>
 struct BasicBearing {
@@ -44,6 +50,15 @@ struct BasicBearing {
   Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();   ///< unit direction, observer's body axes
   Eigen::Vector3d p_B_C = Eigen::Vector3d::Zero();  ///< the camera's optical center in the body [m]
   double sigma_rad = 0.0;                           ///< one sigma across the direction
+  Naming how = Naming::kRead;                       ///< those of a report are read
+};
+
+/// The lever arms that readings of a pair refer to: rings of LEDs and antennas, in each one's body.
+struct PairMounting {
+  Eigen::Vector3d p_B_M = Eigen::Vector3d::Zero();  ///< our LED ring
+  Eigen::Vector3d p_B_U = Eigen::Vector3d::Zero();  ///< our antenna
+  Eigen::Vector3d p_N_M = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_N_Q = Eigen::Vector3d::Zero();
 };
 
 /// The direction of up. Gravity determines roll and pitch only.

@@ -1,7 +1,5 @@
 #include "estimator/swarm/outcome_log.hpp"
 
-#include <algorithm>
-
 namespace crepes {
 namespace {
 
@@ -16,17 +14,21 @@ bool is_range(MeasurementKind kind) {
 
 }  // namespace
 
-void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion) {
+void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion,
+                     const SensorReading& reading) {
   ++counts_[static_cast<std::size_t>(kind)][static_cast<std::size_t>(fusion.verdict)];
-  std::optional<Timestamp>& newest = newest_[static_cast<std::size_t>(kind)];
-  newest = std::max(newest.value_or(stamp), stamp);
+  // Of alternatives, which have the same stamp, the one that was fused.
+  std::optional<NewestReading>& newest = newest_[static_cast<std::size_t>(kind)];
+  if (!newest || stamp > newest->stamp ||
+      (stamp == newest->stamp && newest->verdict != Verdict::kFused))
+    newest = NewestReading{stamp, fusion.verdict, reading};
   if (fusion.dimension > 0) {
     if (is_range(kind)) follow(range_residual_m_, fusion.residual[0], 16.0);
     if (fusion.verdict == Verdict::kFused)
       follow(nis_.at(static_cast<std::size_t>(kind)),
              fusion.nis / static_cast<double>(fusion.dimension), 50.0);
   }
-  if (keeps_records_) records_.measurements.push_back({neighbor_, stamp, kind, fusion});
+  if (keeps_records_) records_.measurements.push_back({neighbor_, stamp, kind, fusion, reading});
 }
 
 void OutcomeLog::add(std::optional<CalibrationRecord> calibration) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "estimator/core/quantile.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -82,12 +83,6 @@ struct Half {
   }
 };
 
-double middle_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// The median in each component, so that single false bearings do not count.
 std::optional<Eigen::Vector2d> median_residual(const TeamPair& pair, const TeamCamera& camera,
                                                const SightModel& model, const Half& half,
@@ -100,7 +95,7 @@ std::optional<Eigen::Vector2d> median_residual(const TeamPair& pair, const TeamC
     x.push_back(residual->x());
     y.push_back(residual->y());
   }
-  return Eigen::Vector2d(middle_of(x), middle_of(y));
+  return Eigen::Vector2d(upper_median(x), upper_median(y));
 }
 
 Direction direction_of(const SightModel& model, const Eigen::Vector2d& residual) {

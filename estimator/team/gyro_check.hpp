@@ -11,7 +11,7 @@ namespace crepes {
 /// The bearings of a robot change over the interval as if it turned at another rate than its
 /// gyroscope reads.
 struct GyroContradiction {
-  double chi2 = 0.0;  ///< of three degrees of freedom: by which that rate explains them better
+  double chi2 = 0.0;        ///< improvement by that rate; three degrees of freedom
   double rate_radps = 0.0;  ///< the difference
 };
 
@@ -21,10 +21,9 @@ struct GyroCheck {
   std::optional<GyroContradiction> contradiction;
 };
 
-/// Of each robot that sees anybody long enough. Most of the robots that it sees, at least two, must
-/// agree on a rate that contradicts its gyroscope. Their places and a camera's constant
-/// misalignment have no part in it; what the belief does not know of velocities and of the
-/// gyroscope is allowed for.
+/// Of each robot that sees others long enough. Most of the robots that it sees, and at least two,
+/// must agree on a rate that contradicts its gyroscope. Their places and a constant misalignment of
+/// the camera cancel. The uncertainty of velocities and of the gyroscope is included.
 [[nodiscard]] std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
                                                        const TeamTrajectories& paths,
                                                        const TeamBelief& belief);

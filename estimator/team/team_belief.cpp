@@ -15,13 +15,13 @@ namespace {
 
 constexpr int kMotion = FreeMotionAt::kMotion;
 constexpr int kBias = FreeMotionAt::kBias;
-// A pair's range bias is mostly its modules' antenna delays, the same toward everybody: so much of
-// its variance. The rest is the pair's own, and drifts.
+// The share of a pair's range-bias variance that its two modules' antenna delays explain. A delay
+// is the same in all pairs of a module. The rest belongs to the pair alone, and drifts.
 constexpr double kShareOfModules = 0.8;
-// An accelerometer's scale errors act as a bias that changes while the robot turns, and keeps its
-// direction for so long.
+// An accelerometer's scale errors act as a bias that changes while the robot turns. This is its
+// correlation time.
 constexpr double kTurnMemory = 1.0;  // s
-// What the mesh's clocks leave.
+// Errors of the clock offsets that the mesh estimates.
 constexpr double kClockSigma = 3e-3;  // s
 constexpr double kClockWalk = 1e-4;   // s/sqrt(s)
 

@@ -14,7 +14,7 @@
 namespace crepes {
 namespace {
 
-// Ranges about a robot that nobody sees would make its direction appear known, little by little.
+// Without bearings, repeated ranges make direction spuriously observable.
 constexpr Duration kDark = std::chrono::seconds{1};
 
 bool is_inside(const TeamInterval& interval, Timestamp stamp) {
@@ -190,9 +190,9 @@ std::optional<TeamRow> mean_of(const Scene& scene, const Sight& sight) {
   return row;
 }
 
-/// The mean of what a pair measured may be false, although its gate accepts it: then nothing in it
-/// is information. Mean and variance become those of the mixture (probabilistic data association,
-/// Bar-Shalom and Tse 1975). `S` is the innovation's variance. False if it is more likely false.
+/// The mean range of a pair may be false although the gate accepts it. Mean and variance become
+/// those of the mixture of both cases (probabilistic data association, Bar-Shalom and Tse 1975).
+/// `S` is the innovation's variance. Returns false if the range is more likely false than true.
 bool associate(double S, TeamRow& row) {
   const double residual = row.residual.x();
   const double nis = residual * residual / S;

@@ -36,6 +36,7 @@ struct TeamReadings {
   std::vector<Sight> sights;
   std::vector<Ranging> rangings;
 
+  /// The readings of an interval that this stage accepts.
   [[nodiscard]] static TeamReadings of(const TeamInterval& interval, const TeamBelief& belief,
                                        Stage stage);
   [[nodiscard]] bool empty() const { return sights.empty() && rangings.empty(); }

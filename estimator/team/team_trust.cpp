@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 
 namespace crepes {
 namespace {
@@ -56,10 +57,10 @@ MisalignmentTest tested_without_prior(const TeamBelief& belief, const TeamCamera
   return {.chi2 = m.dot(covariance.llt().solve(m)), .turn = m};
 }
 
-/// The estimate is drawn to zero by its prior, so a turn shows long before the estimate is large:
-/// the difference of two estimates, the later of which knows more, has the difference of their
-/// covariances (Hausman 1978). In the axes of that difference, what was measured alone has the mean
-/// m P0 / (P0 - P) and the variance P P0 / (P0 - P).
+/// The prior draws the estimate to zero, so a turn is significant long before the estimate is
+/// large. The difference of two estimates, the second of which uses more data, has the difference
+/// of their covariances (Hausman 1978). In the axes of that difference, the data alone give the
+/// mean m P0 / (P0 - P) and the variance P P0 / (P0 - P).
 MisalignmentTest tested(const TeamBelief& belief, const TeamCamera& camera, const Priors& priors) {
   constexpr double kObserved =
       1e-4;  // of the prior's variance; an axis that taught less is unknown
@@ -168,7 +169,8 @@ void add_range_fault(const TeamBelief& belief, RobotId id, std::vector<TeamFault
     faults.push_back({id, TeamFault::Kind::kRanges, sum_m / contradicted});
 }
 
-/// Trusted robots measure other distances to it than it does to them, and its place fits its own.
+/// Whether the robot's place agrees with the ranges that it measured, but not with those that
+/// trusted robots measured to it.
 bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {
   return std::ranges::any_of(belief.ranges, [&](const auto& entry) {
     const auto& [pair, range] = entry;
@@ -182,12 +184,6 @@ bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {
   });
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// Clocks that differ from most others, this robot's among them.
 void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) {
   if (belief.robots.size() < 3) return;
@@ -197,8 +193,10 @@ void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) 
     ahead_s.push_back(robot.clock_s);
     variances.push_back(belief.P(robot.clock_index(), robot.clock_index()));
   }
-  const double most_s = median(ahead_s);
-  const double variance = median(variances);
+  std::vector<double> sorted_s = ahead_s;
+  const double most_s = quantile(sorted_s, 0.5);
+  std::vector<double> sorted_variances = variances;
+  const double variance = quantile(sorted_variances, 0.5);
   for (std::size_t i = 0; const auto& [id, robot] : belief.robots) {
     const double size_s = robot.clock_s - most_s;
     const double sigma_s = std::sqrt(variances[i++] + variance);
@@ -222,14 +220,15 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
     doubt.found = belief.stamp;
     doubt.rate_radps = check.contradiction->rate_radps;
     robots.push_back(id);
-    // What its camera was found guilty of may have been the gyroscope's fault.
+    // The gyroscope may have caused what its camera was blamed for.
     if (const auto verdict = verdicts_.find(id); verdict != verdicts_.end())
       verdict->second.is_withdrawn = true;
   }
   return robots;
 }
 
-/// Of late: what it has strained may still look as if its camera were turned.
+/// Whether its gyroscope was recently false. The states that it has disturbed may still look as if
+/// its camera were turned.
 bool TeamTrust::is_strained(RobotId robot, Timestamp now) const {
   const auto doubt = gyro_doubts_.find(robot);
   return doubt != gyro_doubts_.end() && doubt->second.found &&
@@ -281,8 +280,8 @@ std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamB
   return turned;
 }
 
-/// A verdict lasts as long as the camera is found turned, and some time. So a robot that was found
-/// guilty wrongly, or was repaired, starts like any other one after that.
+/// A verdict lasts for some time after the camera was last found turned. A robot that was convicted
+/// wrongly, or was repaired, then starts like any other.
 void TeamTrust::review_verdicts(const TeamInterval& interval, const TeamBelief& belief) {
   for (auto& [id, verdict] : verdicts_) {
     if (verdict.is_refused || !belief.robots.contains(id)) continue;
@@ -294,7 +293,8 @@ void TeamTrust::review_verdicts(const TeamInterval& interval, const TeamBelief& 
   });
 }
 
-/// Whoever was found turned before and once, was found so while this one strained the team.
+/// Withdraws the verdict of robots that were convicted once before: this robot had disturbed the
+/// states on which they were judged.
 void TeamTrust::convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance) {
   Verdict& verdict = verdicts_[robot];
   verdict.is_refused = verdict.count > 0 && !verdict.is_withdrawn;

@@ -1,4 +1,4 @@
-/// Whose measurements contradict the others'.
+/// Finds robots whose measurements contradict the others'.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +14,8 @@ namespace crepes {
 /// Remembers which robots were contradicted, and whose cameras are turned.
 class TeamTrust {
  public:
-  /// Robots that must leave the belief: without IMU, known too badly, or contradicted by most
-  /// cameras that see them. Where as many agree, the robot that came last is in the wrong. And
+  /// Robots that must be removed from the belief: they have no IMU, are too uncertain, or are
+  /// contradicted by most cameras that see them. In a tie, the robot that came last is removed. Also
   /// robots whose camera was refused for so long that it is tried again.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
@@ -24,26 +24,27 @@ class TeamTrust {
                                                  const TeamBelief& belief,
                                                  const std::map<RobotId, GyroCheck>& checks);
 
-  /// Robots with a camera that is turned, newly. Such a robot has a wrong attitude too. It must
-  /// start anew with a camera that may be turned, so that the others' measurements determine it. If
-  /// that camera contradicts them again, it is refused.
+  /// Robots of which a camera was newly found turned. Their attitude is wrong too. They must be
+  /// restarted with an uncertain misalignment, so that the others' measurements determine it. If
+  /// the camera contradicts the others again, it is refused.
   [[nodiscard]] std::vector<RobotId> turned(const TeamInterval& interval, const TeamBelief& belief);
 
-  /// At least half of the pairs' ranges are refused, and one robot has a part in all others, newly:
-  /// trusted too early, it has set a wrong scale. All must start anew, and it is trusted last.
+  /// Whether a robot that was trusted too early was newly found to have set a wrong scale: the
+  /// ranges of at least half of the pairs are refused, and the robot is part of every other pair.
+  /// All robots must be restarted, and this one is trusted last.
   [[nodiscard]] bool is_misled(const TeamBelief& belief);
   /// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.
   void end_probations(TeamBelief& belief) const;
 
-  /// Robots whose gyroscope was false within the last second.
+  /// Robots whose gyroscope was found false within the last second.
   [[nodiscard]] std::vector<TeamFault> gyro_faults(Timestamp now) const;
 
-  /// How uncertain the misalignment of its cameras is, and likewise its attitude, in its body's
-  /// axes [rad^2]. None if its cameras are as they were calibrated.
+  /// Covariance of the misalignment of its cameras, which is also that of its attitude, in body
+  /// axes [rad^2]. Empty if its cameras are as calibrated.
   [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot) const;
-  /// A realigned robot's cameras contradicted the others after that, too.
+  /// Whether a robot's cameras contradicted the others again after they were realigned.
   [[nodiscard]] bool is_refused(RobotId robot) const { return verdicts_.at(robot).is_refused; }
-  /// How many times less certain a robot starts that was contradicted of late.
+  /// The factor on the start's sigmas of a robot that was recently contradicted.
   [[nodiscard]] double doubt(RobotId robot, Timestamp now) const;
 
  private:
@@ -76,13 +77,13 @@ class TeamTrust {
   std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
 };
 
-/// What is known of all robots' sensors. A camera is turned if its misalignment is significant, and
-/// beyond what a calibration leaves.
+/// The calibration of each robot. A camera is turned if its misalignment is significant and beyond
+/// what a calibration leaves.
 [[nodiscard]] std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief,
                                                             const Priors& priors);
 
-/// Cameras that are turned or refused, robots most of whose ranges are refused, and clocks that are
-/// off. `calibrations` are those of `belief`.
+/// Faults to report: cameras that are turned or refused, robots of which most ranges are refused,
+/// and wrong clocks. `calibrations` are those of `belief`.
 [[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief,
                                                const std::vector<RobotCalibration>& calibrations);
 

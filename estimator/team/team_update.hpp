@@ -16,8 +16,8 @@ class TeamUpdate {
 
   /// False if S is singular. Then nothing else may be called.
   [[nodiscard]] bool is_valid() const { return is_valid_; }
-  /// The correction of the state about which P is, if the rows are linearized `dx` away from it
-  /// (iterated Kalman filter; Bell and Cathey 1993).
+  /// The correction of the state to which P belongs, for rows that are linearized at a distance
+  /// `dx` from it (iterated Kalman filter; Bell and Cathey 1993).
   [[nodiscard]] Eigen::VectorXd correction(const std::vector<TeamRow>& rows,
                                            const Eigen::VectorXd& dx) const;
   /// P - G G^T, symmetric to the bit. States that are not `corrected` keep their covariance, and

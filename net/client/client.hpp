@@ -27,6 +27,7 @@
 
 namespace crepes::client {
 
+/// Three coordinates.
 struct Vector {
   double x = 0.0;
   double y = 0.0;
@@ -83,6 +84,7 @@ struct Pose {
 struct Status {
   using Totals = std::map<std::string, std::uint64_t>;  ///< by name
 
+  /// A neighbor's datagrams.
   struct Reports {
     std::uint64_t received = 0;
     std::uint64_t lost = 0;
@@ -90,6 +92,7 @@ struct Status {
     double age_s = 0.0;
     double loss = 0.0;  ///< of the last seconds
   };
+  /// One neighbor of the robot.
   struct Neighbor {
     std::uint16_t peer = 0;
     std::string name;
@@ -100,11 +103,13 @@ struct Status {
     std::optional<Reports> reports;
     std::vector<std::string> faults;  ///< what the team finds wrong with it
   };
+  /// One sensor of the robot.
   struct Sensor {
     std::string name;
     double rate_hz = 0.0;
     bool ok = false;
-    std::string message;  ///< what is wrong, and what to do
+    bool calibrated = true;  ///< false: a camera whose lens is a guess
+    std::string message;     ///< what is wrong, and what to do
     Totals faults;
     Totals counts;
   };
@@ -115,6 +120,7 @@ struct Status {
     double skew_ppm = 0.0;
     double sigma_s = 0.0;
   };
+  /// How datagrams between robots are protected, and their airtime.
   struct Mesh {
     bool sealed = false;
     bool signs = false;

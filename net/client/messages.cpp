@@ -104,6 +104,7 @@ Status::Sensor sensor_from(const json& object) {
   return {object.at("name").get<std::string>(),
           object.value("rate_hz", 0.0),
           object.value("ok", false),
+          object.value("calibrated", true),
           object.value("message", ""),
           totals_from(object, "faults"),
           totals_from(object, "counts")};

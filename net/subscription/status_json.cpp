@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <utility>
 
 #include "net/subscription/fault_text.hpp"
@@ -30,6 +31,7 @@ Json sensor_json(const SensorStatus& sensor) {
   Json json{{"name", truncated_utf8(sensor.name, kMaxName)}};
   put(json, "rate_hz", sensor.rate_hz, 4);
   json["ok"] = sensor.ok;
+  if (!sensor.is_calibrated) json["calibrated"] = false;
   if (!sensor.message.empty()) json["message"] = truncated_utf8(sensor.message, kMaxText);
   if (Json faults = totals_json(sensor.totals.faults); !faults.empty())
     json["faults"] = std::move(faults);
@@ -87,10 +89,53 @@ Json ages_json(const NeighborStatus& neighbor, Timestamp now) {
   for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind) {
     if (const auto& newest = neighbor.newest.at(kind)) {
       put(json, std::string(name_of(static_cast<MeasurementKind>(kind))).c_str(),
-          to_seconds(now - *newest), 3);
+          to_seconds(now - newest->stamp), 3);
     }
   }
   if (neighbor.newest_imu) put(json, "imu", to_seconds(now - *neighbor.newest_imu), 3);
+  return json;
+}
+
+/// Lengths and components of directions, to a tenth of a millimeter or of a milliradian.
+Json numbers_json(std::span<const double> numbers) {
+  Json json = Json::array();
+  for (const double number : numbers) json.push_back(std::round(1e4 * number) / 1e4);
+  return json;
+}
+
+Json vector_json(const Eigen::Vector3d& v) { return numbers_json({v.data(), 3}); }
+
+bool is_finite(const NewestReading& newest) {
+  return std::ranges::all_of(newest.reading, [](double number) { return std::isfinite(number); });
+}
+
+/// What was measured, without any estimate. A bearing leads from the seeing robot's camera to the
+/// other one's ring, a range from our antenna to the neighbor's; each end in its own robot's body.
+Json measured_json(const NeighborStatus& neighbor) {
+  Json json = Json::object();
+  const auto put_reading = [&](MeasurementKind kind, const auto& about) {
+    const auto& newest = neighbor.newest.at(static_cast<std::size_t>(kind));
+    if (!newest || newest->reading == SensorReading{} || !is_finite(*newest)) return;
+    Json& one = json[std::string(name_of(kind))] = about(newest->reading);
+    if (newest->verdict == Verdict::kGated) one["gated"] = true;
+  };
+  const auto bearing_to = [](const Eigen::Vector3d& ring) {
+    return [&ring](const SensorReading& z) {
+      return Json{{"u", numbers_json(std::span(z).first(3))},
+                  {"from", numbers_json(std::span(z).last(3))},
+                  {"to", vector_json(ring)}};
+    };
+  };
+  const PairMounting& mounting = neighbor.mounting;
+  const auto range = [&mounting](const SensorReading& z) {
+    return Json{{"m", numbers_json(std::span(z).first(1))[0]},
+                {"from", vector_json(mounting.p_B_U)},
+                {"to", vector_json(mounting.p_N_Q)}};
+  };
+  put_reading(MeasurementKind::kBearing, bearing_to(mounting.p_N_M));
+  put_reading(MeasurementKind::kPeerBearing, bearing_to(mounting.p_B_M));
+  put_reading(MeasurementKind::kRange, range);
+  put_reading(MeasurementKind::kPeerRange, range);
   return json;
 }
 
@@ -136,8 +181,11 @@ void put_network(Json& json, const SystemStatus& status) {
   json["queues"] = Json::object();
   for (const QueueStatus& queue : status.queues)
     put_total(json["queues"], queue.name, queue.dropped);
-  json["estimator"] = totals_json({{"unknown_senders", status.estimator.unknown_senders},
-                                   {"refused_samples", status.estimator.refused_samples}});
+  json["estimator"] =
+      totals_json({{"unknown_senders", status.estimator.unknown_senders},
+                   {"refused_samples", status.estimator.refused_samples},
+                   {"ids_confirmed", status.estimator.predicted_ids.confirmed},
+                   {"ids_unconfirmed", status.estimator.predicted_ids.unconfirmed}});
   put_refused_imu(json["estimator"], status.estimator.refused_imu);
   json["mesh"] = mesh_json(status.mesh);
   json["network"] = totals_json(status.network);
@@ -191,8 +239,9 @@ bool drop_last_neighbor(Json& status) {
 /// long.
 std::string fitted(Json status) {
   using Cut = void (*)(Json&);
-  constexpr std::array<Cut, 14> kCuts{
+  constexpr std::array<Cut, 15> kCuts{
       [](Json& s) { erase_in_each(s, "sensors", "counts"); },
+      [](Json& s) { erase_in_each(s, "neighbors", "measured"); },
       [](Json& s) { erase_in_each(s, "neighbors", "measurements"); },
       [](Json& s) { s.erase("network"); },
       [](Json& s) { s.erase("mesh"); },
@@ -276,8 +325,11 @@ std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId 
   const auto neighbor = std::ranges::find(neighbors, peer, &NeighborStatus::neighbor);
   if (neighbor == neighbors.end()) return std::nullopt;
   Json json = head_json(status);
+  put(json, "timestamp", to_seconds(status.stamp.time_since_epoch()), 13);
   json["neighbors"] = {neighbor_json(*neighbor)};
   json["neighbors"][0]["ages_s"] = ages_json(*neighbor, status.stamp);
+  if (Json measured = measured_json(*neighbor); !measured.empty())
+    json["neighbors"][0]["measured"] = std::move(measured);
   const auto traffic = std::ranges::find(status.traffic, peer, &PeerTraffic::peer);
   if (traffic != status.traffic.end()) json["neighbors"][0]["reports"] = traffic_json(*traffic);
   const auto air = status.mesh.air.of_peers.find(peer);

@@ -33,6 +33,7 @@ struct PollRequest {
   StatusPart about = StatusPart::kAll;
 };
 
+/// A request of a client, parsed.
 struct SubscriptionRequest {
   std::variant<WatchRequest, PollRequest> what;
   std::string cookie;  ///< empty: none

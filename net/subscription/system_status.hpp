@@ -17,10 +17,12 @@ struct SensorStatus {
   std::string name;
   double rate_hz = 0.0;
   bool ok = false;
-  std::string message;  ///< the fault and its remedy
+  bool is_calibrated = true;  ///< false: a camera whose lens is a guess
+  std::string message;        ///< the fault and its remedy
   SensorTotals totals{};
 };
 
+/// The drops of one queue.
 struct QueueStatus {
   std::string name;
   std::uint64_t dropped = 0;

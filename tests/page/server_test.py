@@ -2,6 +2,7 @@
 """Hostile and honest requests to crepesctl view. No browser."""
 import json
 import os
+import pathlib
 import re
 import resource
 import socket
@@ -9,6 +10,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+import urllib.request
 
 from fake_daemon import FakeDaemon
 from viewer import RECORDING, TOOL, Viewer, replayed, wait
@@ -228,6 +230,43 @@ class Start(unittest.TestCase):
             file.write("short")
             file.flush()
             self.assertIn("16 characters", self.refusal("--listen", "127.0.0.1:0", "--token-file", file.name))
+
+    def test_messages_do_not_repeat_their_prefix(self):
+        for command in (["view", "/nonexistent"], ["view", "--listen", "localhost"], ["replay", "/nonexistent", "--out", "/tmp/never"],
+                        ["evaluate", "/nonexistent"], ["convert", "/nonexistent", "--to", "mcap"], ["plot", "/nonexistent"], ["spots", "/nonexistent"],
+                        ["calibrate", "imu", "/nonexistent", "--out", "/tmp/never"], ["status", "--port", "1"]):
+            done = subprocess.run([TOOL, *command], capture_output=True, text=True, timeout=60)
+            self.assertNotEqual(done.returncode, 0, command)
+            for line in done.stderr.splitlines():
+                parts = [part.strip() for part in line.split(": ")]
+                self.assertEqual(len(parts), len(set(parts)), line)
+                self.assertLessEqual(line.count("/nonexistent"), 1, line)
+
+    def test_open_starts_the_desktops_browser_with_the_address(self):
+        with tempfile.TemporaryDirectory() as folder:
+            browser, told = pathlib.Path(folder, "xdg-open"), pathlib.Path(folder, "told")
+            browser.write_text(f'#!/bin/sh\necho "$1" > {told}.part && mv {told}.part {told}\n')
+            browser.chmod(0o755)
+            viewer = Viewer("--port", 1, "--open", PATH=f"{folder}:{os.environ['PATH']}")
+            try:
+                wait(told.exists, "the browser")
+                self.assertEqual(told.read_text().strip(), viewer.url)
+            finally:
+                viewer.stop()
+
+    def test_the_demo_has_a_page_until_it_is_interrupted(self):
+        with tempfile.NamedTemporaryFile("w+") as log:
+            demo = subprocess.Popen([TOOL, "demo", "--scenario", "two", "--view", "--listen", "127.0.0.1:0", "--port", "47591"], stdout=log, stderr=log)
+            try:
+                said = pathlib.Path(log.name)
+                wait(lambda: demo.poll() is not None or "world time" in said.read_text(), "the address of the page")
+                url = re.search(r"page: (http\S+)", said.read_text()).group(1)
+                self.assertRegex(said.read_text(), r"world time [\d.]+ s\n")  # of no end
+                with urllib.request.urlopen(f"{url}robots", timeout=30) as reply:
+                    self.assertEqual(len(json.load(reply)["robots"]), 2)
+            finally:
+                demo.terminate()
+                demo.wait(30)
 
     def test_an_address_in_use_is_an_error(self):
         viewer = Viewer("--port", 1)

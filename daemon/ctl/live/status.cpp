@@ -3,9 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <map>
 #include <vector>
 
 #include "daemon/ctl/live/full_status.hpp"
+#include "daemon/ctl/live/light_advice.hpp"
+#include "daemon/ctl/live/pose_advice.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "estimator/core/constants.hpp"
 
@@ -59,6 +62,32 @@ std::string neighbors_of(const client::Status& status) {
     rows.push_back(std::move(row));
   }
   return text_table(rows);
+}
+
+/// What to do where there is no pose, once for each reason.
+std::string advice_of(const client::Status& status) {
+  std::map<std::string, std::string> neighbors;  // by reason
+  for (const auto& neighbor : status.neighbors) {
+    std::string& names = neighbors[neighbor.reason];
+    names += (names.empty() ? "" : ", ") + neighbor.name;
+  }
+  std::string text;
+  for (const auto& [reason, names] : neighbors) {
+    if (const std::string_view advice = advice_for(reason); !advice.empty())
+      text += fmt::format("{} ({}): {}\n", reason, names, advice);
+  }
+  return text;
+}
+
+/// How to change the cameras' exposure.
+std::string light_of(const client::Status& status) {
+  std::string text;
+  for (const auto& sensor : status.sensors) {
+    if (!sensor.counts.contains("background")) continue;
+    const std::string advice = light_advice(sensor.counts);
+    if (!advice.empty()) text += fmt::format("{}: {}\n", sensor.name, advice);
+  }
+  return text;
 }
 
 /// What the team finds wrong with a robot; on a healthy team this is empty.
@@ -157,9 +186,9 @@ std::string totals_of(const client::Status& status) {
 }  // namespace
 
 std::string status_text(const client::Status& status) {
-  return fmt::format("{}\n{}\n{}\n{}{}{}{}{}", head_of(status), sensors_of(status),
-                     neighbors_of(status), team_of(status), faults_of(status), mesh_of(status),
-                     thinned_of(status), totals_of(status));
+  return fmt::format("{}\n{}\n{}\n{}{}{}{}{}{}{}", head_of(status), sensors_of(status),
+                     neighbors_of(status), advice_of(status), light_of(status), team_of(status),
+                     faults_of(status), mesh_of(status), thinned_of(status), totals_of(status));
 }
 
 Result<std::string> status(const StatusOptions& options) {

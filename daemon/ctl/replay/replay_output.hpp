@@ -37,6 +37,7 @@ struct RobotReport {
   std::vector<std::pair<std::string, double>> cpu_s;           ///< by stage
 };
 
+/// The contents of report.json.
 struct ReplayReport {
   std::string scenario;
   std::string profile;
@@ -56,6 +57,7 @@ class ReplayOutput {
  public:
   /// The name of each robot's directory.
   using Names = std::map<RobotId, std::string>;
+  /// Whether the files of records are written besides those of poses.
   enum class Detail { kPoses, kRecords };
 
   [[nodiscard]] static Result<ReplayOutput> create(const std::filesystem::path& dir, Names names,

@@ -86,6 +86,8 @@ Json robot_json(const RobotReport& robot, const ReplayOutput::Names& names) {
   json["refused_samples"] = robot.status.refused_samples;
   json["refused_imu"] = refused_imu_json(robot.status.refused_imu);
   json["unknown_senders"] = robot.status.unknown_senders;
+  json["predicted_ids"] = {{"confirmed", robot.status.predicted_ids.confirmed},
+                           {"unconfirmed", robot.status.predicted_ids.unconfirmed}};
   json["cpu_s"] = object_of(robot.cpu_s);
   if (robot.status.team) json["team"] = team_json(robot, names);
   return json;

@@ -7,6 +7,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl plot`.
 struct PlotOptions {
   std::filesystem::path results;  ///< the output folder of replay
   std::filesystem::path swarm;    ///< the data set, for errors against its truth; may be empty

@@ -272,6 +272,38 @@ TEST(SubscriptionJson, ReportsOneNeighborInFull) {
   EXPECT_FALSE(peer_status_json(status, RobotId{1}).has_value());
 }
 
+TEST(SubscriptionJson, ReportsWhatWasMeasuredAsItCame) {
+  SystemStatus status;
+  status.stamp = Timestamp{std::chrono::seconds{100}};
+  NeighborStatus neighbor;
+  neighbor.neighbor = RobotId{2};
+  neighbor.mounting = {.p_B_M = {0.05, 0.0, 0.01},
+                       .p_B_U = {-0.04, 0.02, 0.1},
+                       .p_N_M = {0.0, 0.0, 0.3},
+                       .p_N_Q = {0.0, 0.0, 0.2}};
+  const auto put = [&](MeasurementKind kind, Verdict verdict, const SensorReading& reading) {
+    neighbor.newest.at(static_cast<std::size_t>(kind)) =
+        NewestReading{status.stamp, verdict, reading};
+  };
+  put(MeasurementKind::kBearing, Verdict::kFused, {0.6, -0.8, 0.0, 0.06, 0.0, 0.01});
+  put(MeasurementKind::kPeerBearing, Verdict::kGated, {0.0, 1.0, 0.0, 0.1, 0.2, 0.3});
+  put(MeasurementKind::kRange, Verdict::kFused, {3.21});
+  put(MeasurementKind::kPeerRange, Verdict::kFused, {kNan});
+  status.estimator.neighbors = {neighbor};
+
+  const Json json = Json::parse(peer_status_json(status, RobotId{2}).value());
+  const Json& measured = json["neighbors"][0]["measured"];
+
+  EXPECT_EQ(measured["bearing"],
+            Json::parse(R"({"u":[0.6,-0.8,0.0],"from":[0.06,0.0,0.01],"to":[0.0,0.0,0.3]})"));
+  EXPECT_EQ(
+      measured["peer_bearing"],
+      Json::parse(R"({"u":[0.0,1.0,0.0],"from":[0.1,0.2,0.3],"to":[0.05,0.0,0.01],"gated":true})"));
+  EXPECT_EQ(measured["range"],
+            Json::parse(R"({"m":3.21,"from":[-0.04,0.02,0.1],"to":[0.0,0.0,0.2]})"));
+  EXPECT_FALSE(measured.contains("peer_range"));
+}
+
 TEST(SubscriptionJson, ReportsRefusedInertialSamplesByReason) {
   SystemStatus status = big_status(1);
   EXPECT_EQ(status_json(status).find("refused_imu"), std::string::npos);
