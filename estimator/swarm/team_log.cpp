@@ -8,7 +8,7 @@ namespace crepes {
 
 void TeamLog::add(const TeamSolution& solution) {
   constexpr double kMemory = 5.0;  // s
-  const double dt = stamp_ == kNever ? 0.0 : to_seconds(solution.stamp - stamp_);
+  const double dt = stamp_ ? to_seconds(solution.stamp - *stamp_) : 0.0;
   const double kept = std::exp(-std::max(0.0, dt) / kMemory);
   for (auto& [robot, sums] : sums_) {
     for (Sum& sum : sums) {
@@ -38,8 +38,8 @@ std::vector<TeamFault> TeamLog::faults_of(RobotId robot) const {
 
 std::optional<TeamStatus> TeamLog::status() const {
   constexpr double kLeast = 1.0;  // dimensions; fewer have faded
-  if (stamp_ == kNever) return std::nullopt;
-  TeamStatus status{.stamp = stamp_, .robots = {}};
+  if (!stamp_) return std::nullopt;
+  TeamStatus status{.stamp = *stamp_, .robots = {}};
   for (const RobotCalibration& calibration : calibrations_) {
     TeamRobotStatus robot{
         .calibration = calibration, .residuals = {}, .faults = faults_of(calibration.robot)};

@@ -28,7 +28,7 @@ class TeamLog {
   };
   using Sums = std::array<Sum, kTeamResidualKindCount>;
 
-  Timestamp stamp_ = kNever;
+  std::optional<Timestamp> stamp_;  ///< of the latest solution
   std::vector<RobotCalibration> calibrations_;
   std::vector<TeamFault> faults_;
   std::map<RobotId, Sums> sums_;
