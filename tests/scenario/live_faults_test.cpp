@@ -166,7 +166,9 @@ class SealedSwarm : public LiveDaemon {
   /// A hundred thousand damaged datagrams a second, while the machine does other work too.
   void expect_unmoved_by_flood(bool from_member) {
     const auto port = static_cast<std::uint16_t>(mesh_port_);
-    DatagramFlood flood(port, from_member, overheard());
+    const std::vector<std::uint8_t> sample = overheard();
+    ASSERT_FALSE(sample.empty());
+    DatagramFlood flood(port, from_member, sample);
     ASSERT_TRUE(flood.is_open());
     const long before = DatagramFlood::dropped(port);
     Watched flooded;

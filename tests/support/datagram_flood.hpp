@@ -10,10 +10,12 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <ctime>
 #include <fstream>
 #include <random>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "drivers/base/monotonic_clock.hpp"
@@ -34,7 +36,7 @@ class DatagramFlood {
     const int on = 1;
     (void)::setsockopt(fd_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
     (void)::setsockopt(fd_.get(), SOL_SOCKET, SO_BROADCAST, &on, sizeof(on));
-    const sockaddr_in from = address(INADDR_LOOPBACK, from_member ? port : 0);
+    const sockaddr_in from = address(INADDR_LOOPBACK, from_member ? port : std::uint16_t{0});
     const sockaddr_in to = address(0x7fffffff, port);
     is_open_ = ::bind(fd_.get(), any(from), sizeof(from)) == 0 &&
                ::connect(fd_.get(), any(to), sizeof(to)) == 0;
