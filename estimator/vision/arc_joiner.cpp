@@ -18,6 +18,7 @@ constexpr std::size_t kUsualArcs = 1024;
 constexpr double kArcArea = 1.5;        // of an LED's: two that touch
 constexpr double kLongArcArea = 4.0;    // the same where there is nothing but an arc and an LED
 constexpr double kArcElongation = 1.4;  // of an arc, where there is nothing but arcs
+constexpr double kArcMiddle = 0.9;  // of the radius: an arc's; that of a streak is on the ellipse
 constexpr double kMinArcRoundness = 0.28;
 constexpr double kOffEllipse = 1.0;    // px beside half an LED
 constexpr double kLeastCovered = 0.6;  // of the ellipse's length
@@ -153,6 +154,12 @@ bool ArcJoiner::is_ring(std::span<const Blob> blobs, const BlobFinder& finder) {
   const double radius = view->radius();
   if (2.0 * radius * view->roundness() < width + kLeastHole || 2.0 * radius > kMaxRingSide)
     return false;
+  const auto members = ring_.members();
+  const bool are_curved =
+      has_led_ || std::all_of(members.begin(), members.end(), [&](auto i) {
+        return view->place_near({blobs[i].mean_u(), blobs[i].mean_v()}).norm() <= kArcMiddle;
+      });
+  if (!are_curved) return false;
   const bool are_near = std::all_of(pixels_.begin(), pixels_.end(), [&](const Eigen::Vector2d& uv) {
     return distance_from(*view, to_place, uv) <= 0.5 * width + kOffEllipse;
   });

@@ -83,7 +83,9 @@ std::optional<HiddenLights::Return> HiddenLights::extract_match(
   double most = 0.0;
   const auto is_most = [&](double density) {
     sum += density;
-    return density > most && (most = density, true);
+    if (density <= most) return false;
+    most = density;
+    return true;
   };
   auto likeliest = lights_.end();
   for (auto it = lights_.begin(); it != lights_.end(); ++it) {

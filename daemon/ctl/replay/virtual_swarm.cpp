@@ -257,7 +257,8 @@ void VirtualSwarm::step(const Arrival& arrival, const Event& event) {
 
 void VirtualSwarm::handle_outputs(const Arrival& arrival, const Outputs& outputs) {
   VirtualRobot& robot = robots_[arrival.robot];
-  robot.handed.bearings += outputs.bearings.size();
+  robot.handed.bearings += static_cast<std::uint64_t>(
+      std::ranges::count(outputs.bearings, Naming::kRead, &Bearing::how));
   for (const NeighborPose& pose : outputs.poses) sinks_.on_pose(robot.id(), pose);
   if (sinks_.on_records) sinks_.on_records(robot.id(), outputs.records);
   if (outputs.report) {

@@ -49,10 +49,11 @@ TEST(PredictedIds, DoNotLetALampPullThePose) {
   for (const double aside : {0.0, 0.005, 0.01, -0.02}) {
     EstimatorPair pair(7);
     pair.run_for(4s);
+    pair.run_for(1200ms, {.in_view = false});
     const auto fused = pair.count(MeasurementKind::kBearing, Verdict::kFused);
     for (int i = 0; i < 4; ++i) {
-      pair.run_for(1200ms, {.in_view = false});
       pair.run_for(500ms, {.in_view = false, .decoy_rad = aside, .is_lamp = true});
+      pair.run_for(1200ms, {.in_view = false});
     }
     predicted += pair.named(Naming::kPredicted);
 

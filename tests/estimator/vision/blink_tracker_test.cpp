@@ -197,7 +197,7 @@ TEST_F(BlinkTrackerTest, NamesABoardInItsFirstFrameAfterAGapThatTheGyroCarries) 
                   return shown(t, 0.0, {5.0, 0.2 * (t - begin), 0.3});
                 }},
                {1, [=](double t) {
-                  return shown(t, 0.5, {5.0, 2.0 - 0.2 * (t - begin), 0.3});
+                  return shown(t, 0.5, {5.0, 2.0 + 0.2 * (t - begin), 0.3});
                 }}};
     std::size_t lit = 0;
     std::size_t predicted = 0;
