@@ -12,6 +12,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl calibrate camera --grid`.
 struct CalibrateGridOptions {
   std::filesystem::path pictures;  ///< a folder of pictures, or a robot's folder of a recording
   std::filesystem::path out;

@@ -19,6 +19,7 @@ namespace crepes {
                                                const std::array<int, 2>& resolution,
                                                const std::optional<KannalaBrandtFit>& kb);
 
+/// Whether a camchain says how the camera is mounted.
 enum class Mounting : std::uint8_t {
   kKnown,
   kUnknown,  ///< no T_cam_imu, no timeshift_cam_imu

@@ -13,6 +13,7 @@
 
 namespace crepes {
 
+/// Where the neighbor is put.
 enum class WalkStep : std::uint8_t {
   kAhead,       ///< both upright on a level floor, a taped distance apart
   kLeft,        ///< in front, to the left

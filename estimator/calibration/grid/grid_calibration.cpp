@@ -30,11 +30,23 @@ std::size_t leds_of(const Orders& orders) {
   return count;
 }
 
-Orders orders_with(const std::vector<GridPicture>& pictures, const GridLens& lens,
+/// By the lens with which most LEDs are found.
+std::vector<GridLed> best_order(const GridPicture& picture, const std::vector<GridLens>& lenses,
+                                const GridShape& shape) {
+  std::vector<GridLed> best;
+  for (const GridLens& lens : lenses) {
+    if (best.size() == static_cast<std::size_t>(shape.leds())) break;
+    auto leds = find_grid(picture.lights, lens, shape);
+    if (leds.size() > best.size()) best = std::move(leds);
+  }
+  return best;
+}
+
+Orders orders_with(const std::vector<GridPicture>& pictures, const std::vector<GridLens>& lenses,
                    const GridShape& shape, const Progress& progress) {
   Orders orders;
   for (const GridPicture& picture : pictures) {
-    orders.push_back(find_grid(picture.lights, lens, shape));
+    orders.push_back(best_order(picture, lenses, shape));
     progress(static_cast<double>(orders.size()) / static_cast<double>(pictures.size()));
   }
   return orders;
@@ -225,15 +237,17 @@ GridCalibration calibrate_grid(const std::vector<GridPicture>& pictures,
       if (settings.on_progress) settings.on_progress(begin + share * (end - begin));
     };
   };
-  const GridLens guess =
-      generic_grid_lens(settings.kind, settings.resolution, settings.fov_rad, 1.0);
-  Orders orders = orders_with(pictures, guess, settings.shape, part(0.0, 0.4));
+  // A guess, and a longer lens that also sees what lies beyond the guess's rim.
+  const auto guess = [&](double scale) {
+    return generic_grid_lens(settings.kind, settings.resolution, settings.fov_rad, scale);
+  };
+  Orders orders = orders_with(pictures, {guess(1.0), guess(2.0)}, settings.shape, part(0.0, 0.4));
   Views found;
   if (const auto start = first_lens(orders, settings)) {
     found = views_with(orders, *start, settings.shape);
     GridFit fit = fit_of(*start, settings.shape, found);
     // Once more with a lens that is nearly right: corners that were missed are found now.
-    Orders again = orders_with(pictures, fit.lens, settings.shape, part(0.5, 0.9));
+    Orders again = orders_with(pictures, {fit.lens}, settings.shape, part(0.5, 0.9));
     if (leds_of(again) >= leds_of(orders)) orders = std::move(again);
     found = views_with(orders, fit.lens, settings.shape);
     fit = fit_of(fit.lens, settings.shape, found);

@@ -19,6 +19,7 @@ struct GridPicture {
   std::vector<Eigen::Vector2d> lights;
 };
 
+/// What is known before.
 struct GridSettings {
   GridShape shape;
   std::array<int, 2> resolution{};
@@ -27,6 +28,7 @@ struct GridSettings {
   Progress on_progress;  ///< optional
 };
 
+/// The lens, how good it is, and what speaks against it.
 struct GridCalibration {
   GridLens lens;
   Eigen::VectorXd sigma;       ///< of its numbers

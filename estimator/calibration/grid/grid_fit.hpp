@@ -25,6 +25,7 @@ struct GridView {
 [[nodiscard]] std::optional<Pose> grid_pose(const std::vector<GridLed>& leds, const GridLens& lens,
                                             const GridShape& shape);
 
+/// A fitted lens, and where the grid is in each view.
 struct GridFit {
   GridLens lens;
   std::vector<GridView> views;
@@ -35,6 +36,7 @@ struct GridFit {
   bool has_converged = false;
 };
 
+/// What a fit searches.
 enum class GridUnknowns : std::uint8_t { kLensAndPoses, kPoses };
 
 /// Levenberg-Marquardt from loose to tight, as `solve_camera`. `views` hold the first poses.

@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// The models that are fitted.
 enum class LensKind : std::uint8_t { kDoubleSphere, kKannalaBrandt };
 
 /// Double Sphere: xi, alpha, fx, fy, cx, cy. Kannala-Brandt: fx, fy, cx, cy, k1, k2, k3, k4.
