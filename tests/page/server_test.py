@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Hostile and honest requests to crepesctl view. No browser."""
+import gzip
 import json
 import os
 import pathlib
@@ -13,7 +14,7 @@ import unittest
 import urllib.request
 
 from fake_daemon import FakeDaemon
-from viewer import RECORDING, TOOL, Viewer, replayed, wait
+from viewer import RECORDING, SOURCE, TOOL, Viewer, replayed, wait
 
 
 def raw(viewer, text, patience_s=10):
@@ -74,6 +75,16 @@ class Server(unittest.TestCase):
             reply = get(self.viewer, path)
             self.assertNotIn(status_of(reply), (200, 500), path)
             self.assertNotIn("root:", reply, path)
+
+    def test_the_whole_page_is_small(self):
+        names = [file.name for file in (SOURCE / "daemon/ctl/view/page").iterdir() if file.suffix != ".md"]
+        self.assertIn("main.js", names)
+        texts = [self.viewer.get(name).encode() for name in names]
+        compressed = sum(len(gzip.compress(text)) for text in texts)
+        # A megabyte was asked for. What ARCHITECTURE.md says of it holds.
+        self.assertLess(compressed, 50_000)
+        said = int(re.search(r"plain files of about (\d+) kB", (SOURCE / "ARCHITECTURE.md").read_text()).group(1))
+        self.assertAlmostEqual(sum(map(len, texts)) / 1000, said, delta=5)
 
     def test_wrong_robots_are_not_found(self):
         for query in ("", "?robot=", "?robot=1", "?robot=-1", "?robot=99999999999999999999", "?robot=0x0", "?robot=0.0", "?x=0", "?robot=nan"):
