@@ -144,6 +144,7 @@ struct Estimator::State {
   bool keeps_records = false;
   std::vector<TeamFault> faults;  ///< of the latest team solution
   std::uint64_t unknown_senders = 0;
+  std::uint64_t used_samples = 0;
   std::uint64_t refused_samples = 0;
 };
 
@@ -188,6 +189,7 @@ Outputs Estimator::State::handle(const ImuSample& sample) {
       ++refused_samples;
       continue;
     }
+    ++used_samples;
     self.tilt = tilt_filter.tilt();
     for (BlinkTracker& tracker : trackers) tracker.add_imu(believed);
   }
@@ -233,7 +235,7 @@ Outputs Estimator::State::handle(const ReceivedReport& received) {
     return {};
   }
   neighbor->second.add_report(received, self);
-  graph_builder.add_report(received.report);
+  graph_builder.add_report(received.report, swarm);
   if (!runs_team_filter()) return {};
   const ImuHistory& imu = neighbor->second.robot_state().imu;
   const double w = imu.empty() ? 0.0 : imu.newest().gyro_radps.norm();
@@ -316,7 +318,7 @@ Outputs Estimator::State::handle(const Tick& tick) {
     outputs.report = composer.compose(tick.stamp, self, estimates);
   }
   if (outputs.report && runs_team_filter()) {
-    graph_builder.add_report(*outputs.report);
+    graph_builder.add_report(*outputs.report, swarm);
     team_intake.add_own_report(*outputs.report, swarm, filters);
   }
   if (graph_enabled && !self.imu.empty() && graph_timer.is_due(tick.stamp)) {
@@ -345,6 +347,8 @@ void Estimator::keep_records() {
   state_->keeps_records = true;
   for (auto& [robot, neighbor] : state_->neighbors) neighbor.outcomes().keep_records();
 }
+
+std::uint64_t Estimator::used_samples() const { return state_->used_samples; }
 
 EstimatorStatus Estimator::status() const {
   EstimatorStatus status;

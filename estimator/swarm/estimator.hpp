@@ -40,6 +40,8 @@ class Estimator {
   void reconfigure(const EstimatorSettings& settings);
   /// From now on `Outputs::records` contains every measurement. Changes nothing else.
   void keep_records();
+  /// Of our IMU. With `EstimatorStatus::refused_samples` these are all, but for the latest.
+  [[nodiscard]] std::uint64_t used_samples() const;
   [[nodiscard]] EstimatorStatus status() const;
 
  private:

@@ -75,7 +75,8 @@ std::size_t MeshRelay::missed_by(const std::vector<RobotId>& sent_by, Timestamp 
 
 void MeshRelay::note_sent(Offer& offer, const Endpoint& from) const {
   for (const auto& [id, neighbor] : neighbors_)
-    if (neighbor.address == from && id != offer.id.sender) offer.sent_by.push_back(id);
+    if (neighbor.address == from && std::ranges::find(offer.sent_by, id) == offer.sent_by.end())
+      offer.sent_by.push_back(id);
 }
 
 void MeshRelay::offer(const DatagramId& id, std::span<const std::uint8_t> bytes,

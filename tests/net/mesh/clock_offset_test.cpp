@@ -1,6 +1,7 @@
 #include "net/mesh/clock_offset.hpp"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <cmath>
@@ -316,6 +317,19 @@ TEST(ClockOffset, RefusesPacketsFromTheFarEndsOfTime) {
               ClockOffset::Verdict::kImplausible);
 
   EXPECT_EQ(clock.to_local(PeerTimestamp{Duration{pair.clocks_[1].at(5.0)}}), pair.mapped(5.0));
+}
+
+TEST(ClockOffset, KeepsABoundedNumberOfPackets) {
+  ClockOffset clock;
+  const struct mallinfo2 before = ::mallinfo2();
+  for (std::int64_t i = 0; i < 100'000; ++i) {
+    const Duration at = std::chrono::seconds{100} + std::chrono::microseconds{4 * i};
+    (void)clock.add_packet({PeerTimestamp{at}, Timestamp{at + std::chrono::milliseconds{3}}});
+  }
+  const struct mallinfo2 after = ::mallinfo2();
+
+  EXPECT_LT(after.uordblks + after.hblkhd, before.uordblks + before.hblkhd + 100'000);
+  EXPECT_TRUE(clock.fastest_recent_packet());
 }
 
 TEST(ClockOffset, IsUnknownWhileOnlyOneWayWorks) {

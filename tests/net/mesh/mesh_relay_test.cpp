@@ -1,6 +1,7 @@
 #include "net/mesh/mesh_relay.hpp"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <chrono>
 #include <vector>
@@ -113,6 +114,34 @@ TEST(MeshRelay, ForwardsAFewDatagramsASecondOfOneSender) {
   }
   EXPECT_GT(forwarded, 5U);
   EXPECT_LT(forwarded, 20U);
+}
+
+/// What is on the heap.
+std::int64_t heap_bytes() {
+  const struct mallinfo2 heap = ::mallinfo2();
+  return static_cast<std::int64_t>(heap.uordblks + heap.hblkhd);
+}
+
+TEST(MeshRelay, StoresNoMoreForAFloodOfCopies) {
+  MeshRelay relay = relay_that_hears({kSender, kFar, kOther});
+  relay.offer(datagram(), kBytes, address_of(kSender), kNow);
+  const std::int64_t before = heap_bytes();
+
+  for (int i = 0; i < 100'000; ++i)
+    ASSERT_TRUE(relay.note_copy(datagram(), address_of(kOther)));
+
+  EXPECT_LT(heap_bytes() - before, 1'000);
+}
+
+TEST(MeshRelay, StoresNoMoreForAFloodOfDatagrams) {
+  MeshRelay relay = relay_that_hears({kSender, kFar});
+  const std::vector<std::uint8_t> longest(1400);
+  const std::int64_t before = heap_bytes();
+
+  for (std::uint32_t i = 0; i < 10'000; ++i)
+    relay.offer(datagram(i), longest, address_of(kSender), kNow);
+
+  EXPECT_LT(heap_bytes() - before, 256 * 1'600);
 }
 
 TEST(MeshRelay, MarksAboutFourDatagramsASecond) {
