@@ -135,6 +135,12 @@ class NetLoop {
     return doubled.empty() ? key_monitor_.fault() : doubled;
   }
 
+  [[nodiscard]] std::string mesh_warning() const {
+    const std::string keys = key_warning(settings_);
+    if (!mesh_.keys_may_be_swapped()) return keys;
+    return std::string(kKeysUnlocked) + (keys.empty() ? "" : "; ") + keys;
+  }
+
   /// Sends the status line to systemd if it has changed.
   void notify_service() {
     std::string line = systemd_status(status());
@@ -229,7 +235,7 @@ class NetLoop {
     status.traffic = link_.traffic(status.stamp);
     status.mesh = {.is_sealed = mesh_.seal().has_value(),
                    .is_signed = mesh_.signer().has_value(),
-                   .warning = key_warning(settings_),
+                   .warning = mesh_warning(),
                    .air = air_};
     status.queues = stage_.queues();
     status.network = link_.counters().totals();

@@ -54,11 +54,15 @@ class PacketSigner {
 
   explicit PacketSigner(const RobotKey& key);
 
+  /// False if the system refuses to lock the memory of the key: then it may be swapped.
+  [[nodiscard]] bool is_locked() const { return is_locked_; }
+
   /// Signs a datagram of `encode_peer_message`. Equal datagrams have equal signatures.
   [[nodiscard]] std::vector<std::uint8_t> sign(std::span<const std::uint8_t> plain) const;
 
  private:
-  std::shared_ptr<const RobotKey> key_;  ///< in memory that is not swapped and not dumped
+  std::shared_ptr<const RobotKey> key_;  ///< in memory of its own (`locked_key.hpp`)
+  bool is_locked_ = false;
 };
 
 /// Whether a datagram that is not sealed has the mark of a signed one, and room for a signature.
