@@ -26,6 +26,8 @@ struct Conditions {
   std::function<ImuSample(const ImuSample&)> own_imu{};  ///< what the IMU makes of the truth
   std::function<ImuSample(const ImuSample&)> peer_imu{};
   std::function<void(UwbRange&)> range{};
+  std::function<void(Report&)> peer_report{};                       ///< what the neighbor sends
+  std::function<void(std::vector<std::uint8_t>&)> peer_datagram{};  ///< as it is on the air
 };
 
 class EstimatorPair {
@@ -175,7 +177,7 @@ class EstimatorPair {
                                          so3_exp({0.0, 0.0, with.peer_turn_rad}) * z.u, z.camera,
                                          z.sigma_rad});
       }
-      if (with.peer_is_on) report_for_peer();
+      if (with.peer_is_on) report_for_peer(with);
       tick();
     }
   }
@@ -237,12 +239,14 @@ class EstimatorPair {
     }
   }
 
-  void report_for_peer() {
+  void report_for_peer(const Conditions& with) {
     const Timestamp stamp{now_ + peer_clock_};
     peer_report_.sender = kOther;
     peer_report_.stamp = stamp;
     peer_report_.tilt = {stamp, pair_.sighting(Timestamp{now_}).N.up, 0.01};
+    if (with.peer_report) with.peer_report(peer_report_);
     in_flight_to_us_.push_back({now_, peer_link_.compose(peer_report_, stamp)});
+    if (with.peer_datagram) with.peer_datagram(in_flight_to_us_.back().bytes);
     peer_report_ = {};
   }
 
