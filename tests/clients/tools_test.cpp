@@ -8,6 +8,7 @@
 #include "config/keys/robot_key.hpp"
 #include "daemon/runtime.hpp"
 #include "tests/clients/tool_run.hpp"
+#include "tests/daemon/ctl/tiny_swarm.hpp"
 #include "tests/support/places.hpp"
 
 namespace crepes {
@@ -182,6 +183,44 @@ TEST_F(OneRobot, IsSetToAnotherExposureWhileItRuns) {
   EXPECT_NE(impossible.errors.find("longer than a frame"), std::string::npos) << impossible.errors;
   // What was refused has left nothing behind.
   EXPECT_EQ(load_config(file).value().cameras[0].device.light.exposure_us, 2.0);
+}
+
+TEST_F(OneRobot, IsWatchedOnceInJsonThoughItsNeighborIsMissing) {
+  const Config config = pair_config(1, mesh_port_);
+  const Runtime runtime(config, machine_);
+  EXPECT_TRUE(Client(config).await_status([](const Json&) { return true; }));
+
+  const Ending once =
+      crepesctl({"watch", "--once", "--json", "--port", std::to_string(config.subscription.port)});
+
+  EXPECT_EQ(once.how, "exit code 0");
+  EXPECT_NE(once.output.find("STATUS"), std::string::npos) << once.output;
+}
+
+TEST(ToolsAlone, ReplayNothingWhereNoRowOfASensorIsGood) {
+  const TinySwarm files;
+  files.write("r1/uwb0/data.csv", "#t_ns,peer,range,fp,rx\n10000000000,2,far,-80,-79\n");
+
+  const Ending ending =
+      crepesctl({"replay", files.dir().string(), "--out", (files.dir() / "out").string()});
+
+  EXPECT_EQ(ending.how, "exit code 1");
+  EXPECT_NE(ending.errors.find("uwb0/data.csv: none of 1 rows is good"), std::string::npos)
+      << ending.errors;
+}
+
+TEST(DaemonAlone, RefusesWarningsOnlyIfItIsStrict) {
+  const TinySwarm files;  // without lever arms, on a mesh that is not there
+  const std::string file = (files.dir() / "r1/crepesd.yaml").string();
+
+  const Ending lenient = run(crepesd_path(), {"--check-config", file});
+  const Ending strict = run(crepesd_path(), {"--check-config", file, "--strict"});
+
+  EXPECT_EQ(lenient.how, "exit code 0");
+  EXPECT_EQ(strict.how, "exit code 1");
+  EXPECT_EQ(lenient.errors, strict.errors);
+  for (const char* warning : {"net.interface: there is no such interface", "p_body_led"})
+    EXPECT_NE(lenient.errors.find(warning), std::string::npos) << lenient.errors;
 }
 
 TEST(ToolsAlone, SayThatNobodyAnswersAndEndWithOne) {

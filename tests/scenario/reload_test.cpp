@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 
 #include <algorithm>
@@ -290,7 +291,7 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsTold) {
   NotifySocket systemd(folder.path() / "notify");
   ::setenv("NOTIFY_SOCKET", (folder.path() / "notify").c_str(),
            1);  // NOLINT(concurrency-mt-unsafe)
-  const auto daemon =
+  auto daemon =
       ChildProcess::start(crepesd_path(), {"--config", file.string()}, folder.path() / "log");
   ::unsetenv("NOTIFY_SOCKET");  // NOLINT(concurrency-mt-unsafe)
   ASSERT_TRUE(daemon) << daemon.error().message;
@@ -325,6 +326,18 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsTold) {
   write("");
   daemon->send_signal(SIGHUP);
   EXPECT_TRUE(client.await_status(has_generation(3)));
+
+  // A pipe in the place of the file neither blocks the daemon nor its end.
+  std::filesystem::remove(file);
+  ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+  daemon->send_signal(SIGHUP);
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    return status["config"].value("fault", "").find("is not a file") != std::string::npos;
+  }));
+  daemon->terminate();
+  const Timestamp end_of_first = clock.now() + std::chrono::seconds{20};
+  while (!daemon->exit_reason() && clock.now() < end_of_first) ::poll(nullptr, 0, 20);
+  EXPECT_EQ(daemon->exit_reason(), "exit code 0");
 
   const std::string heard = systemd.heard();
   EXPECT_NE(heard.find("RELOADING=1\nMONOTONIC_USEC="), std::string::npos) << heard;

@@ -348,6 +348,8 @@ TEST(ConfigFile, RefusesNumbersThatCannotBeMeant) {
             "f:11: imu.accelerometer.bias");
   EXPECT_EQ(with("uwb: {", "imu: {port: /dev/ttyUSB0}\nuwb: {port: /dev/ttyUSB0, "),
             "f:12: uwb.port");
+  EXPECT_EQ(with("duty: 0.3", "duty: 0.3, p_body_uwb: [0, 0, 60]"),
+            "f:5: swarm.members[1].p_body_uwb");
   EXPECT_EQ(with("uwb:", "net: {interface: " + std::string(5000, 'x') + "}\nuwb:"),
             "f:11: net.interface");
   EXPECT_EQ(with("uwb:", "recording: {socket: /" + std::string(200, 'x') + "}\nuwb:"),
@@ -385,6 +387,9 @@ TEST(ConfigFile, WarnsOfWhatCanHardlyBeMeant) {
       warnings_of(and_in("resolution:", "driver: folder\n    folder: /nowhere\n    resolution:")),
       "10 cameras[0].folder\n");
   EXPECT_EQ(warnings_of(and_in("{noise_m: 0.05}", "{noise_m: 0.05}") + "#"), "");
+  std::string elsewhere = and_in("id: 1", "id: 1");
+  elsewhere.replace(elsewhere.find("interface: lo"), 13, "interface: nowhere9");
+  EXPECT_EQ(warnings_of(elsewhere), "12 net.interface\n");
 }
 
 TEST(ConfigFile, PrintsEachFaultInOneLineWhateverTheFileContains) {

@@ -2,6 +2,9 @@
 #include "config/reading/config_sources.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 
 #include <filesystem>
 #include <fstream>
@@ -13,6 +16,7 @@
 #include "config/reading/config_file.hpp"
 #include "config/schema/mesh_slice.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/unique_fd.hpp"
 #include "tests/support/places.hpp"
 
 namespace crepes {
@@ -99,6 +103,23 @@ TEST_F(ConfigSources, LaysFragmentsOverTheFileInTheOrderOfTheirNames) {
   EXPECT_EQ(config.uwb.noise.noise_m, 0.2);
   EXPECT_EQ(config.uwb.device.port, "/dev/uwb");
   EXPECT_EQ(config.log.level, LogLevel::kDebug);
+}
+
+TEST_F(ConfigSources, RefusesAFragmentThatIsNoFileAtOnce) {
+  write("crepesd.yaml", kBase);
+  write("crepesd.d/10-noise.yaml", "uwb: {noise_m: 0.1}\n");
+  ASSERT_EQ(::mkfifo(path("crepesd.d/20-pipe.yaml").c_str(), 0600), 0);
+  EXPECT_EQ(faults(), "crepesd.d/20-pipe.yaml: is not a file");
+
+  fs::remove(path("crepesd.d/20-pipe.yaml"));
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string name = path("crepesd.d/20-socket.yaml");
+  ASSERT_LT(name.size(), sizeof(address.sun_path));
+  name.copy(address.sun_path, name.size());
+  const UniqueFd socket{::socket(AF_UNIX, SOCK_DGRAM, 0)};
+  ASSERT_EQ(::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  EXPECT_EQ(faults(), "crepesd.d/20-socket.yaml: is not a file");
 }
 
 TEST_F(ConfigSources, MergesCamerasByNameAndMembersById) {

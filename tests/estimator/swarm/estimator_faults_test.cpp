@@ -113,6 +113,23 @@ TEST(EstimatorFaults, ANeighborThatPassesFromCameraToCameraIsKept) {
   EXPECT_LT(passing.during.worst_rad, 0.03);
 }
 
+TEST(EstimatorFaults, ATiltOfTheFutureIsForgottenInTheNextPause) {
+  using namespace std::chrono;
+  for (const Duration ahead : {Duration{90ms}, Duration{400ms}, Duration{hours{5} + minutes{54}}}) {
+    EstimatorPair pair(1);
+    pair.run_for(kWarmUp);
+    ASSERT_NE(pair.latest(), nullptr);
+    pair.run_for(EstimatorPair::kTick,
+                 {.peer_report = [ahead](Report& report) { report.tilt.stamp += ahead; }});
+    pair.run_for(3s, {.in_view = false, .peer_is_on = false});
+    pair.run_for(3s);
+
+    EXPECT_NE(pair.status().reason, NoPoseReason::kTiltUnknown);
+    ASSERT_NE(pair.latest(), nullptr) << name_of(pair.status().reason);
+    EXPECT_LT(pair.latest()->error.head<3>().norm(), 0.3);
+  }
+}
+
 /// The same numbers again and again, with stamps that go on.
 auto frozen() {
   return [held = std::optional<ImuSample>()](const ImuSample& sample) mutable {
