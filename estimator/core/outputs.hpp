@@ -188,7 +188,7 @@ struct CalibrationRecord {
 struct TeamRecord {
   Timestamp stamp{};
   std::vector<TeamResidual> residuals;
-  std::vector<EstimatedCalibration> calibrations;
+  std::vector<RobotCalibration> calibrations;
   std::vector<TeamFault> faults;
 };
 
@@ -228,7 +228,7 @@ struct ResidualStatus {
 
 /// A robot as the team's filter knows it.
 struct TeamRobotStatus {
-  EstimatedCalibration calibration;
+  RobotCalibration calibration;
   std::array<ResidualStatus, kTeamResidualKindCount> residuals{};  ///< of what it measured
   std::vector<TeamFault> faults;
 };

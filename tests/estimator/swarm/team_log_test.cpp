@@ -15,7 +15,7 @@ class Log : public testing::Test {
  protected:
   void add(std::vector<TeamResidual> residuals, std::vector<TeamFault> faults = {}) {
     now_ += 100ms;
-    EstimatedCalibration calibration;
+    RobotCalibration calibration;
     calibration.robot = kRobot;
     log_.add({.stamp = now_,
               .poses = {},
