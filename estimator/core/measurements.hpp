@@ -144,7 +144,8 @@ struct TeamPose {
   Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
   /// Of [p, v, theta], theta a right perturbation.
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
-  Timestamp last_sighting{};  ///< when anybody saw it, or it anybody
+  /// When anybody saw it, or it anybody, or ranges of robots that are seen located it.
+  Timestamp last_sighting{};
   Duration clock_ahead{};     ///< its sensors' stamps are so much ahead of this robot's
 };
 

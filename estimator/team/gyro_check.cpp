@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -42,10 +43,12 @@ struct Direction {
 struct Change {
   Direction first;
   Direction second;
-  Eigen::Matrix2d turn;              ///< from the second's plane to the first's
+  Eigen::Matrix2d turn;  ///< from the second's plane to the first's
+  TeamRow first_row;
+  TeamRow row;                       ///< of the difference
+  double time_s = 0.0;               ///< between the halves
   Eigen::Matrix2d first_covariance;  ///< of the first's residual
   Eigen::Matrix2d covariance;        ///< of the difference of the residuals
-  double time_s = 0.0;               ///< between the halves
 
   [[nodiscard]] Eigen::Vector2d residual(const Eigen::Matrix3d& R) const {
     return turn * second.residual(R) - first.residual(R);
@@ -111,8 +114,10 @@ Direction direction_of(const SightModel& model, const Eigen::Vector2d& residual)
           .across = model.across()};
 }
 
+/// By the noise of its measurements alone.
 std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajectories& paths,
-                                const TeamBelief& belief, const Sight& sight) {
+                                const InstantStates& states, const TeamBelief& belief,
+                                const Sight& sight) {
   const std::size_t count = sight.bearings.size() / 2;
   if (count == 0) return std::nullopt;
   std::vector<const Bearing*> sorted = sight.bearings;
@@ -124,9 +129,13 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   const double t2_s = second.time_s(interval.from);
   if (t2_s - t1_s < kLeastTime) return std::nullopt;
 
-  const TeamPair pair{belief.robots.at(sight.observer), belief.robots.at(sight.neighbor),
-                      *interval.member(sight.observer), *interval.member(sight.neighbor),
-                      paths.at(sight.observer),         paths.at(sight.neighbor)};
+  const TeamPair pair{belief.robots.at(sight.observer),
+                      belief.robots.at(sight.neighbor),
+                      *interval.member(sight.observer),
+                      *interval.member(sight.neighbor),
+                      paths.at(sight.observer),
+                      paths.at(sight.neighbor),
+                      states};
   const TeamCamera& camera = pair.observer.cameras[sight.camera];
   const auto before = SightModel::at(pair, camera, t1_s, sight.sigma_rad());
   const auto after = SightModel::at(pair, camera, t2_s, sight.sigma_rad());
@@ -145,9 +154,11 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   return Change{.first = direction_of(*before, *r1),
                 .second = direction_of(*after, *r2),
                 .turn = turn,
-                .first_covariance = before->row().covariance(belief.P),
-                .covariance = row.covariance(belief.P),
-                .time_s = t2_s - t1_s};
+                .first_row = before->row(),
+                .row = row,
+                .time_s = t2_s - t1_s,
+                .first_covariance = before->row().variance * Eigen::Matrix2d::Identity(),
+                .covariance = row.variance * Eigen::Matrix2d::Identity()};
 }
 
 /// The turn of the camera that explains the first half.
@@ -168,25 +179,63 @@ struct CameraTurn {
   }
 };
 
-std::optional<GyroContradiction> contradiction(std::span<const Change> changes) {
-  const CameraTurn turn(changes);
+/// What the changes of all that a robot sees say together.
+struct Evidence {
   std::ptrdiff_t unlikely = 0;
   double sum = 0.0;
-  LeastSquares rate(kAnyRate);
-  for (const Change& change : changes) {
-    const Eigen::Vector2d residual = change.residual(turn.R);
-    const Matrix23 by_turn = change.by_turn();
-    const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
-    const double chi2 = residual.dot(S.llt().solve(residual));
-    unlikely += chi2 > kUnlikely ? 1 : 0;
-    sum += chi2;
-    rate.add(residual, S, change.by_rate());
+  LeastSquares rate{kAnyRate};
+
+  explicit Evidence(std::span<const Change> changes) {
+    const CameraTurn turn(changes);
+    for (const Change& change : changes) {
+      const Eigen::Vector2d residual = change.residual(turn.R);
+      const Matrix23 by_turn = change.by_turn();
+      const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
+      const double chi2 = residual.dot(S.llt().solve(residual));
+      unlikely += chi2 > kUnlikely ? 1 : 0;
+      sum += chi2;
+      rate.add(residual, S, change.by_rate());
+    }
   }
-  const Eigen::Vector3d mean = rate.mean();
-  const double explained = rate.weighed.dot(mean);
-  const bool is_common = unlikely >= 2 && 2 * unlikely > std::ssize(changes);
-  if (!is_common || explained <= kExplained * sum) return std::nullopt;
+  [[nodiscard]] bool is_common(std::ptrdiff_t changes) const {
+    return unlikely >= 2 && 2 * unlikely > changes;
+  }
+};
+
+std::optional<GyroContradiction> contradiction(std::span<const Change> changes) {
+  const Evidence evidence(changes);
+  const Eigen::Vector3d mean = evidence.rate.mean();
+  const double explained = evidence.rate.weighed.dot(mean);
+  if (!evidence.is_common(std::ssize(changes)) || explained <= kExplained * evidence.sum)
+    return std::nullopt;
   return GyroContradiction{.chi2 = explained, .rate_radps = mean.norm()};
+}
+
+/// Of what a gyroscope reads, by its biases and scale errors.
+Eigen::Matrix3d rate_covariance(const TeamBelief& belief, const TeamRobot& robot,
+                                const TeamMember& member) {
+  Eigen::Vector4d by = Eigen::Vector4d::Unit(0);
+  for (const ImuMean& mean : member.imu)
+    by.tail<3>() += mean.gyro_radps / static_cast<double>(member.imu.size());
+  constexpr std::array<int, 4> kParts{0, 6, 9, 12};
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (std::size_t a = 0; a < kParts.size(); ++a) {
+    for (std::size_t b = 0; b < kParts.size(); ++b)
+      covariance +=
+          by(Eigen::Index(a)) * by(Eigen::Index(b)) *
+          belief.P.block<3, 3>(robot.bias_index + kParts[a], robot.bias_index + kParts[b]);
+  }
+  return covariance;
+}
+
+/// Adds what the belief does not know.
+void add_belief(const TeamInstant& instant, const Eigen::Matrix3d& of_rate,
+                std::span<Change> changes) {
+  for (Change& change : changes) {
+    change.first_covariance = change.first_row.covariance(instant.covariance());
+    change.covariance = change.row.covariance(instant.covariance()) +
+                        change.by_rate() * of_rate * change.by_rate().transpose();
+  }
 }
 
 }  // namespace
@@ -194,13 +243,23 @@ std::optional<GyroContradiction> contradiction(std::span<const Change> changes) 
 std::map<RobotId, GyroContradiction> gyro_contradictions(const TeamInterval& interval,
                                                          const TeamTrajectories& paths,
                                                          const TeamBelief& belief) {
+  const double middle_s = 0.5 * to_seconds(interval.to - interval.from);
+  const InstantStates states(belief, middle_s);
   std::map<RobotId, std::vector<Change>> changes;
   for (const Sight& sight : all_sights(interval, belief)) {
-    if (const auto change = change_of(interval, paths, belief, sight))
+    if (const auto change = change_of(interval, paths, states, belief, sight))
       changes[sight.observer].push_back(*change);
   }
+  // What their noise explains needs no covariance of the whole team.
+  std::erase_if(changes, [](const auto& entry) {
+    return !Evidence(entry.second).is_common(std::ssize(entry.second));
+  });
   std::map<RobotId, GyroContradiction> contradictions;
-  for (const auto& [robot, seen] : changes) {
+  if (changes.empty()) return contradictions;
+  const TeamInstant instant(belief, paths, middle_s);
+  for (auto& [robot, seen] : changes) {
+    add_belief(instant, rate_covariance(belief, belief.robots.at(robot), *interval.member(robot)),
+               seen);
     if (const auto found = contradiction(seen)) contradictions.emplace(robot, *found);
   }
   return contradictions;

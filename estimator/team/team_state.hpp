@@ -55,6 +55,7 @@ struct TeamRobot {
   int bias_index = 0;
   std::vector<TeamCamera> cameras{};
   Timestamp last_sighting{};
+  Timestamp last_fix{};  ///< in the dark, by the ranges of robots that are seen
   Timestamp since{};
   /// A robot on probation is corrected by what is measured between it and trusted robots, which are
   /// not.
