@@ -181,9 +181,12 @@ void check_driver(const std::string& key, const CameraConfig& camera, RuleFaults
   if (camera.device.light.exposure_us &&
       *camera.device.light.exposure_us >= kMicroseconds / camera.calibration.rate_hz)
     faults.push_back({key + ".exposure_us", "is longer than a frame at rate_hz"});
-  if (camera.device.driver == CameraDriver::kV4l2 &&
-      camera.device.trigger == CameraTrigger::kHardware)
-    faults.push_back({key + ".trigger", "driver v4l2 has no hardware trigger"});
+  const bool is_kernels = camera.device.driver == CameraDriver::kV4l2 ||
+                          camera.device.driver == CameraDriver::kLibcamera;
+  if (is_kernels && camera.device.trigger == CameraTrigger::kHardware)
+    faults.push_back({key + ".trigger", "drivers v4l2 and libcamera set no hardware trigger"});
+  if (camera.device.driver == CameraDriver::kLibcamera && camera.device.offset != std::array{0, 0})
+    faults.push_back({key + ".offset", "driver libcamera reads out the whole sensor"});
   if (camera.device.driver != CameraDriver::kMindVision) return;
   if (camera.device.light.gain) faults.push_back({key + ".gain", "driver mindvision sets none"});
   if (camera.device.offset != std::array{0, 0})

@@ -4,6 +4,7 @@
 
 #include "drivers/camera/aravis_camera.hpp"
 #include "drivers/camera/image_folder.hpp"
+#include "drivers/camera/libcamera_camera.hpp"
 #include "drivers/camera/mindvision_camera.hpp"
 #include "drivers/camera/v4l2_camera.hpp"
 #include "drivers/camera/watched_camera.hpp"
@@ -18,6 +19,8 @@ Result<std::unique_ptr<Camera>> open_device(const CameraConfig& camera, std::uin
       return open_aravis_camera(camera, index, clock);
     case CameraDriver::kV4l2:
       return open_v4l2_camera(camera, index, clock);
+    case CameraDriver::kLibcamera:
+      return open_libcamera_camera(camera, index, clock);
     case CameraDriver::kMindVision:
       return open_mindvision_camera(camera, index, clock);
     default:

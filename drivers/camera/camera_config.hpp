@@ -12,12 +12,14 @@
 
 namespace crepes {
 
-enum class CameraDriver : std::uint8_t { kNone, kFolder, kAravis, kV4l2, kMindVision };
+/// The program interface of a camera.
+enum class CameraDriver : std::uint8_t { kNone, kFolder, kAravis, kV4l2, kLibcamera, kMindVision };
 inline constexpr std::array kCameraDrivers{
-    Choice{"none", CameraDriver::kNone}, Choice{"folder", CameraDriver::kFolder},
-    Choice{"aravis", CameraDriver::kAravis}, Choice{"v4l2", CameraDriver::kV4l2},
-    Choice{"mindvision", CameraDriver::kMindVision}};
+    Choice{"none", CameraDriver::kNone},           Choice{"folder", CameraDriver::kFolder},
+    Choice{"aravis", CameraDriver::kAravis},       Choice{"v4l2", CameraDriver::kV4l2},
+    Choice{"libcamera", CameraDriver::kLibcamera}, Choice{"mindvision", CameraDriver::kMindVision}};
 
+/// What starts an exposure.
 enum class CameraTrigger : std::uint8_t { kFree, kHardware };
 inline constexpr std::array kCameraTriggers{Choice{"free", CameraTrigger::kFree},
                                             Choice{"hardware", CameraTrigger::kHardware}};
@@ -44,7 +46,8 @@ struct CameraDeviceConfig {
     v.field("folder", folder, "driver folder: the directory of pictures, with data.csv beside it");
     v.field("device", id,
             "aravis: id from `crepesctl devices`, or address; v4l2: best a name under "
-            "/dev/v4l/by-id; mindvision: serial number; if omitted: the only device");
+            "/dev/v4l/by-id; libcamera: id from `crepesctl devices`; mindvision: serial number; if "
+            "omitted: the only device");
     v.field("exposure_us", light.exposure_us, Bounds{1, 100000},
             "exposure time, shorter than a frame; if omitted: the device's setting (live)");
     v.field("gain", light.gain, Bounds{0, 1000},

@@ -28,4 +28,19 @@ inline void narrow_to_8_bits(std::span<const std::uint8_t> rows, int width, int 
   }
 }
 
+/// Writes the upper 8 bits of each level of rows in MIPI CSI-2's packing to `grey`, without
+/// padding: of `group` pixels, first their upper bytes, then one byte with all lower bits. `rows`
+/// as above.
+inline void unpack_upper_bytes(std::span<const std::uint8_t> rows, int width, int height,
+                               std::size_t stride, std::size_t group,
+                               std::vector<std::uint8_t>& grey) {
+  const auto columns = static_cast<std::size_t>(width);
+  grey.resize(columns * static_cast<std::size_t>(height));
+  for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+    const std::uint8_t* in = &rows[y * stride];
+    std::uint8_t* out = &grey[y * columns];
+    for (std::size_t x = 0; x < columns; ++x) out[x] = in[x + x / group];
+  }
+}
+
 }  // namespace crepes

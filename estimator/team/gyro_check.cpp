@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "estimator/core/quantile.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -43,12 +44,10 @@ struct Direction {
 struct Change {
   Direction first;
   Direction second;
-  Eigen::Matrix2d turn;  ///< from the second's plane to the first's
-  TeamRow first_row;
-  TeamRow row;                       ///< of the difference
-  double time_s = 0.0;               ///< between the halves
+  Eigen::Matrix2d turn;              ///< from the second's plane to the first's
   Eigen::Matrix2d first_covariance;  ///< of the first's residual
   Eigen::Matrix2d covariance;        ///< of the difference of the residuals
+  double time_s = 0.0;               ///< between the halves
 
   [[nodiscard]] Eigen::Vector2d residual(const Eigen::Matrix3d& R) const {
     return turn * second.residual(R) - first.residual(R);
@@ -85,12 +84,6 @@ struct Half {
   }
 };
 
-double middle_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// The median in each component, so that single false bearings do not count.
 std::optional<Eigen::Vector2d> median_residual(const TeamPair& pair, const TeamCamera& camera,
                                                const SightModel& model, const Half& half,
@@ -103,7 +96,7 @@ std::optional<Eigen::Vector2d> median_residual(const TeamPair& pair, const TeamC
     x.push_back(residual->x());
     y.push_back(residual->y());
   }
-  return Eigen::Vector2d(middle_of(x), middle_of(y));
+  return Eigen::Vector2d(upper_median(x), upper_median(y));
 }
 
 Direction direction_of(const SightModel& model, const Eigen::Vector2d& residual) {
@@ -114,9 +107,25 @@ Direction direction_of(const SightModel& model, const Eigen::Vector2d& residual)
           .across = model.across()};
 }
 
-/// By the noise of its measurements alone.
+/// Of what a gyroscope reads, by its biases and scale errors.
+Eigen::Matrix3d rate_covariance(const TeamBelief& belief, const TeamRobot& robot,
+                                const TeamMember& member) {
+  Eigen::Vector4d by = Eigen::Vector4d::Unit(0);
+  for (const ImuMean& mean : member.imu)
+    by.tail<3>() += mean.gyro_radps / static_cast<double>(member.imu.size());
+  constexpr std::array<int, 4> kParts{0, 6, 9, 12};  // the bias, and the scale's columns
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (std::size_t a = 0; a < kParts.size(); ++a) {
+    for (std::size_t b = 0; b < kParts.size(); ++b)
+      covariance +=
+          by(Eigen::Index(a)) * by(Eigen::Index(b)) *
+          belief.P.block<3, 3>(robot.bias_index + kParts[a], robot.bias_index + kParts[b]);
+  }
+  return covariance;
+}
+
 std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajectories& paths,
-                                const InstantStates& states, const TeamBelief& belief,
+                                const TeamInstant& instant, const TeamBelief& belief,
                                 const Sight& sight) {
   const std::size_t count = sight.bearings.size() / 2;
   if (count == 0) return std::nullopt;
@@ -135,7 +144,7 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
                       *interval.member(sight.neighbor),
                       paths.at(sight.observer),
                       paths.at(sight.neighbor),
-                      states};
+                      instant.states()};
   const TeamCamera& camera = pair.observer.cameras[sight.camera];
   const auto before = SightModel::at(pair, camera, t1_s, sight.sigma_rad());
   const auto after = SightModel::at(pair, camera, t2_s, sight.sigma_rad());
@@ -151,14 +160,17 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   row.H.leftCols(row.size) =
       (turn * row.H.leftCols(row.size)).eval() - before->row().H.leftCols(row.size);
   row.variance += before->row().variance;
-  return Change{.first = direction_of(*before, *r1),
+  Change change{.first = direction_of(*before, *r1),
                 .second = direction_of(*after, *r2),
                 .turn = turn,
-                .first_row = before->row(),
-                .row = row,
-                .time_s = t2_s - t1_s,
-                .first_covariance = before->row().variance * Eigen::Matrix2d::Identity(),
-                .covariance = row.variance * Eigen::Matrix2d::Identity()};
+                .first_covariance = before->row().covariance(instant.covariance()),
+                .covariance = row.covariance(instant.covariance()),
+                .time_s = t2_s - t1_s};
+  // The instant has no part of the gyroscope's errors from the first half to the second.
+  change.covariance += change.by_rate() *
+                       rate_covariance(belief, pair.observer, pair.observer_arms) *
+                       change.by_rate().transpose();
+  return change;
 }
 
 /// The turn of the camera that explains the first half.
@@ -179,90 +191,42 @@ struct CameraTurn {
   }
 };
 
-/// What the changes of all that a robot sees say together.
-struct Evidence {
+GyroCheck check_of(std::span<const Change> changes) {
+  const CameraTurn turn(changes);
   std::ptrdiff_t unlikely = 0;
-  double sum = 0.0;
-  LeastSquares rate{kAnyRate};
-
-  explicit Evidence(std::span<const Change> changes) {
-    const CameraTurn turn(changes);
-    for (const Change& change : changes) {
-      const Eigen::Vector2d residual = change.residual(turn.R);
-      const Matrix23 by_turn = change.by_turn();
-      const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
-      const double chi2 = residual.dot(S.llt().solve(residual));
-      unlikely += chi2 > kUnlikely ? 1 : 0;
-      sum += chi2;
-      rate.add(residual, S, change.by_rate());
-    }
+  GyroCheck check;
+  LeastSquares rate(kAnyRate);
+  for (const Change& change : changes) {
+    const Eigen::Vector2d residual = change.residual(turn.R);
+    const Matrix23 by_turn = change.by_turn();
+    const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
+    const double chi2 = residual.dot(S.llt().solve(residual));
+    unlikely += chi2 > kUnlikely ? 1 : 0;
+    check.chi2 += chi2;
+    check.dimension += 2;
+    rate.add(residual, S, change.by_rate());
   }
-  [[nodiscard]] bool is_common(std::ptrdiff_t changes) const {
-    return unlikely >= 2 && 2 * unlikely > changes;
-  }
-};
-
-std::optional<GyroContradiction> contradiction(std::span<const Change> changes) {
-  const Evidence evidence(changes);
-  const Eigen::Vector3d mean = evidence.rate.mean();
-  const double explained = evidence.rate.weighed.dot(mean);
-  if (!evidence.is_common(std::ssize(changes)) || explained <= kExplained * evidence.sum)
-    return std::nullopt;
-  return GyroContradiction{.chi2 = explained, .rate_radps = mean.norm()};
-}
-
-/// Of what a gyroscope reads, by its biases and scale errors.
-Eigen::Matrix3d rate_covariance(const TeamBelief& belief, const TeamRobot& robot,
-                                const TeamMember& member) {
-  Eigen::Vector4d by = Eigen::Vector4d::Unit(0);
-  for (const ImuMean& mean : member.imu)
-    by.tail<3>() += mean.gyro_radps / static_cast<double>(member.imu.size());
-  constexpr std::array<int, 4> kParts{0, 6, 9, 12};
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  for (std::size_t a = 0; a < kParts.size(); ++a) {
-    for (std::size_t b = 0; b < kParts.size(); ++b)
-      covariance +=
-          by(Eigen::Index(a)) * by(Eigen::Index(b)) *
-          belief.P.block<3, 3>(robot.bias_index + kParts[a], robot.bias_index + kParts[b]);
-  }
-  return covariance;
-}
-
-/// Adds what the belief does not know.
-void add_belief(const TeamInstant& instant, const Eigen::Matrix3d& of_rate,
-                std::span<Change> changes) {
-  for (Change& change : changes) {
-    change.first_covariance = change.first_row.covariance(instant.covariance());
-    change.covariance = change.row.covariance(instant.covariance()) +
-                        change.by_rate() * of_rate * change.by_rate().transpose();
-  }
+  const Eigen::Vector3d mean = rate.mean();
+  const double explained = rate.weighed.dot(mean);
+  const bool is_common = unlikely >= 2 && 2 * unlikely > std::ssize(changes);
+  if (is_common && explained > kExplained * check.chi2)
+    check.contradiction = {.chi2 = explained, .rate_radps = mean.norm()};
+  return check;
 }
 
 }  // namespace
 
-std::map<RobotId, GyroContradiction> gyro_contradictions(const TeamInterval& interval,
-                                                         const TeamTrajectories& paths,
-                                                         const TeamBelief& belief) {
-  const double middle_s = 0.5 * to_seconds(interval.to - interval.from);
-  const InstantStates states(belief, middle_s);
+std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
+                                         const TeamTrajectories& paths, const TeamBelief& belief) {
+  const TeamInstant instant(belief, paths, 0.5 * to_seconds(interval.to - interval.from));
   std::map<RobotId, std::vector<Change>> changes;
   for (const Sight& sight : all_sights(interval, belief)) {
-    if (const auto change = change_of(interval, paths, states, belief, sight))
+    if (const auto change = change_of(interval, paths, instant, belief, sight))
       changes[sight.observer].push_back(*change);
   }
-  // What their noise explains needs no covariance of the whole team.
-  std::erase_if(changes, [](const auto& entry) {
-    return !Evidence(entry.second).is_common(std::ssize(entry.second));
-  });
-  std::map<RobotId, GyroContradiction> contradictions;
-  if (changes.empty()) return contradictions;
-  const TeamInstant instant(belief, paths, middle_s);
-  for (auto& [robot, seen] : changes) {
-    add_belief(instant, rate_covariance(belief, belief.robots.at(robot), *interval.member(robot)),
-               seen);
-    if (const auto found = contradiction(seen)) contradictions.emplace(robot, *found);
-  }
-  return contradictions;
+  std::map<RobotId, GyroCheck> checks;
+  for (const auto& [robot, seen] : changes) checks.emplace(robot, check_of(seen));
+  return checks;
 }
 
 }  // namespace crepes

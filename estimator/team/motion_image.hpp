@@ -10,13 +10,15 @@ namespace crepes {
 
 /// The error of a robot's motion as a sum of products with runs of states.
 struct MotionImage {
+  /// The product with a run of states.
   struct Part {
     int from = 0;  ///< the first of the states
+    /// The derivative by them.
     Eigen::Matrix<double, FreeMotionAt::kMotion, Eigen::Dynamic, 0, FreeMotionAt::kMotion,
                   FreeMotionAt::kBias>
         by;
   };
-  std::vector<Part> parts;
+  std::vector<Part> parts;  ///< which are added
 };
 
 /// Nine columns an image. If the columns of `P` are the covariances of something with all states,

@@ -16,13 +16,13 @@ namespace {
 
 constexpr int kMotion = FreeMotionAt::kMotion;
 constexpr int kBias = FreeMotionAt::kBias;
-// A pair's range bias is mostly its modules' antenna delays, the same toward everybody: so much of
-// its variance. The rest is the pair's own, and drifts.
+// The share of a pair's range-bias variance that its two modules' antenna delays explain. A delay
+// is the same in all pairs of a module. The rest belongs to the pair alone, and drifts.
 constexpr double kShareOfModules = 0.8;
-// An accelerometer's scale errors act as a bias that changes while the robot turns, and keeps its
-// direction for so long.
+// An accelerometer's scale errors act as a bias that changes while the robot turns. This is its
+// correlation time.
 constexpr double kTurnMemory = 1.0;  // s
-// What the mesh's clocks leave.
+// Errors of the clock offsets that the mesh estimates.
 constexpr double kClockSigma = 3e-3;  // s
 constexpr double kClockWalk = 1e-4;   // s/sqrt(s)
 
@@ -222,26 +222,73 @@ TeamPose TeamBelief::team_pose(RobotId id, const TeamMember& member) const {
   const Eigen::Vector3d a = robot.motion.q_F_B * (last.accel_mps2 - robot.bias.accel_mps2);
   const Eigen::Vector3d v = robot.motion.v_F + tau * a;
 
+  // Of [motion, biases of this robot and of the other], by the states and the clock.
+  constexpr int kBiases = TeamPose::kBiases;
   using Matrix9d = Eigen::Matrix<double, kMotion, kMotion>;
   Matrix9d by_motion = Matrix9d::Identity();
   by_motion.block<3, 3>(0, 3).diagonal().setConstant(tau);
   by_motion.block<3, 3>(6, 6) = so3_exp(-tau * w).toRotationMatrix();
   Eigen::Matrix<double, kMotion, 1> by_clock;
   by_clock << v, a, w;
-  const Matrix9d of_motion = P.block<kMotion, kMotion>(robot.motion_index, robot.motion_index);
+  const int motion = robot.motion_index;
+  const int clock = robot.clock_index();
+  const std::array<int, 2> biases{robots.at(self).bias_index, robot.bias_index};
+  const auto of_biases = [&](Eigen::Index row) {
+    Eigen::Matrix<double, 1, kBiases> covariance;
+    covariance << P.block<1, 6>(row, biases[0]), P.block<1, 6>(row, biases[1]);
+    return covariance;
+  };
   const Eigen::Matrix<double, kMotion, 1> with_clock =
-      by_motion * P.block<kMotion, 1>(robot.motion_index, robot.clock_index());
-  const Matrix9d carried = by_motion.lazyProduct(of_motion);
-  Matrix9d covariance = carried.lazyProduct(by_motion.transpose());
-  covariance += with_clock * by_clock.transpose() + by_clock * with_clock.transpose() +
-                P(robot.clock_index(), robot.clock_index()) * by_clock * by_clock.transpose();
-  return {.neighbor = id,
-          .T_B_N = {robot.motion.p_F + tau * robot.motion.v_F + 0.5 * tau * tau * a,
-                    (robot.motion.q_F_B * so3_exp(tau * w)).normalized()},
-          .v_B_N = v,
-          .covariance = 0.5 * (covariance + covariance.transpose()),
-          .last_sighting = std::max(robot.last_sighting, robot.last_fix),
-          .clock_ahead = from_seconds(tau)};
+      by_motion * P.block<kMotion, 1>(motion, clock);
+  const Matrix9d carried = by_motion.lazyProduct(P.block<kMotion, kMotion>(motion, motion));
+  Matrix9d of_motion = carried.lazyProduct(by_motion.transpose());
+  of_motion += with_clock * by_clock.transpose() + by_clock * with_clock.transpose() +
+               P(clock, clock) * by_clock * by_clock.transpose();
+  Eigen::Matrix<double, kMotion, kBiases> with_biases;
+  for (int i = 0; i < kMotion; ++i) with_biases.row(i) = of_biases(motion + i);
+  with_biases = (by_motion * with_biases + by_clock * of_biases(clock)).eval();
+
+  TeamPose pose{.neighbor = id,
+                .T_B_N = {robot.motion.p_F + tau * robot.motion.v_F + 0.5 * tau * tau * a,
+                          (robot.motion.q_F_B * so3_exp(tau * w)).normalized()},
+                .v_B_N = v,
+                .last_sighting = std::max(robot.last_sighting, robot.last_fix),
+                .clock_ahead = from_seconds(tau)};
+  pose.covariance.topLeftCorner<kMotion, kMotion>() = 0.5 * (of_motion + of_motion.transpose());
+  pose.covariance.topRightCorner<kMotion, kBiases>() = with_biases;
+  pose.covariance.bottomLeftCorner<kBiases, kMotion>() = with_biases.transpose();
+  for (int i = 0; i < kBiases; ++i)
+    pose.covariance.bottomRightCorner<kBiases, kBiases>().row(i) =
+        of_biases(biases.at(static_cast<std::size_t>(i / 6)) + i % 6);
+  return pose;
+}
+
+RobotCalibration TeamBelief::calibration(RobotId id) const {
+  const TeamRobot& robot = robots.at(id);
+  const auto sigma = [this](int index) { return std::sqrt(P(index, index)); };
+  const auto sigmas = [this](int index) -> Eigen::Vector3d {
+    return P.diagonal().segment<3>(index).cwiseSqrt();
+  };
+  RobotCalibration calibration{.robot = id,
+                               .is_trusted = robot.is_trusted,
+                               .imu = {.gyro_radps = robot.bias.gyro_radps,
+                                       .accel_mps2 = robot.bias.accel_mps2,
+                                       .gyro_scale = robot.bias.gyro_scale,
+                                       .gyro_sigma_radps = sigmas(robot.bias_index),
+                                       .accel_sigma_mps2 = sigmas(robot.bias_index + 3)},
+                               .antenna_delay_m = robot.antenna_delay_m,
+                               .antenna_delay_sigma_m = sigma(robot.delay_index()),
+                               .clock_s = robot.clock_s,
+                               .clock_sigma_s = sigma(robot.clock_index()),
+                               .cameras = {}};
+  for (int i = 0; i < 3; ++i)
+    calibration.imu.gyro_scale_sigma.col(i) = sigmas(robot.bias_index + 6 + 3 * i);
+  for (const TeamCamera& camera : robot.cameras) {
+    calibration.cameras.push_back({.p_B_C = camera.p_B_C,
+                                   .rotation = camera.misalignment,
+                                   .covariance = P.block<3, 3>(camera.index, camera.index)});
+  }
+  return calibration;
 }
 
 Eigen::Matrix3d TeamBelief::position_covariance(RobotId from, RobotId to) const {

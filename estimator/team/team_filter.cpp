@@ -15,7 +15,6 @@ namespace {
 // An estimate that starts a robot shares its errors with what follows, so it counts little.
 constexpr double kStartPosition = 0.05;          // m
 constexpr double kStartAttitude = radians(1.0);  // rad
-constexpr double kStartSpeed = 0.3;              // m/s
 constexpr double kUnknownDistance = 0.10;        // m; the least by which a step is judged
 constexpr double kLinear = 0.01;                 // rad, and relative to the distance
 constexpr int kMaxIterations = 4;
@@ -57,33 +56,14 @@ double largest_step(const std::map<RobotId, TeamRobot>& robots, const Eigen::Vec
   return largest;
 }
 
-TeamPose distant_pose(RobotId id, const GaussianPose& T_S_N, const Eigen::Vector3d& v_S_N,
-                      Timestamp stamp) {
-  TeamPose pose{.neighbor = id, .T_B_N = T_S_N.pose, .v_B_N = v_S_N};
-  pose.last_sighting = stamp;
-  const Matrix6d& covariance = T_S_N.covariance;
-  pose.covariance.topLeftCorner<3, 3>() = covariance.topLeftCorner<3, 3>();
-  pose.covariance.topRightCorner<3, 3>() = covariance.topRightCorner<3, 3>();
-  pose.covariance.bottomLeftCorner<3, 3>() = covariance.bottomLeftCorner<3, 3>();
-  pose.covariance.bottomRightCorner<3, 3>() = covariance.bottomRightCorner<3, 3>();
-  pose.covariance.diagonal().segment<3>(3).setConstant(kStartSpeed * kStartSpeed);
-  return pose;
-}
-
-ImuBiasEstimate unknown_bias(RobotId id, const Priors& priors) {
-  ImuBiasEstimate bias{.robot = id};
-  bias.gyro_sigma_radps = priors.gyro_bias_radps;
-  bias.accel_sigma_mps2 = std::sqrt(accel_bias_variance(priors));
-  return bias;
-}
-
 }  // namespace
 
 TeamSolution TeamFilter::step(const TeamInterval& interval) {
   if (interval.member(interval.self) == nullptr || interval.to <= interval.from) {
     belief_.robots.clear();
-    return {.stamp = interval.to, .poses = {}, .biases = {}, .faults = {}};
+    return {.stamp = interval.to, .poses = {}, .calibrations = {}, .residuals = {}, .faults = {}};
   }
+  residuals_.clear();
   if (belief_.robots.empty() || interval.self != belief_.self || interval.from != belief_.stamp)
     belief_ = TeamBelief::beginning(interval);
   remove_members(interval);
@@ -92,7 +72,12 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
   belief_.append_range_biases(interval);
   if (!correct(interval)) belief_ = TeamBelief::beginning(interval);
   belief_.advance(interval);
-  TeamSolution solution{.stamp = belief_.stamp, .poses = {}, .biases = {}, .faults = {}};
+  estimates_.add(interval, belief_);
+  TeamSolution solution{.stamp = belief_.stamp,
+                        .poses = {},
+                        .calibrations = {},
+                        .residuals = residuals_,
+                        .faults = {}};
   add_members(interval, exchange_member(interval), solution);
   report(interval, solution);
   return solution;
@@ -102,8 +87,11 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
 /// So have robots with false ranges, and this robot's own gyroscope, if it was false.
 void TeamFilter::remove_members(const TeamInterval& interval) {
   bool has_strained = false;
-  for (const RobotId id : trust_.lost(interval, belief_)) belief_.remove(id);
-  for (const RobotId id : trust_.false_gyros(interval, belief_)) {
+  for (const RobotId id : trust_.lost(interval, belief_)) {
+    has_strained = has_strained || id == belief_.self;
+    if (id != belief_.self) belief_.remove(id);
+  }
+  for (const RobotId id : false_gyros(interval)) {
     has_strained = has_strained || id == belief_.self;
     if (id != belief_.self) belief_.remove(id);
   }
@@ -123,6 +111,22 @@ RobotId TeamFilter::exchange_member(const TeamInterval& interval) {
   return exchange->joins;
 }
 
+/// All robots in the belief have an IMU over the interval.
+std::vector<RobotId> TeamFilter::false_gyros(const TeamInterval& interval) {
+  const auto checks = gyro_checks(interval, belief_.trajectories(interval), belief_);
+  for (const auto& [id, check] : checks) {
+    const bool is_refused = check.contradiction.has_value();
+    residuals_.push_back({.observer = id,
+                          .neighbor = id,
+                          .kind = TeamResidual::Kind::kGyro,
+                          .fused = is_refused ? 0 : 1,
+                          .refused = is_refused ? 1 : 0,
+                          .nis = check.chi2,
+                          .dimension = check.dimension});
+  }
+  return trust_.false_gyros(interval, belief_, checks);
+}
+
 /// For cameras that measure for the first time.
 void TeamFilter::append_cameras(const TeamInterval& interval) {
   const double known = interval.settings.priors.misalignment_rad;
@@ -135,9 +139,10 @@ void TeamFilter::append_cameras(const TeamInterval& interval) {
     if (cameras.size() >= kMaxCameras ||
         std::ranges::find(cameras, p_B_C, &TeamCamera::p_B_C) != cameras.end())
       continue;
-    const auto turn = trust_.turn_covariance(reading.observer, belief_.stamp);
+    const auto turn = trust_.turn_covariance(reading.observer);
     cameras.push_back({.p_B_C = p_B_C,
                        .index = belief_.append(3, known),
+                       .is_free = turn.has_value(),
                        .is_refused = turn && trust_.is_refused(reading.observer)});
     if (turn) belief_.P.bottomRightCorner<3, 3>() = *turn;
   }
@@ -174,7 +179,7 @@ bool TeamFilter::correct(const TeamInterval& interval, Stage stage, TeamReadings
     const TeamTrajectories paths = belief_.trajectories(interval);
     const TeamInstant instant(belief_, paths, time_s);
     if (iteration == 1) {
-      gate(interval, paths, instant, belief_, readings);
+      gate(interval, paths, instant, belief_, readings, residuals_);
       robots = belief_.robots;
       ranges = belief_.ranges;
     }
@@ -229,14 +234,10 @@ std::vector<bool> TeamFilter::corrected_states(Stage stage) const {
 /// `first`, if it is one. When the filter is full, the others are located by their chain of
 /// estimates alone.
 void TeamFilter::add_members(const TeamInterval& interval, RobotId first, TeamSolution& solution) {
-  struct Place {
-    GaussianPose T_S_N;
-    Eigen::Vector3d v_S_N = Eigen::Vector3d::Zero();
-  };
-  std::map<RobotId, Place> places;
-  std::map<RobotId, Place> candidates;
+  std::map<RobotId, TeamPlace> places;
+  std::map<RobotId, TeamPlace> candidates;
   const auto add_candidates_from = [&](RobotId known) {
-    const Place& via = places.at(known);
+    const TeamPlace& via = places.at(known);
     for (const RelativePoseEdge& edge : interval.edges) {
       const bool forward = edge.from == known;
       const RobotId id = forward ? edge.to : edge.from;
@@ -249,70 +250,59 @@ void TeamFilter::add_members(const TeamInterval& interval, RobotId first, TeamSo
       const Eigen::Vector3d v =
           forward ? edge.v_from_to
                   : Eigen::Vector3d(-(edge.T_from_to.pose.R().transpose() * edge.v_from_to));
-      const Place place{via.T_S_N * step, via.v_S_N + via.T_S_N.pose.R() * v};
+      const TeamPlace place = via.beyond(step, v, edge.estimated);
       const auto [best, is_first] = candidates.try_emplace(id, place);
-      if (!is_first && place.T_S_N.covariance.trace() < best->second.T_S_N.covariance.trace())
-        best->second = place;
+      if (!is_first && place.doubt() < best->second.doubt()) best->second = place;
     }
   };
-  for (const auto& [id, robot] : belief_.robots) places[id] = {belief_.pose(id), robot.motion.v_F};
+  for (const auto& [id, robot] : belief_.robots) places[id] = TeamPlace::of(belief_, id);
   for (const auto& [id, robot] : belief_.robots) add_candidates_from(id);
   while (!candidates.empty()) {
-    const auto best = std::ranges::min_element(candidates, {}, [](const auto& candidate) {
-      return candidate.second.T_S_N.covariance.trace();
-    });
+    const auto best = std::ranges::min_element(
+        candidates, {}, [](const auto& candidate) { return candidate.second.doubt(); });
     const auto [id, place] = *best;
     candidates.erase(best);
     places[id] = place;
     const std::size_t reserved = first != RobotId{} && first != id ? 1 : 0;
     if (belief_.robots.size() + reserved < interval.settings.max_robots) {
       if (first == id) first = {};
-      add_member(interval, id, place.T_S_N, place.v_S_N);
+      add_member(interval, id, place);
     } else if (!has_own_edge(interval, id)) {
       // A pair's filter would know it better than a chain of estimates.
-      solution.poses.push_back(distant_pose(id, place.T_S_N, place.v_S_N, belief_.stamp));
-      solution.biases.push_back(unknown_bias(id, interval.settings.priors));
+      solution.poses.push_back(place.pose(id, belief_, interval.settings.priors));
     }
     add_candidates_from(id);
   }
 }
 
-void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const GaussianPose& T_S_N,
-                            const Eigen::Vector3d& v_S_N) {
+void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const TeamPlace& place) {
   TeamRobot& robot = belief_.robots[id];
-  robot.motion = {T_S_N.pose.p, v_S_N, T_S_N.pose.q};
+  robot.motion = {place.T_S_N.p, place.v_S_N, place.T_S_N.q};
   const double doubt = trust_.doubt(id, belief_.stamp);
-  robot.motion_index = belief_.append(FreeMotionAt::kMotion, doubt * kStartSpeed);
+  robot.motion_index = belief_.append(FreeMotionAt::kMotion, 0.0);
   auto block = belief_.P.bottomRightCorner<FreeMotionAt::kMotion, FreeMotionAt::kMotion>();
-  const Matrix6d& covariance = T_S_N.covariance;
-  block.topLeftCorner<3, 3>() = covariance.topLeftCorner<3, 3>();
-  block.topLeftCorner<3, 3>().diagonal().array() += std::pow(doubt * kStartPosition, 2);
-  block.topRightCorner<3, 3>() = covariance.topRightCorner<3, 3>();
-  block.bottomLeftCorner<3, 3>() = covariance.bottomLeftCorner<3, 3>();
-  block.bottomRightCorner<3, 3>() = covariance.bottomRightCorner<3, 3>();
-  block.bottomRightCorner<3, 3>().diagonal().array() += std::pow(doubt * kStartAttitude, 2);
-  if (const auto turn = trust_.turn_covariance(id, belief_.stamp))
-    block.bottomRightCorner<3, 3>() += *turn;
+  block = place.covariance;
+  block.diagonal().head<3>().array() += std::pow(doubt * kStartPosition, 2);
+  block.diagonal().segment<3>(3).array() +=
+      (doubt * doubt - 1.0) * std::pow(TeamPlace::kSpeedSigma, 2);
+  block.diagonal().tail<3>().array() += std::pow(doubt * kStartAttitude, 2);
+  if (const auto turn = trust_.turn_covariance(id)) block.bottomRightCorner<3, 3>() += *turn;
   robot.bias_index = belief_.append_calibration(interval.settings.priors);
-  robot.last_sighting = belief_.stamp;
+  robot.last_sighting = place.last_sighting;
   robot.since = belief_.stamp;
 }
 
 void TeamFilter::report(const TeamInterval& interval, TeamSolution& solution) const {
   for (const auto& [id, robot] : belief_.robots) {
-    const auto sigma = [&](int index) {
-      return std::sqrt(belief_.P.diagonal().segment<3>(index).mean());
-    };
-    solution.biases.push_back({id, robot.bias.gyro_radps, robot.bias.accel_mps2,
-                               robot.bias.gyro_scale, sigma(robot.bias_index),
-                               sigma(robot.bias_index + 3)});
     // On probation it is known worse than by its pair's filter, if there is one.
     if (robot.motion_index < 0 || (!robot.is_trusted && has_own_edge(interval, id))) continue;
     solution.poses.push_back(belief_.team_pose(id, *interval.member(id)));
   }
   std::ranges::sort(solution.poses, {}, &TeamPose::neighbor);
-  solution.faults = faults_of(belief_, interval.settings.priors);
+  solution.calibrations = calibrations_of(belief_, interval.settings.priors);
+  solution.faults = faults_of(belief_, solution.calibrations);
   for (const TeamFault& fault : trust_.gyro_faults(interval.from)) solution.faults.push_back(fault);
+  for (const TeamFault& fault : estimates_.faults()) solution.faults.push_back(fault);
 }
 
 }  // namespace crepes

@@ -3,8 +3,10 @@
 
 #include <vector>
 
+#include "estimator/team/estimate_check.hpp"
 #include "estimator/team/team_belief.hpp"
 #include "estimator/team/team_links.hpp"
+#include "estimator/team/team_place.hpp"
 #include "estimator/team/team_readings.hpp"
 #include "estimator/team/team_trust.hpp"
 
@@ -37,6 +39,7 @@ class TeamFilter {
   using Stage = TeamReadings::Stage;
 
   void remove_members(const TeamInterval& interval);
+  [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval);
   /// Whoever joins in exchange for another one; RobotId{} if nobody does.
   [[nodiscard]] RobotId exchange_member(const TeamInterval& interval);
   void append_cameras(const TeamInterval& interval);
@@ -45,13 +48,14 @@ class TeamFilter {
   [[nodiscard]] bool correct(const TeamInterval& interval, Stage stage, TeamReadings readings);
   [[nodiscard]] std::vector<bool> corrected_states(Stage stage) const;
   void add_members(const TeamInterval& interval, RobotId first, TeamSolution& solution);
-  void add_member(const TeamInterval& interval, RobotId id, const GaussianPose& T_S_N,
-                  const Eigen::Vector3d& v_S_N);
+  void add_member(const TeamInterval& interval, RobotId id, const TeamPlace& place);
   void report(const TeamInterval& interval, TeamSolution& solution) const;
 
   TeamBelief belief_;
   TeamTrust trust_;
   TeamLinks links_;
+  EstimateCheck estimates_;
+  std::vector<TeamResidual> residuals_;  ///< of the interval
 };
 
 }  // namespace crepes

@@ -17,9 +17,10 @@ class TeamLinks {
   /// Of robots with an IMU over the interval.
   void add(const TeamInterval& interval, const TeamBelief& belief);
 
+  /// Two robots that change places.
   struct Exchange {
-    RobotId leaves{};
-    RobotId joins{};
+    RobotId leaves{};  ///< the filter
+    RobotId joins{};   ///< in its place
   };
   /// The worst connected robot of the belief and the best beyond it, if the latter is clearly
   /// better connected. At most one in two seconds, so that whoever joins can be trusted first.

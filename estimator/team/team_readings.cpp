@@ -11,6 +11,8 @@
 #include <tuple>
 #include <utility>
 
+#include "estimator/relative/range_update.hpp"
+
 namespace crepes {
 namespace {
 
@@ -153,37 +155,87 @@ struct Scene {
   [[nodiscard]] double time_s(Timestamp stamp) const { return to_seconds(stamp - interval.from); }
 };
 
-void gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
+/// Mean residual of readings, of those that were fused if any was.
+class MeanResidual {
+ public:
+  void add(const Eigen::Vector2d& residual, bool fits) {
+    (fits ? fused_ : refused_) += residual;
+    ++(fits ? residual_.fused : residual_.refused);
+  }
+  [[nodiscard]] int count() const {
+    return residual_.fused > 0 ? residual_.fused : residual_.refused;
+  }
+  /// `S` is the covariance of the mean of `count`.
+  [[nodiscard]] TeamResidual of(TeamResidual what, const Eigen::Matrix2d& S, int dimension) const {
+    what.fused = residual_.fused;
+    what.refused = residual_.refused;
+    if (count() == 0) return what;
+    const Eigen::Vector2d mean = (residual_.fused > 0 ? fused_ : refused_) / count();
+    what.dimension = dimension;
+    what.nis = dimension == 2 ? mean.dot(S.llt().solve(mean)) : mean.x() * mean.x() / S(0, 0);
+    for (int i = 0; i < dimension; ++i) {
+      what.residual.at(static_cast<std::size_t>(i)) = mean(i);
+      what.sigma.at(static_cast<std::size_t>(i)) = std::sqrt(S(i, i));
+    }
+    return what;
+  }
+
+ private:
+  Eigen::Vector2d fused_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d refused_ = Eigen::Vector2d::Zero();
+  TeamResidual residual_;
+};
+
+TeamResidual gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
+  TeamResidual found{.observer = sight.observer,
+                     .neighbor = sight.neighbor,
+                     .kind = TeamResidual::Kind::kBearing,
+                     .camera = static_cast<int>(sight.camera)};
   const TeamPair pair = scene.pair(sight.observer, sight.neighbor);
   const auto model = SightModel::at(pair, camera, sight.time_s(scene.interval), sight.sigma_rad());
   if (!model) {
     sight.bearings.clear();
-    return;
+    return found;
   }
-  const Eigen::LLT<Eigen::Matrix2d> S(model->row().covariance(scene.instant.covariance()));
+  const Eigen::Matrix2d S = model->row().covariance(scene.instant.covariance());
+  const Eigen::LLT<Eigen::Matrix2d> factors(S);
   Agreement& agreement = camera.agreement[sight.neighbor];
+  MeanResidual mean;
   std::erase_if(sight.bearings, [&](const Bearing* z) {
     const auto residual = model->residual(pair, camera, z->u_B, scene.time_s(z->stamp));
     const bool fits =
-        residual && residual->dot(S.solve(*residual)) <= scene.interval.settings.bearing_gate;
+        residual && residual->dot(factors.solve(*residual)) <= scene.interval.settings.bearing_gate;
     agreement.add(fits);
+    if (residual) mean.add(*residual, fits);
     return !fits;
   });
+  return mean.of(found, S, 2);
 }
 
-void gate(const Scene& scene, TeamRangeBias& bias, Ranging& ranging) {
+TeamResidual gate(const Scene& scene, TeamRangeBias& bias, Ranging& ranging) {
   const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
   const Eigen::Matrix3d covariance =
       scene.belief.position_covariance(ranging.observer, ranging.neighbor);
+  MeanResidual mean;
+  double noise = 0.0;
+  double variance = 0.0;
   std::erase_if(ranging.ranges, [&](const TeamRange* z) {
     const auto row = range_row(pair, bias, z->reading, scene.time_s(z->stamp), covariance);
     if (!row) return true;
     const double residual = row->residual.x();
-    const double variance = row->covariance(scene.instant.covariance())(0, 0);
+    variance = row->covariance(scene.instant.covariance())(0, 0);
+    noise = z->reading.sigma_m * z->reading.sigma_m;
     const bool fits = residual * residual <= scene.interval.settings.range_gate * variance;
     if (!ranging.dark) bias.add(ranging.observer, fits, residual);
+    mean.add({residual, 0.0}, fits);
     return !fits;
   });
+  // The readings' noise is independent, and the mean has less.
+  const double of_mean = variance - noise + noise / std::max(1, mean.count());
+  return mean.of({.observer = ranging.observer,
+                  .neighbor = ranging.neighbor,
+                  .kind = TeamResidual::Kind::kRange},
+                 of_mean * Eigen::Matrix2d::Identity(), 1);
 }
 
 std::optional<TeamRow> mean_of(const Scene& scene, const Sight& sight) {
@@ -205,15 +257,14 @@ std::optional<TeamRow> mean_of(const Scene& scene, const Sight& sight) {
   return row;
 }
 
-/// The mean of what a pair measured may be false, although its gate accepts it: then nothing in it
-/// is information. Mean and variance become those of the mixture (probabilistic data association,
-/// Bar-Shalom and Tse 1975). `S` is the innovation's variance. False if it is more likely false.
+/// The mean range of a pair may be false although the gate accepts it. Mean and variance become
+/// those of the mixture of both cases (probabilistic data association, Bar-Shalom and Tse 1975).
+/// `S` is the innovation's variance. Returns false if the range is more likely false than true.
 bool associate(double S, TeamRow& row) {
-  constexpr double kFalseRanges = 0.05;  // 1/m, as for the pairs' filters
   const double residual = row.residual.x();
   const double nis = residual * residual / S;
   const double density = std::exp(-0.5 * nis) / std::sqrt(2.0 * std::numbers::pi * S);
-  const double is_true = density / (density + kFalseRanges);
+  const double is_true = density / (density + kFalseRangeDensity);
   const double weight = is_true * (1.0 - (1.0 - is_true) * nis);
   if (is_true < 0.5 || weight <= 0.0) return false;
   row.variance += S / weight - S;
@@ -290,10 +341,10 @@ std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& be
 }
 
 void gate(const TeamInterval& interval, const TeamTrajectories& paths, const TeamInstant& instant,
-          TeamBelief& belief, TeamReadings& readings) {
+          TeamBelief& belief, TeamReadings& readings, std::vector<TeamResidual>& residuals) {
   const Scene scene{interval, paths, instant, belief};
   for (Sight& sight : readings.sights) {
-    gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight);
+    residuals.push_back(gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight));
     for (const Bearing* z : sight.bearings) {
       for (const RobotId robot : {sight.observer, sight.neighbor}) {
         Timestamp& last = belief.robots.at(robot).last_sighting;
@@ -302,7 +353,8 @@ void gate(const TeamInterval& interval, const TeamTrajectories& paths, const Tea
     }
   }
   for (Ranging& ranging : readings.rangings) {
-    gate(scene, belief.ranges.at(ordered(ranging.observer, ranging.neighbor)), ranging);
+    residuals.push_back(
+        gate(scene, belief.ranges.at(ordered(ranging.observer, ranging.neighbor)), ranging));
     if (ranging.dark && !ranging.ranges.empty())
       belief.robots.at(*ranging.dark).last_fix = interval.to;
   }

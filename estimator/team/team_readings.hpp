@@ -42,6 +42,7 @@ struct TeamReadings {
   std::vector<Sight> sights;
   std::vector<Ranging> rangings;
 
+  /// The readings of an interval that this stage accepts.
   [[nodiscard]] static TeamReadings of(const TeamInterval& interval, const TeamBelief& belief,
                                        Stage stage);
   [[nodiscard]] bool empty() const { return sights.empty() && rangings.empty(); }
@@ -53,9 +54,9 @@ struct TeamReadings {
 [[nodiscard]] std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& belief);
 
 /// Drops readings that are too unlikely. Counts how each camera and pair agrees, and when a robot
-/// was last seen.
+/// was last seen. Appends what was found to `residuals`.
 void gate(const TeamInterval& interval, const TeamTrajectories& paths, const TeamInstant& instant,
-          TeamBelief& belief, TeamReadings& readings);
+          TeamBelief& belief, TeamReadings& readings, std::vector<TeamResidual>& residuals);
 
 /// One row a sight and one a pair's ranges: the mean of what was not gated.
 [[nodiscard]] std::vector<TeamRow> linearized(const TeamInterval& interval,

@@ -3,6 +3,7 @@
     closed_loop.py SOURCE crepesctl
 Fails where the triangle is not held, or was never hidden by the pillar; and where the robots, left to themselves,
 are as good."""
+import contextlib
 import json
 import os
 import pathlib
@@ -16,13 +17,16 @@ MAX_RMS_M = 0.3  # four seeds of 60 s: at most half of it, on a busy machine (co
 
 
 def free_ports():
-    """The first of four that follow one another."""
+    """The first of four that follow one another: three daemons, and the commands."""
     while True:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            first = probe.getsockname()[1]
-        if first < 65000:
-            return first
+        with contextlib.ExitStack() as stack:
+            probes = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(4)]
+            probes[0].bind(("127.0.0.1", 0))
+            first = probes[0].getsockname()[1]
+            with contextlib.suppress(OSError, OverflowError):
+                for further, probe in enumerate(probes[1:], start=1):
+                    probe.bind(("127.0.0.1", first + further))
+                return first
 
 
 def formation(seconds, *more):

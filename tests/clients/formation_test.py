@@ -54,14 +54,14 @@ def pose_of(observer, neighbor):
 class FormationTest(unittest.TestCase):
     def test_followers_reach_their_places_and_keep_them_behind_a_leader_that_moves(self):
         leader = Robot((0.0, 0.0, 1.4), 0.3)
-        for place in formation.PLACES.values():
+        for place, turn in formation.PLACES.values():
             with self.subTest(place=place):
-                self.assertLess(self.worst_error(leader, place, moves=False), 0.01)
-                self.assertLess(self.worst_error(leader, place, moves=True), 0.1)
+                self.assertLess(self.worst_error(leader, place, turn, moves=False), 0.01)
+                self.assertLess(self.worst_error(leader, place, turn, moves=True), 0.1)
 
-    def worst_error(self, leader, place, moves):
+    def worst_error(self, leader, place, turn, moves):
         """In the last twenty of sixty seconds [m]."""
-        control = formation.Follower(place)
+        control = formation.Follower(place, turn)
         robot = Robot([leader.p[0] + 3.0, leader.p[1] + 0.5 * place[1], 1.0], place[2] + 0.4)
         worst = 0.0
         for i in range(6000):
@@ -71,7 +71,7 @@ class FormationTest(unittest.TestCase):
                 robot.command, robot.turn = control.command(pose_of(robot, leader), 0.05)
             leader.step()
             robot.step()
-            want = turned(leader.yaw, (*place[:2], 0.0))
+            want = turned(leader.yaw, place)
             if i >= 4000:
                 worst = max(worst, math.dist(robot.p, [p + w for p, w in zip(leader.p, want)]))
         return worst

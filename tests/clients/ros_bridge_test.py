@@ -107,7 +107,7 @@ class Covariance(unittest.TestCase):
 
         for i in range(3):
             for j in range(3):
-                # 20000 samples tell a variance of at most 1.4e-3 to 1.4e-5 (one sigma); four of them.
+                # 20000 samples determine a variance of at most 1.4e-3 to 1.4e-5 (one sigma); four of them.
                 self.assertAlmostEqual(ros[6 * (3 + i) + 3 + j], spread[i][j], delta=6e-5)
 
     def test_is_symmetric_and_row_by_row(self):
@@ -336,12 +336,12 @@ class TheNode(unittest.TestCase):
     def published(self, connection, *parameters):
         """(topic, message) of all that the node publishes, and what it logs."""
         rclpy._left = 1000
-        told, logged = io.StringIO(), io.StringIO()
+        reported, logged = io.StringIO(), io.StringIO()
         with mock.patch.object(crepes_client, "Connection", connection), \
                 mock.patch.object(sys, "argv", ["bridge", "--ros-args", *parameters]), \
-                contextlib.redirect_stdout(told), contextlib.redirect_stderr(logged):
+                contextlib.redirect_stdout(reported), contextlib.redirect_stderr(logged):
             bridge.main()
-        lines = [json.loads(line) for line in told.getvalue().splitlines()]
+        lines = [json.loads(line) for line in reported.getvalue().splitlines()]
         return [(line["topic"], line["message"]) for line in lines], logged.getvalue()
 
     def test_publishes_pose_odometry_transform_and_diagnostics(self):
@@ -354,6 +354,14 @@ class TheNode(unittest.TestCase):
         self.assertEqual(len(published[3][1]["status"]), 8)
         self.assertEqual(connection.arguments, ("127.0.0.1", 48000))
         self.assertEqual(connection.options, {"rate_hz": 20.0, "poll_s": 1.0})
+
+    def test_takes_whole_numbers_for_rates_too(self):
+        connection = FakeConnection(pose_of())
+
+        self.published(connection, "rate_hz:=20", "diagnostics_period_s:=2")
+
+        self.assertEqual(connection.options, {"rate_hz": 20.0, "poll_s": 2.0})
+        self.assertIsInstance(connection.options["rate_hz"], float)
 
     def test_leaves_out_what_is_not_wanted(self):
         published, _ = self.published(FakeConnection(pose_of()), "publish_odometry:=false")
@@ -396,11 +404,11 @@ class ThePackage(unittest.TestCase):
         self.assertEqual(root.find("export/build_type").text, "ament_python")
 
     def test_installs_where_ros_looks(self):
-        told = subprocess.run([sys.executable, "-B", "-c", "import setuptools, json, runpy\n"
+        reported = subprocess.run([sys.executable, "-B", "-c", "import setuptools, json, runpy\n"
                                "kept = {}\nsetuptools.setup = lambda **words: kept.update(words)\n"
                                "runpy.run_path('setup.py')\nprint(json.dumps(kept))"],
                               cwd=ROS2, capture_output=True, text=True, check=True).stdout
-        words = json.loads(told)
+        words = json.loads(reported)
 
         name = xml.etree.ElementTree.parse(ROS2 / "package.xml").find("name").text
         self.assertEqual(words["name"], name)

@@ -47,8 +47,8 @@ TEST(LedCommand, SetsStoresAndReportsSettings) {
   EXPECT_EQ(board.answer.type, LED_SETTINGS);
   EXPECT_EQ(board.ask(LED_GET, {}), LED_EFFECT_NONE);
 
-  const led_settings told = led_settings_read(board.answer.payload);
-  EXPECT_EQ(bytes_of(told), bytes_of(settings));
+  const led_settings reported = led_settings_read(board.answer.payload);
+  EXPECT_EQ(bytes_of(reported), bytes_of(settings));
   EXPECT_EQ(bytes_of(led_settings_load(&board.board.flash)), bytes_of(settings));
 }
 

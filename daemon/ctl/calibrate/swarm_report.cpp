@@ -10,10 +10,10 @@
 
 #include "config/writing/config_writer.hpp"
 #include "daemon/ctl/calibrate/calibration_report.hpp"
-#include "daemon/ctl/calibrate/camera_report.hpp"
+#include "daemon/ctl/calibrate/camchain.hpp"
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
-#include "estimator/calibration/imu_calibration.hpp"
+#include "estimator/calibration/imu/imu_calibration.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 
@@ -74,6 +74,11 @@ std::string members_part(const SwarmBatchResult& found, const SwarmDataset& data
                     with_delays ? ", range_delay_m: " + to_yaml(robot.range_delay_m) : "");
   }
   return text;
+}
+
+/// The default's bias is of ranges from which no delay was taken off.
+std::string uwb_part(const SwarmBatchResult& found, std::size_t robot) {
+  return fmt::format("uwb: {{bias_sigma_m: {}}}\n", fixed(remaining_range_bias(found, robot), 3));
 }
 
 std::string camera_part(const CameraConstants& constants, const CameraCalibration& camera) {
@@ -177,8 +182,9 @@ std::string calibration_text(const SwarmBatchResult& found, const SwarmDataset& 
                              std::size_t robot) {
   const RobotCalibration& own = found.robots[robot];
   const auto& resolution = dataset.robots[robot].config.cameras.front().calibration.resolution;
-  return camchain_text(own.after.camera, resolution, std::nullopt, "swarm") + imu_part(own) +
-         ranges_part(found, dataset) + members_part(found, dataset, false);
+  return camchain_text(calibration_of(own.after.camera, resolution, std::nullopt), Mounting::kKnown,
+                       "swarm") +
+         imu_part(own) + ranges_part(found, dataset) + members_part(found, dataset, false);
 }
 
 std::string fragment_text(const SwarmBatchResult& found, const SwarmDataset& dataset,
@@ -188,7 +194,8 @@ std::string fragment_text(const SwarmBatchResult& found, const SwarmDataset& dat
                      recording.robot.name) +
          camera_part(found.robots[robot].after.camera,
                      recording.config.cameras.front().calibration) +
-         imu_part(found.robots[robot]) + members_part(found, dataset, true);
+         imu_part(found.robots[robot]) + members_part(found, dataset, true) +
+         uwb_part(found, robot);
 }
 
 std::string swarm_text(const SwarmBatchResult& found, const SwarmDataset& dataset,

@@ -11,6 +11,7 @@
 #include "daemon/ctl/json_line.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/camera/aravis_camera.hpp"
+#include "drivers/camera/libcamera_device.hpp"
 #include "drivers/camera/v4l2_device.hpp"
 #include "drivers/detect_protocol.hpp"
 #include "drivers/serial/serial_port.hpp"
@@ -55,6 +56,8 @@ std::vector<CameraDevice> find_cameras(const DevicesOptions& options) {
   for (FoundCamera& found : find_aravis_cameras()) cameras.push_back({"aravis", std::move(found)});
   for (FoundCamera& found : find_v4l2_cameras(options.dev))
     cameras.push_back({"v4l2", std::move(found)});
+  for (FoundCamera& found : find_libcamera_cameras())
+    cameras.push_back({"libcamera", std::move(found)});
   return cameras;
 }
 

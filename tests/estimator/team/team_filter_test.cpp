@@ -29,11 +29,8 @@ Vector6d error_of(const TeamPose& pose, const Pose& truth) {
 }
 
 double nees_of(const TeamPose& pose, const Pose& truth) {
-  Matrix6d P;
-  P << pose.covariance.topLeftCorner<3, 3>(), pose.covariance.topRightCorner<3, 3>(),
-      pose.covariance.bottomLeftCorner<3, 3>(), pose.covariance.bottomRightCorner<3, 3>();
   const Vector6d e = error_of(pose, truth);
-  return e.dot(P.llt().solve(e));
+  return e.dot(pose.pose_covariance().llt().solve(e));
 }
 
 double position_nees_of(const TeamPose& pose, const Pose& truth) {
@@ -176,6 +173,54 @@ TEST(TeamFilter, ACameraThatWasTurnedFromTheBeginningLeavesTheOthersHonest) {
   }
   EXPECT_LE(beyond, 4);  // of some 4,700
   EXPECT_GE(named, kSeeds - 1);
+}
+
+// Of what each robot measured: the gate's residuals, one row a camera and neighbor, a pair's ranges
+// and a gyroscope.
+TEST(TeamFilter, ResidualsAreAsLargeAsTheirCovarianceSays) {
+  std::map<TeamResidual::Kind, double> nis;
+  std::map<TeamResidual::Kind, double> dimension;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 3.0));
+    for (double t = 0.0; t < 3.0; t += kIntervalSeconds) {
+      const TeamSolution solution = filter.step(team.next());
+      EXPECT_EQ(solution.residuals.size(), 12U + 6U + 4U);
+      for (const TeamResidual& residual : solution.residuals) {
+        nis[residual.kind] += residual.nis;
+        dimension[residual.kind] += residual.dimension;
+      }
+    }
+  }
+  // The noise of a bearing is constant over an interval, and is not between intervals.
+  EXPECT_NEAR(nis[TeamResidual::Kind::kBearing] / dimension[TeamResidual::Kind::kBearing], 1.0,
+              0.1);
+  EXPECT_NEAR(nis[TeamResidual::Kind::kRange] / dimension[TeamResidual::Kind::kRange], 1.0, 0.15);
+  EXPECT_LT(nis[TeamResidual::Kind::kGyro] / dimension[TeamResidual::Kind::kGyro], 1.2);
+}
+
+// Their sum over seeds is as large as their sigmas say.
+TEST(TeamFilter, CalibrationsAreAsGoodAsTheySay) {
+  double nees = 0.0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    const TeamSolution solution = solution_after(team, filter, 5.0);
+    ASSERT_EQ(solution.calibrations.size(), 4U);
+    for (const RobotCalibration& robot : solution.calibrations) {
+      EXPECT_TRUE(robot.is_trusted);
+      ASSERT_EQ(robot.cameras.size(), 1U);
+      const CameraMisalignment& camera = robot.cameras.front();
+      const Eigen::Vector3d error = camera.rotation - team.misalignment(robot.robot);
+      nees += error.dot(camera.covariance.llt().solve(error));
+      ++count;
+      EXPECT_EQ(camera.state, CameraMisalignment::State::kCalibrated);
+      EXPECT_LT(robot.antenna_delay_sigma_m, 0.05);
+    }
+  }
+  EXPECT_NEAR(nees / count, 3.0, 1.2);
 }
 
 TEST(TeamFilter, FindsNoFaultInAHealthyTeam) {
@@ -584,6 +629,41 @@ TEST(TeamFilter, RangesLocateTheTeamForARobotThatSeesNobody) {
   const InTheDark with = in_the_dark(kSelf, 30.0, true);
   EXPECT_EQ(with.beyond, 0) << "of " << with.poses;
   EXPECT_GE(with.located, 5);
+}
+
+// A chain of estimates has the errors of the others' cameras, too, which the filter has used.
+TEST(TeamFilter, RobotsBeyondItsSizeAreHonestOverSeeds) {
+  static constexpr RobotId kHidden{6};
+  constexpr int kSeeds = 40;
+  double nees = 0.0;
+  int beyond = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    SimulatedTeam team(seed, 6);
+    team.sees = [](RobotId a, RobotId b) { return std::set{a, b} != std::set{kSelf, kHidden}; };
+    team.damage = [&](TeamInterval& interval) {
+      interval.settings.max_robots = 4;
+      for (RelativePoseEdge& edge : interval.edges) {
+        // By a camera that is misaligned; its estimate knows how well it is calibrated.
+        const Pose turn{Eigen::Vector3d::Zero(), so3_exp(team.misalignment(edge.from))};
+        edge.T_from_to.pose = turn * edge.T_from_to.pose;
+        const Eigen::Matrix3d of_turn = std::pow(radians(0.17), 2) * Eigen::Matrix3d::Identity();
+        const Eigen::Matrix3d arm = hat(edge.T_from_to.pose.p);
+        edge.T_from_to.covariance.topLeftCorner<3, 3>() += arm * of_turn * arm.transpose();
+        edge.T_from_to.covariance.bottomRightCorner<3, 3>() += of_turn;
+        if (edge.from == kHidden || edge.to == kHidden) edge.T_from_to.covariance *= 1.2;
+      }
+    };
+    TeamFilter filter;
+    const TeamSolution solution = solution_after(team, filter, 3.0);
+    const TeamPose* pose = find(solution, kHidden);
+    ASSERT_NE(pose, nullptr) << seed;
+    const double one = nees_of(*pose, team.truth(kHidden));
+    nees += one / kSeeds;
+    beyond += one > 22.5 ? 1 : 0;
+    EXPECT_LT(to_seconds(solution.stamp - pose->last_sighting), 0.3) << seed;
+  }
+  EXPECT_LT(nees, 7.2);
+  EXPECT_LE(beyond, 1);
 }
 
 TEST(TeamFilter, ForgetsARobotWithoutImuAndFindsItAgain) {

@@ -12,9 +12,10 @@ ask() {
 }
 
 # nc writes datagrams one after another without a separator: an object ends where the next begins.
-# nc ignores the end of its reader. So the reader's end stops this shell, and that stops `ask`.
+# nc ignores the end of its reader. So the reader's end stops this shell, and that stops `ask`. The daemon falls
+# silent when the lease has ended, and nc ends after some seconds of silence.
 trap 'exit 0' TERM
-ask | nc -u "$address" "$port" | {
+ask | nc -u -w 5 "$address" "$port" | {
   perl -e '$/ = "}{"; $| = 1; while (<STDIN>) { chomp; print $. > 1 ? "{" : "", $_, "}\n" or exit }'
   kill $$
 } &

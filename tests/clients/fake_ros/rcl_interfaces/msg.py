@@ -1,3 +1,3 @@
 class ParameterDescriptor:
-    def __init__(self, *, name="", description="", read_only=False):
-        self.name, self.description, self.read_only = name, description, read_only
+    def __init__(self, *, name="", description="", read_only=False, dynamic_typing=False):
+        self.name, self.description, self.read_only, self.dynamic_typing = name, description, read_only, dynamic_typing

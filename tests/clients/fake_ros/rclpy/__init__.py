@@ -15,7 +15,7 @@ def plain(value):
     return value.hex() if isinstance(value, bytes) else vars(value)
 
 
-def tell(topic, message):
+def record(topic, message):
     global _left
     _left -= 1
     print(json.dumps({"topic": topic, "message": message}, default=plain), flush=True)
@@ -38,6 +38,18 @@ def try_shutdown():
     pass
 
 
+def scalar(text):
+    """As YAML, which ROS reads overrides with."""
+    if text in ("true", "false"):
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            pass
+    return text
+
+
 class Parameter:
     def __init__(self, value):
         self.value = value
@@ -49,7 +61,7 @@ class Publisher:
 
     def publish(self, message):
         assert isinstance(message, self.kind)
-        tell(self.topic, message)
+        record(self.topic, message)
 
 
 class Time:
@@ -67,8 +79,9 @@ class Node:
         assert descriptor.description
         for word in sys.argv:
             if word.startswith(name + ":="):
-                text = word.split(":=", 1)[1]
-                return Parameter(text == "true" if isinstance(value, bool) else type(value)(text))
+                given = scalar(word.split(":=", 1)[1])
+                assert descriptor.dynamic_typing or type(given) is type(value), f"InvalidParameterTypeException: {word}"
+                return Parameter(given)
         return Parameter(value)
 
     def create_publisher(self, msg_type, topic, qos_profile):

@@ -17,8 +17,12 @@ import time
 from crepes_client import Pose, Vector, aio
 
 SIDE = 4.0  # m, of the triangle
-# Where followers belong, in the leader's level axes, and how far they are turned against it: all face the center.
-PLACES = {2: (SIDE * math.sqrt(0.75), SIDE / 2, math.radians(-120.0)), 3: (SIDE * math.sqrt(0.75), -SIDE / 2, math.radians(120.0))}
+# Where followers belong, in the leader's level axes (forward, left, up), and how far they are turned against it: all
+# face the center.
+PLACES = {
+    2: ((SIDE * math.sqrt(0.75), SIDE / 2, 0.0), math.radians(-120.0)),
+    3: ((SIDE * math.sqrt(0.75), -SIDE / 2, 0.0), math.radians(120.0)),
+}
 POSITION_GAIN = 0.9  # 1/s
 TURN_GAIN = 0.8  # 1/s
 MAX_SPEED = 0.8  # m/s
@@ -57,8 +61,9 @@ class Level:
 class Follower:
     """From poses of the leader to velocity commands."""
 
-    def __init__(self, place):
+    def __init__(self, place, turned):
         self.place = place
+        self.turned = turned
         self.own = [0.0, 0.0, 0.0]  # our velocity, as the commands so far make it
 
     def command(self, pose: Pose, dt: float):
@@ -67,16 +72,16 @@ class Follower:
         to_leader = level(pose.position)
         ahead = level(rotated(pose.orientation, (1.0, 0.0, 0.0)))
         heading = math.atan2(ahead[1], ahead[0])  # of the leader, seen from us
-        forward, left, turned = self.place
+        forward, left, up = self.place
         c, s = math.cos(heading), math.sin(heading)
-        error = (to_leader[0] + c * forward - s * left, to_leader[1] + s * forward + c * left, to_leader[2])
+        error = (to_leader[0] + c * forward - s * left, to_leader[1] + s * forward + c * left, to_leader[2] + up)
         # POSE has the difference of velocities; with our own it is the leader's, which we fly too.
         relative = level(pose.velocity or Vector(0.0, 0.0, 0.0))
         velocity = [POSITION_GAIN * e + v + own for e, v, own in zip(error, relative, self.own)]
         speed = math.sqrt(dot(velocity, velocity))
         velocity = [v * min(1.0, MAX_SPEED / max(speed, 1e-9)) for v in velocity]
         self.settle(velocity, dt)
-        return velocity, TURN_GAIN * math.remainder(heading + turned, 2 * math.pi)
+        return velocity, TURN_GAIN * math.remainder(heading + self.turned, 2 * math.pi)
 
     def settle(self, velocity, dt):
         """Our velocity approaches the command."""
@@ -97,7 +102,7 @@ class Robots:
 
 async def follow(robot, port, robots):
     """Never ends: a daemon that restarts is asked again, and meanwhile the robot stands still."""
-    follower = Follower(PLACES[robot])
+    follower = Follower(*PLACES[robot])
     last = time.monotonic()
     async with aio.Connection(port=port, rate_hz=CONTROL_HZ, peers=[1]) as daemon:
         while True:

@@ -39,8 +39,10 @@ def settings_of(node):
     """The parameters, which stay as they are at the start."""
     values = {}
     for parameter in PARAMETERS:
-        description = ParameterDescriptor(description=parameter.meaning, read_only=True)
-        values[parameter.name] = node.declare_parameter(parameter.name, parameter.default, description).value
+        is_number = isinstance(parameter.default, float)  # ROS refuses `rate_hz:=20` for a double, unless its type is free
+        description = ParameterDescriptor(description=parameter.meaning, read_only=True, dynamic_typing=is_number)
+        value = node.declare_parameter(parameter.name, parameter.default, description).value
+        values[parameter.name] = float(value) if is_number else value
     if values["diagnostics_period_s"] <= 0.0:
         raise ValueError("diagnostics_period_s must be above 0")
     return SimpleNamespace(**values)
