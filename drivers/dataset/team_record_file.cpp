@@ -167,7 +167,7 @@ std::string team_calibration_file_header() { return std::string(kTeamCalibration
 
 void append_team_calibration_rows(std::string& text, const TeamRecord& record,
                                   const RobotNames& names) {
-  for (const RobotCalibration& robot : record.calibrations) {
+  for (const EstimatedCalibration& robot : record.calibrations) {
     QuantityRows rows(text, record.stamp, name_of_robot(names, robot.robot));
     rows.add("gyro_bias", robot.imu.gyro_radps, robot.imu.gyro_sigma_radps);
     rows.add("accel_bias", robot.imu.accel_mps2, robot.imu.accel_sigma_mps2);

@@ -188,7 +188,7 @@ struct CalibrationRecord {
 struct TeamRecord {
   Timestamp stamp{};
   std::vector<TeamResidual> residuals;
-  std::vector<RobotCalibration> calibrations;
+  std::vector<EstimatedCalibration> calibrations;
   std::vector<TeamFault> faults;
 };
 
@@ -228,7 +228,7 @@ struct ResidualStatus {
 
 /// A robot as the team's filter knows it.
 struct TeamRobotStatus {
-  RobotCalibration calibration;
+  EstimatedCalibration calibration;
   std::array<ResidualStatus, kTeamResidualKindCount> residuals{};  ///< of what it measured
   std::vector<TeamFault> faults;
 };

@@ -72,7 +72,7 @@ struct CameraMisalignment {
 }
 
 /// What the team's filter knows of a robot's sensors.
-struct RobotCalibration {
+struct EstimatedCalibration {
   RobotId robot{};
   bool is_trusted = false;  ///< false: on probation
   ImuBiasEstimate imu;
@@ -94,7 +94,7 @@ struct TeamResidual {
   RobotId observer{};
   RobotId neighbor{};  ///< the observer itself for kGyro
   Kind kind = Kind::kBearing;
-  int camera = 0;   ///< of `RobotCalibration::cameras`
+  int camera = 0;   ///< of `EstimatedCalibration::cameras`
   int fused = 0;    ///< readings; intervals for kGyro
   int refused = 0;  ///< likewise
   /// Of the mean of those that were fused, or of all if none was: residual^T S^-1 residual.
@@ -133,9 +133,9 @@ struct TeamFault {
 /// The team's answer, in this robot's body frame at `stamp`.
 struct TeamSolution {
   Timestamp stamp{};
-  std::vector<TeamPose> poses;                 ///< ordered by neighbor
-  std::vector<RobotCalibration> calibrations;  ///< of those estimated jointly, with this robot
-  std::vector<TeamResidual> residuals;         ///< of the interval that ends at `stamp`
+  std::vector<TeamPose> poses;                     ///< ordered by neighbor
+  std::vector<EstimatedCalibration> calibrations;  ///< of those estimated jointly, with this robot
+  std::vector<TeamResidual> residuals;             ///< of the interval that ends at `stamp`
   std::vector<TeamFault> faults;
 };
 

@@ -279,7 +279,8 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
     tilt_filter.restart();
   }
   const auto bias_of = [&](RobotId robot) {
-    const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
+    const auto found =
+        std::ranges::find(solution.calibrations, robot, &EstimatedCalibration::robot);
     return found == solution.calibrations.end() ? ImuBiasEstimate{} : found->imu;
   };
   for (const TeamPose& pose : solution.poses) {

@@ -40,7 +40,7 @@ std::optional<TeamStatus> TeamLog::status() const {
   constexpr double kLeast = 1.0;  // dimensions; fewer have faded
   if (!stamp_) return std::nullopt;
   TeamStatus status{.stamp = *stamp_, .robots = {}};
-  for (const RobotCalibration& calibration : calibrations_) {
+  for (const EstimatedCalibration& calibration : calibrations_) {
     TeamRobotStatus robot{
         .calibration = calibration, .residuals = {}, .faults = faults_of(calibration.robot)};
     if (const auto sums = sums_.find(calibration.robot); sums != sums_.end()) {

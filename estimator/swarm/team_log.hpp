@@ -29,7 +29,7 @@ class TeamLog {
   using Sums = std::array<Sum, kTeamResidualKindCount>;
 
   std::optional<Timestamp> stamp_;  ///< of the latest solution
-  std::vector<RobotCalibration> calibrations_;
+  std::vector<EstimatedCalibration> calibrations_;
   std::vector<TeamFault> faults_;
   std::map<RobotId, Sums> sums_;
 };

@@ -260,24 +260,24 @@ TeamPose TeamBelief::team_pose(RobotId id, const TeamMember& member) const {
   return pose;
 }
 
-RobotCalibration TeamBelief::calibration(RobotId id) const {
+EstimatedCalibration TeamBelief::calibration(RobotId id) const {
   const TeamRobot& robot = robots.at(id);
   const auto sigma = [this](int index) { return std::sqrt(P(index, index)); };
   const auto sigmas = [this](int index) -> Eigen::Vector3d {
     return P.diagonal().segment<3>(index).cwiseSqrt();
   };
-  RobotCalibration calibration{.robot = id,
-                               .is_trusted = robot.is_trusted,
-                               .imu = {.gyro_radps = robot.bias.gyro_radps,
-                                       .accel_mps2 = robot.bias.accel_mps2,
-                                       .gyro_scale = robot.bias.gyro_scale,
-                                       .gyro_sigma_radps = sigmas(robot.bias_index),
-                                       .accel_sigma_mps2 = sigmas(robot.bias_index + 3)},
-                               .antenna_delay_m = robot.antenna_delay_m,
-                               .antenna_delay_sigma_m = sigma(robot.delay_index()),
-                               .clock_s = robot.clock_s,
-                               .clock_sigma_s = sigma(robot.clock_index()),
-                               .cameras = {}};
+  EstimatedCalibration calibration{.robot = id,
+                                   .is_trusted = robot.is_trusted,
+                                   .imu = {.gyro_radps = robot.bias.gyro_radps,
+                                           .accel_mps2 = robot.bias.accel_mps2,
+                                           .gyro_scale = robot.bias.gyro_scale,
+                                           .gyro_sigma_radps = sigmas(robot.bias_index),
+                                           .accel_sigma_mps2 = sigmas(robot.bias_index + 3)},
+                                   .antenna_delay_m = robot.antenna_delay_m,
+                                   .antenna_delay_sigma_m = sigma(robot.delay_index()),
+                                   .clock_s = robot.clock_s,
+                                   .clock_sigma_s = sigma(robot.clock_index()),
+                                   .cameras = {}};
   for (int i = 0; i < 3; ++i)
     calibration.imu.gyro_scale_sigma.col(i) = sigmas(robot.bias_index + 6 + 3 * i);
   for (const TeamCamera& camera : robot.cameras) {

@@ -45,7 +45,7 @@ struct TeamBelief {
   /// clock's.
   [[nodiscard]] TeamPose team_pose(RobotId id, const TeamMember& member) const;
   /// What is known of a robot's sensors.
-  [[nodiscard]] RobotCalibration calibration(RobotId id) const;
+  [[nodiscard]] EstimatedCalibration calibration(RobotId id) const;
   /// Of the position of `to` relative to `from`.
   [[nodiscard]] Eigen::Matrix3d position_covariance(RobotId from, RobotId to) const;
 

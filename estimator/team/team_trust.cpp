@@ -142,7 +142,7 @@ bool is_turned(const CameraMisalignment& camera, const Priors& priors) {
   return angle > kWrongPriors * believed_misalignment(priors) && angle > kWrongSigmas * sigma;
 }
 
-void add_camera_faults(const RobotCalibration& robot, std::vector<TeamFault>& faults) {
+void add_camera_faults(const EstimatedCalibration& robot, std::vector<TeamFault>& faults) {
   using State = CameraMisalignment::State;
   for (const CameraMisalignment& camera : robot.cameras) {
     if (camera.state == State::kCalibrated) continue;
@@ -388,10 +388,10 @@ std::vector<TeamFault> TeamTrust::gyro_faults(Timestamp now) const {
   return faults;
 }
 
-std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief, const Priors& priors) {
-  std::vector<RobotCalibration> calibrations;
+std::vector<EstimatedCalibration> calibrations_of(const TeamBelief& belief, const Priors& priors) {
+  std::vector<EstimatedCalibration> calibrations;
   for (const auto& [id, robot] : belief.robots) {
-    RobotCalibration one = belief.calibration(id);
+    EstimatedCalibration one = belief.calibration(id);
     for (std::size_t i = 0; i < one.cameras.size(); ++i) {
       using State = CameraMisalignment::State;
       CameraMisalignment& camera = one.cameras[i];
@@ -404,9 +404,9 @@ std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief, const Pr
 }
 
 std::vector<TeamFault> faults_of(const TeamBelief& belief,
-                                 const std::vector<RobotCalibration>& calibrations) {
+                                 const std::vector<EstimatedCalibration>& calibrations) {
   std::vector<TeamFault> faults;
-  for (const RobotCalibration& robot : calibrations) {
+  for (const EstimatedCalibration& robot : calibrations) {
     add_camera_faults(robot, faults);
     add_range_fault(belief, robot.robot, faults);
   }

@@ -15,8 +15,8 @@ namespace crepes {
 class TeamTrust {
  public:
   /// Robots that must be removed from the belief: they have no IMU, are too uncertain, or are
-  /// contradicted by most cameras that see them. In a tie, the robot that came last is removed. Also
-  /// robots whose camera was refused for so long that it is tried again.
+  /// contradicted by most cameras that see them. In a tie, the robot that came last is removed.
+  /// Also robots whose camera was refused for so long that it is tried again.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
   /// Robots whose gyroscope has contradicted for some intervals what their cameras see.
@@ -79,12 +79,12 @@ class TeamTrust {
 
 /// The calibration of each robot. A camera is turned if its misalignment is significant and beyond
 /// what a calibration leaves.
-[[nodiscard]] std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief,
-                                                            const Priors& priors);
+[[nodiscard]] std::vector<EstimatedCalibration> calibrations_of(const TeamBelief& belief,
+                                                                const Priors& priors);
 
 /// Faults to report: cameras that are turned or refused, robots of which most ranges are refused,
 /// and wrong clocks. `calibrations` are those of `belief`.
-[[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief,
-                                               const std::vector<RobotCalibration>& calibrations);
+[[nodiscard]] std::vector<TeamFault> faults_of(
+    const TeamBelief& belief, const std::vector<EstimatedCalibration>& calibrations);
 
 }  // namespace crepes

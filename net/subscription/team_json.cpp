@@ -45,7 +45,7 @@ Json camera_json(const CameraMisalignment& camera) {
   return json;
 }
 
-Json calibration_json(const RobotCalibration& robot, RobotId self) {
+Json calibration_json(const EstimatedCalibration& robot, RobotId self) {
   Json json = Json::object();
   put_estimate(json, "gyro_bias_radps", robot.imu.gyro_radps, robot.imu.gyro_sigma_radps);
   put_estimate(json, "accel_bias_mps2", robot.imu.accel_mps2, robot.imu.accel_sigma_mps2);

@@ -148,7 +148,7 @@ class NamingWatch {
     if (observer == liar_) return;
     const double t_s = recording_of(swarm_.dataset, observer).robot.clock.true_s(record.stamp);
     if (std::ranges::any_of(record.calibrations,
-                            [&](const RobotCalibration& c) { return c.robot == liar_; }))
+                            [&](const EstimatedCalibration& c) { return c.robot == liar_; }))
       met_s_.try_emplace(observer, t_s);
     for (const TeamFault& fault : record.faults) {
       if (fault.robot == liar_) {

@@ -15,7 +15,7 @@ class Log : public testing::Test {
  protected:
   void add(std::vector<TeamResidual> residuals, std::vector<TeamFault> faults = {}) {
     now_ += 100ms;
-    RobotCalibration calibration;
+    EstimatedCalibration calibration;
     calibration.robot = kRobot;
     log_.add({.stamp = now_,
               .poses = {},

@@ -209,7 +209,7 @@ TEST(TeamFilter, CalibrationsAreAsGoodAsTheySay) {
     TeamFilter filter;
     const TeamSolution solution = solution_after(team, filter, 5.0);
     ASSERT_EQ(solution.calibrations.size(), 4U);
-    for (const RobotCalibration& robot : solution.calibrations) {
+    for (const EstimatedCalibration& robot : solution.calibrations) {
       EXPECT_TRUE(robot.is_trusted);
       ASSERT_EQ(robot.cameras.size(), 1U);
       const CameraMisalignment& camera = robot.cameras.front();

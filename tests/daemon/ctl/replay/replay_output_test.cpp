@@ -118,7 +118,7 @@ TeamRecord a_team_record() {
                        .fused = 1,
                        .nis = 5.5,
                        .dimension = 6}};
-  RobotCalibration& robot = record.calibrations.emplace_back();
+  EstimatedCalibration& robot = record.calibrations.emplace_back();
   robot.robot = RobotId{2};
   robot.clock_s = 0.003;
   robot.clock_sigma_s = 0.001;

@@ -109,7 +109,7 @@ class Plot : public testing::Test {
                                 .dimension = 2,
                                 .residual = {1e-3, -1e-3},
                                 .sigma = {1e-3, 2e-3}});
-    RobotCalibration& robot = record.calibrations.emplace_back();
+    EstimatedCalibration& robot = record.calibrations.emplace_back();
     robot.robot = RobotId{2};
     robot.cameras.emplace_back();
     return record;
