@@ -47,6 +47,7 @@ struct ImuBiasEstimate {
 
 /// How far a camera points from where its calibration says.
 struct CameraMisalignment {
+  /// What the team makes of it.
   enum class State : std::uint8_t {
     kCalibrated,
     kTurned,   ///< significantly, and beyond what a calibration leaves
@@ -67,6 +68,7 @@ struct CameraMisalignment {
   }
 };
 
+/// As it is called in STATUS.
 [[nodiscard]] constexpr std::string_view name_of(CameraMisalignment::State state) {
   constexpr std::array<std::string_view, 3> kNames{"calibrated", "turned", "left_out"};
   return kNames[static_cast<std::size_t>(state)];
@@ -86,6 +88,7 @@ struct RobotCalibration {
 
 /// What a robot measured within an interval, against what the team expected before it was fused.
 struct TeamResidual {
+  /// Which sensor.
   enum class Kind : std::uint8_t {
     kBearing,  ///< of one of its cameras to one neighbor
     kRange,    ///< of its module to one neighbor
@@ -106,6 +109,7 @@ struct TeamResidual {
 };
 inline constexpr std::size_t kTeamResidualKindCount = 3;
 
+/// As it is called in STATUS and in files.
 [[nodiscard]] constexpr std::string_view name_of(TeamResidual::Kind kind) {
   constexpr std::array<std::string_view, kTeamResidualKindCount> kNames{"bearing", "range", "gyro"};
   return kNames[static_cast<std::size_t>(kind)];
@@ -113,6 +117,7 @@ inline constexpr std::size_t kTeamResidualKindCount = 3;
 
 /// A robot whose sensors contradict the rest of the team.
 struct TeamFault {
+  /// What is wrong, and what becomes of its measurements.
   enum class Kind : std::uint8_t {
     kCameraTurned,   ///< its bearings are used with the misalignment that the team found
     kCameraRefused,  ///< it contradicts the team whatever its misalignment
