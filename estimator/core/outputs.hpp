@@ -233,6 +233,7 @@ struct TeamRobotStatus {
   std::vector<TeamFault> faults;
 };
 
+/// All robots that the team's filter estimates, with this one.
 struct TeamStatus {
   Timestamp stamp{};  ///< of the latest solution
   std::vector<TeamRobotStatus> robots;

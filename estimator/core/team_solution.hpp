@@ -23,8 +23,9 @@ struct TeamPose {
   Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
   /// Of the motion, and of the IMUs' biases: gyroscope and accelerometer of B, then of N.
   Covariance covariance = Covariance::Zero();
-  Timestamp last_sighting{};  ///< when anybody saw it, or it anybody
-  Duration clock_ahead{};     ///< its sensors' stamps are so much ahead of this robot's
+  /// When anybody saw it, or it anybody, or ranges of robots that are seen located it.
+  Timestamp last_sighting{};
+  Duration clock_ahead{};  ///< its sensors' stamps are so much ahead of this robot's
 
   [[nodiscard]] Matrix6d pose_covariance() const {
     Matrix6d of_pose;
@@ -46,6 +47,7 @@ struct ImuBiasEstimate {
 
 /// How far a camera points from where its calibration says.
 struct CameraMisalignment {
+  /// What the team makes of it.
   enum class State : std::uint8_t {
     kCalibrated,
     kTurned,   ///< significantly, and beyond what a calibration leaves
@@ -66,6 +68,7 @@ struct CameraMisalignment {
   }
 };
 
+/// As it is called in STATUS.
 [[nodiscard]] constexpr std::string_view name_of(CameraMisalignment::State state) {
   constexpr std::array<std::string_view, 3> kNames{"calibrated", "turned", "left_out"};
   return kNames[static_cast<std::size_t>(state)];
@@ -85,6 +88,7 @@ struct RobotCalibration {
 
 /// What a robot measured within an interval, against what the team expected before it was fused.
 struct TeamResidual {
+  /// Which sensor.
   enum class Kind : std::uint8_t {
     kBearing,  ///< of one of its cameras to one neighbor
     kRange,    ///< of its module to one neighbor
@@ -105,6 +109,7 @@ struct TeamResidual {
 };
 inline constexpr std::size_t kTeamResidualKindCount = 3;
 
+/// As it is called in STATUS and in files.
 [[nodiscard]] constexpr std::string_view name_of(TeamResidual::Kind kind) {
   constexpr std::array<std::string_view, kTeamResidualKindCount> kNames{"bearing", "range", "gyro"};
   return kNames[static_cast<std::size_t>(kind)];
@@ -112,6 +117,7 @@ inline constexpr std::size_t kTeamResidualKindCount = 3;
 
 /// A robot whose sensors contradict the rest of the team.
 struct TeamFault {
+  /// What is wrong, and what becomes of its measurements.
   enum class Kind : std::uint8_t {
     kCameraTurned,   ///< its bearings are used with the misalignment that the team found
     kCameraRefused,  ///< it contradicts the team whatever its misalignment

@@ -9,11 +9,14 @@
 
 namespace crepes {
 
+/// Follows the solutions of the team's filter.
 class TeamLog {
  public:
+  /// In the order of their stamps.
   void add(const TeamSolution& solution);
   void clear() { *this = TeamLog(); }
 
+  /// By the latest solution.
   [[nodiscard]] std::vector<TeamFault> faults_of(RobotId robot) const;
   /// The robots of the latest solution, ordered by id. Empty before the first.
   [[nodiscard]] std::optional<TeamStatus> status() const;

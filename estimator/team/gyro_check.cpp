@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -106,8 +107,26 @@ Direction direction_of(const SightModel& model, const Eigen::Vector2d& residual)
           .across = model.across()};
 }
 
+/// Of what a gyroscope reads, by its biases and scale errors.
+Eigen::Matrix3d rate_covariance(const TeamBelief& belief, const TeamRobot& robot,
+                                const TeamMember& member) {
+  Eigen::Vector4d by = Eigen::Vector4d::Unit(0);
+  for (const ImuMean& mean : member.imu)
+    by.tail<3>() += mean.gyro_radps / static_cast<double>(member.imu.size());
+  constexpr std::array<int, 4> kParts{0, 6, 9, 12};  // the bias, and the scale's columns
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (std::size_t a = 0; a < kParts.size(); ++a) {
+    for (std::size_t b = 0; b < kParts.size(); ++b)
+      covariance +=
+          by(Eigen::Index(a)) * by(Eigen::Index(b)) *
+          belief.P.block<3, 3>(robot.bias_index + kParts[a], robot.bias_index + kParts[b]);
+  }
+  return covariance;
+}
+
 std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajectories& paths,
-                                const TeamBelief& belief, const Sight& sight) {
+                                const TeamInstant& instant, const TeamBelief& belief,
+                                const Sight& sight) {
   const std::size_t count = sight.bearings.size() / 2;
   if (count == 0) return std::nullopt;
   std::vector<const Bearing*> sorted = sight.bearings;
@@ -119,9 +138,13 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   const double t2_s = second.time_s(interval.from);
   if (t2_s - t1_s < kLeastTime) return std::nullopt;
 
-  const TeamPair pair{belief.robots.at(sight.observer), belief.robots.at(sight.neighbor),
-                      *interval.member(sight.observer), *interval.member(sight.neighbor),
-                      paths.at(sight.observer),         paths.at(sight.neighbor)};
+  const TeamPair pair{belief.robots.at(sight.observer),
+                      belief.robots.at(sight.neighbor),
+                      *interval.member(sight.observer),
+                      *interval.member(sight.neighbor),
+                      paths.at(sight.observer),
+                      paths.at(sight.neighbor),
+                      instant.states()};
   const TeamCamera& camera = pair.observer.cameras[sight.camera];
   const auto before = SightModel::at(pair, camera, t1_s, sight.sigma_rad());
   const auto after = SightModel::at(pair, camera, t2_s, sight.sigma_rad());
@@ -137,12 +160,17 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   row.H.leftCols(row.size) =
       (turn * row.H.leftCols(row.size)).eval() - before->row().H.leftCols(row.size);
   row.variance += before->row().variance;
-  return Change{.first = direction_of(*before, *r1),
+  Change change{.first = direction_of(*before, *r1),
                 .second = direction_of(*after, *r2),
                 .turn = turn,
-                .first_covariance = before->row().covariance(belief.P),
-                .covariance = row.covariance(belief.P),
+                .first_covariance = before->row().covariance(instant.covariance()),
+                .covariance = row.covariance(instant.covariance()),
                 .time_s = t2_s - t1_s};
+  // The instant has no part of the gyroscope's errors from the first half to the second.
+  change.covariance += change.by_rate() *
+                       rate_covariance(belief, pair.observer, pair.observer_arms) *
+                       change.by_rate().transpose();
+  return change;
 }
 
 /// The turn of the camera that explains the first half.
@@ -190,9 +218,10 @@ GyroCheck check_of(std::span<const Change> changes) {
 
 std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
                                          const TeamTrajectories& paths, const TeamBelief& belief) {
+  const TeamInstant instant(belief, paths, 0.5 * to_seconds(interval.to - interval.from));
   std::map<RobotId, std::vector<Change>> changes;
   for (const Sight& sight : all_sights(interval, belief)) {
-    if (const auto change = change_of(interval, paths, belief, sight))
+    if (const auto change = change_of(interval, paths, instant, belief, sight))
       changes[sight.observer].push_back(*change);
   }
   std::map<RobotId, GyroCheck> checks;

@@ -15,6 +15,7 @@ struct GyroContradiction {
   double rate_radps = 0.0;  ///< the difference
 };
 
+/// How well a gyroscope agrees with what its cameras see.
 struct GyroCheck {
   double chi2 = 0.0;  ///< of all that its cameras see, by what its gyroscope reads
   int dimension = 0;  ///< of `chi2`

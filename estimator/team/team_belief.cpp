@@ -9,6 +9,7 @@
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
+#include "estimator/team/motion_image.hpp"
 
 namespace crepes {
 namespace {
@@ -35,13 +36,8 @@ double turn_rate(const TeamMember& member) {
 /// How a robot's errors at the next keyframe follow from those at the last one.
 struct Moved {
   int index = 0;
-  int bias_index = 0;
-  int clock_index = 0;
-  Eigen::Matrix<double, kMotion, kMotion> by_motion{};
-  Eigen::Matrix<double, kMotion, kBias> by_bias{};
-  Eigen::Matrix<double, kMotion, kBias> by_self_bias{};
+  MotionImage image{};
   Eigen::Matrix<double, kMotion, kMotion> by_self{};  ///< by this robot's motion at the end
-  Eigen::Vector3d p_by_clock{};
   Eigen::Matrix<double, kMotion, kMotion> noise{};
 };
 
@@ -50,55 +46,62 @@ struct Moved {
 /// because the robot is there tau before the new frame begins, and their errors
 ///   dp' = R_S^T (dp - dp_S + tau dv_S + v_S dtau) + [p']x dtheta_S,
 ///   dv' = R_S^T (dv - dv_S) + [v']x dtheta_S,  dtheta' = dtheta - R'^T dtheta_S.
-/// `next` becomes the new motion.
-Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, double clock_s, FreeMotion& next) {
+/// `robot` receives the new motion.
+Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, int self_bias, TeamRobot& robot) {
   const Eigen::Matrix3d R_S_F = self.motion.R().transpose();
-  next.p_F = R_S_F * (end.motion.p_F - self.motion.p_F + clock_s * self.motion.v_F);
+  FreeMotion& next = robot.motion;
+  next.p_F = R_S_F * (end.motion.p_F - self.motion.p_F + robot.clock_s * self.motion.v_F);
   next.v_F = R_S_F * (end.motion.v_F - self.motion.v_F);
   next.q_F_B = (self.motion.q_F_B.conjugate() * end.motion.q_F_B).normalized();
-  Moved moved;
-  Eigen::Matrix<double, kMotion, kMotion> turn =
-      Eigen::Matrix<double, kMotion, kMotion>::Identity();
-  turn.block<3, 3>(0, 0) = R_S_F;
-  turn.block<3, 3>(3, 3) = R_S_F;
+  Moved moved{.index = robot.motion_index};
   moved.by_self.setZero();
-  moved.p_by_clock = R_S_F * self.motion.v_F;
   moved.by_self.block<3, 3>(0, 0) = -R_S_F;
-  moved.by_self.block<3, 3>(0, 3) = clock_s * R_S_F;
+  moved.by_self.block<3, 3>(0, 3) = robot.clock_s * R_S_F;
   moved.by_self.block<3, 3>(3, 3) = -R_S_F;
   moved.by_self.block<3, 3>(0, 6) = hat(next.p_F);
   moved.by_self.block<3, 3>(3, 6) = hat(next.v_F);
   moved.by_self.block<3, 3>(6, 6) = -next.R().transpose();
-  moved.by_motion = turn.lazyProduct(end.by_start.leftCols<kMotion>());
-  moved.by_bias = turn.lazyProduct(end.by_start.rightCols<kBias>());
-  moved.by_self_bias = moved.by_self.lazyProduct(self.by_start.rightCols<kBias>());
+  Eigen::Matrix<double, kMotion, kMotion> turn =
+      Eigen::Matrix<double, kMotion, kMotion>::Identity();
+  turn.block<3, 3>(0, 0) = R_S_F;
+  turn.block<3, 3>(3, 3) = R_S_F;
+  Eigen::Matrix<double, kMotion, 1> by_clock = Eigen::Matrix<double, kMotion, 1>::Zero();
+  by_clock.head<3>() = R_S_F * self.motion.v_F;
+  moved.image.parts = {{robot.motion_index, turn.lazyProduct(end.by_start.leftCols<kMotion>())},
+                       {robot.bias_index, turn.lazyProduct(end.by_start.rightCols<kBias>())},
+                       {self_bias, moved.by_self.lazyProduct(self.by_start.rightCols<kBias>())},
+                       {robot.clock_index(), by_clock}};
   const Eigen::Matrix<double, kMotion, kMotion> turned = turn.lazyProduct(end.noise);
   moved.noise = turned.lazyProduct(turn.transpose());
   return moved;
 }
 
 /// The covariance at the next keyframe. `self_noise` is what this robot's IMU has added.
-void carry(const std::vector<Moved>& all, int self_bias,
-           const Eigen::Matrix<double, kMotion, kMotion>& self_noise, Eigen::MatrixXd& P) {
-  for (const Moved& m : all) {
-    P.middleRows<kMotion>(m.index) = (m.by_motion * P.middleRows<kMotion>(m.index) +
-                                      m.by_bias * P.middleRows<kBias>(m.bias_index) +
-                                      m.by_self_bias * P.middleRows<kBias>(self_bias))
-                                         .eval();
-    P.middleRows<3>(m.index) += m.p_by_clock * P.row(m.clock_index);
+void carry(const std::vector<Moved>& all, const Eigen::Matrix<double, kMotion, kMotion>& self_noise,
+           Eigen::MatrixXd& P) {
+  std::vector<MotionImage> images;
+  images.reserve(all.size());
+  for (const Moved& m : all) images.push_back(m.image);
+  const Eigen::MatrixXd with_all = covariance_with(images, P);
+  const Eigen::MatrixXd own = covariance_with(images, with_all.transpose());
+  const auto first = [](std::size_t i) { return kMotion * static_cast<Eigen::Index>(i); };
+  for (std::size_t a = 0; a < all.size(); ++a) {
+    P.middleCols<kMotion>(all[a].index) = with_all.middleCols<kMotion>(first(a));
+    P.middleRows<kMotion>(all[a].index) = with_all.middleCols<kMotion>(first(a)).transpose();
   }
-  for (const Moved& m : all) {
-    P.middleCols<kMotion>(m.index) = (P.middleCols<kMotion>(m.index) * m.by_motion.transpose() +
-                                      P.middleCols<kBias>(m.bias_index) * m.by_bias.transpose() +
-                                      P.middleCols<kBias>(self_bias) * m.by_self_bias.transpose())
-                                         .eval();
-    P.middleCols<3>(m.index) += P.col(m.clock_index) * m.p_by_clock.transpose();
-  }
-  for (const Moved& a : all) {
-    P.block<kMotion, kMotion>(a.index, a.index) += a.noise;
-    const Eigen::Matrix<double, kMotion, kMotion> of_self = a.by_self.lazyProduct(self_noise);
-    for (const Moved& b : all)
-      P.block<kMotion, kMotion>(a.index, b.index) += of_self.lazyProduct(b.by_self.transpose());
+  for (std::size_t a = 0; a < all.size(); ++a) {
+    const Eigen::Matrix<double, kMotion, kMotion> of_self = all[a].by_self.lazyProduct(self_noise);
+    for (std::size_t b = 0; b <= a; ++b) {
+      Eigen::Matrix<double, kMotion, kMotion> block =
+          own.block<kMotion, kMotion>(first(a), first(b));
+      block += of_self.lazyProduct(all[b].by_self.transpose());
+      if (a == b) {
+        block += all[a].noise;
+        block = (0.5 * (block + block.transpose())).eval();
+      }
+      P.block<kMotion, kMotion>(all[b].index, all[a].index) = block.transpose();
+      P.block<kMotion, kMotion>(all[a].index, all[b].index) = block;
+    }
   }
 }
 
@@ -249,7 +252,7 @@ TeamPose TeamBelief::team_pose(RobotId id, const TeamMember& member) const {
                 .T_B_N = {robot.motion.p_F + tau * robot.motion.v_F + 0.5 * tau * tau * a,
                           (robot.motion.q_F_B * so3_exp(tau * w)).normalized()},
                 .v_B_N = v,
-                .last_sighting = robot.last_sighting,
+                .last_sighting = std::max(robot.last_sighting, robot.last_fix),
                 .clock_ahead = from_seconds(tau)};
   pose.covariance.topLeftCorner<kMotion, kMotion>() = 0.5 * (of_motion + of_motion.transpose());
   pose.covariance.topRightCorner<kMotion, kBiases>() = with_biases;
@@ -316,20 +319,26 @@ void TeamBelief::inject(const Eigen::VectorXd& dx) {
   for (auto& [pair, range] : ranges) range.bias_m += dx(range.index);
 }
 
+void TeamBelief::reset_attitude(int index, const Eigen::VectorXd& dx) {
+  const Eigen::Matrix3d J = so3_right_jacobian(dx.segment<3>(index));
+  const Eigen::Matrix<double, 3, Eigen::Dynamic> rows = J * P.middleRows<3>(index);
+  const Eigen::Matrix3d own = rows.middleCols<3>(index) * J.transpose();
+  P.middleRows<3>(index) = rows;
+  P.middleCols<3>(index) = rows.transpose();
+  P.block<3, 3>(index, index) = 0.5 * (own + own.transpose());
+}
+
 void TeamBelief::advance(const TeamInterval& interval) {
   const TeamTrajectories paths = trajectories(interval);
   const FreeMotionAt& end_of_self = paths.at(self).end();
+  const int self_bias = robots.at(self).bias_index;
   std::vector<Moved> all;
   for (auto& [id, robot] : robots) {
-    if (robot.motion_index < 0) continue;
-    all.push_back(moved(paths.at(id).end(), end_of_self, robot.clock_s, robot.motion));
-    all.back().index = robot.motion_index;
-    all.back().bias_index = robot.bias_index;
-    all.back().clock_index = robot.clock_index();
+    if (robot.motion_index >= 0)
+      all.push_back(moved(paths.at(id).end(), end_of_self, self_bias, robot));
   }
-  carry(all, robots.at(self).bias_index, end_of_self.noise, P);
+  carry(all, end_of_self.noise, P);
   add_drift(interval);
-  P = (0.5 * (P + P.transpose())).eval();
   stamp = interval.to;
 }
 

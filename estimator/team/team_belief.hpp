@@ -51,6 +51,9 @@ struct TeamBelief {
 
   /// Adds an error to the states.
   void inject(const Eigen::VectorXd& dx);
+  /// After the attitude's error at this index was injected, what is left of it is about the new
+  /// attitude.
+  void reset_attitude(int index, const Eigen::VectorXd& dx);
   /// Moves the keyframe to the end of the interval.
   void advance(const TeamInterval& interval);
 

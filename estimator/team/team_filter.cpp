@@ -78,7 +78,7 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
                         .calibrations = {},
                         .residuals = residuals_,
                         .faults = {}};
-  add_members(interval, solution);
+  add_members(interval, exchange_member(interval), solution);
   report(interval, solution);
   return solution;
 }
@@ -100,6 +100,15 @@ void TeamFilter::remove_members(const TeamInterval& interval) {
     if (id != belief_.self) belief_.remove(id);
   }
   if (has_strained || trust_.is_misled(belief_)) belief_ = TeamBelief::beginning(interval);
+}
+
+RobotId TeamFilter::exchange_member(const TeamInterval& interval) {
+  links_.add(interval, belief_);
+  if (belief_.robots.size() < interval.settings.max_robots) return {};
+  const auto exchange = links_.exchange(belief_.stamp, belief_);
+  if (!exchange) return {};
+  belief_.remove(exchange->leaves);
+  return exchange->joins;
 }
 
 /// All robots in the belief have an IMU over the interval.
@@ -161,42 +170,39 @@ bool TeamFilter::correct(const TeamInterval& interval) {
 
 bool TeamFilter::correct(const TeamInterval& interval, Stage stage, TeamReadings readings) {
   if (readings.empty()) return true;
-  TeamTrajectories paths = belief_.trajectories(interval);
-  gate(interval, paths, belief_, readings, residuals_);
-  std::vector<TeamRow> rows = linearized(interval, paths, belief_, readings);
+  const double time_s = readings.time_s(interval);
   const std::vector<bool> corrected = corrected_states(stage);
-  const std::map<RobotId, TeamRobot> robots = belief_.robots;
-  const std::map<RobotPair, TeamRangeBias> ranges = belief_.ranges;
+  std::map<RobotId, TeamRobot> robots;
+  std::map<RobotPair, TeamRangeBias> ranges;
   Eigen::VectorXd dx = Eigen::VectorXd::Zero(belief_.P.rows());
   for (int iteration = 1;; ++iteration) {
-    if (rows.empty()) {  // the last step may have made all ranges unlikely
-      belief_.robots = robots;
-      belief_.ranges = ranges;
-      return true;
+    const TeamTrajectories paths = belief_.trajectories(interval);
+    const TeamInstant instant(belief_, paths, time_s);
+    if (iteration == 1) {
+      gate(interval, paths, instant, belief_, readings, residuals_);
+      robots = belief_.robots;
+      ranges = belief_.ranges;
     }
-    const TeamUpdate update(rows, belief_.P);
+    const std::vector<TeamRow> rows = linearized(interval, paths, instant, belief_, readings);
+    belief_.robots = robots;
+    belief_.ranges = ranges;
+    if (rows.empty()) return true;  // the last step may have made all ranges unlikely
+    const TeamUpdate update(rows, instant.image_of(dx), instant.covariance(),
+                            instant.with_belief());
     if (!update.is_valid()) return false;
-    Eigen::VectorXd next = update.correction(rows, dx);
+    Eigen::VectorXd next = update.correction();
     for (Eigen::Index i = 0; i < next.size(); ++i)
       if (!corrected[static_cast<std::size_t>(i)]) next(i) = 0.0;
     const bool is_linear = largest_step(robots, next - dx) < kLinear;
     dx = next;
-    belief_.robots = robots;
-    belief_.ranges = ranges;
     belief_.inject(dx);
     if (is_linear || iteration == kMaxIterations) {
       update.correct(corrected, belief_.P);
       break;
     }
-    paths = belief_.trajectories(interval);
-    rows = linearized(interval, paths, belief_, readings);
   }
-  for (auto& [id, robot] : belief_.robots) {
-    if (robot.motion_index < 0) continue;
-    const int theta = robot.motion_index + 6;
-    const Eigen::Matrix3d J = so3_right_jacobian(dx.segment<3>(theta));
-    belief_.P.middleRows<3>(theta) = (J * belief_.P.middleRows<3>(theta)).eval();
-    belief_.P.middleCols<3>(theta) = (belief_.P.middleCols<3>(theta) * J.transpose()).eval();
+  for (const auto& [id, robot] : belief_.robots) {
+    if (robot.motion_index >= 0) belief_.reset_attitude(robot.motion_index + 6, dx);
   }
   return true;
 }
@@ -224,9 +230,10 @@ std::vector<bool> TeamFilter::corrected_states(Stage stage) const {
   return corrected;
 }
 
-/// Robots that estimates connect to a known one, the most certain first. When the filter is full,
-/// the others are located by their chain of estimates alone.
-void TeamFilter::add_members(const TeamInterval& interval, TeamSolution& solution) {
+/// Robots that estimates connect to a known one, the most certain first; a place is kept for
+/// `first`, if it is one. When the filter is full, the others are located by their chain of
+/// estimates alone.
+void TeamFilter::add_members(const TeamInterval& interval, RobotId first, TeamSolution& solution) {
   std::map<RobotId, TeamPlace> places;
   std::map<RobotId, TeamPlace> candidates;
   const auto add_candidates_from = [&](RobotId known) {
@@ -256,7 +263,9 @@ void TeamFilter::add_members(const TeamInterval& interval, TeamSolution& solutio
     const auto [id, place] = *best;
     candidates.erase(best);
     places[id] = place;
-    if (belief_.robots.size() < interval.settings.max_robots) {
+    const std::size_t reserved = first != RobotId{} && first != id ? 1 : 0;
+    if (belief_.robots.size() + reserved < interval.settings.max_robots) {
+      if (first == id) first = {};
       add_member(interval, id, place);
     } else if (!has_own_edge(interval, id)) {
       // A pair's filter would know it better than a chain of estimates.

@@ -5,6 +5,7 @@
 
 namespace crepes {
 
+/// A pose and a velocity with their errors.
 struct TeamPlace {
   using Covariance = Eigen::Matrix<double, FreeMotionAt::kMotion, FreeMotionAt::kMotion>;
   /// An estimate says nothing about the error of its velocity; nobody sends one that is worse.

@@ -1,11 +1,13 @@
 #include "estimator/team/team_readings.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -14,8 +16,15 @@
 namespace crepes {
 namespace {
 
-// Without bearings, repeated ranges make direction spuriously observable.
-constexpr Duration kDark = std::chrono::seconds{1};
+constexpr Duration kDark = std::chrono::seconds{1};  // a robot that nobody saw for so long
+// What hides a robot from all cameras may delay its ranges, too, for seconds: an error of 0.15 m
+// that lasts 2 s weighs as much as independent ones of this size in each interval.
+constexpr double kDarkSigma = 1.0;  // m
+// Ranges locate a robot in the dark if those who measure them are in different directions from it:
+// the least eigenvalue of the sum of u u^T.
+constexpr std::size_t kLeastBeacons = 3;
+constexpr double kLeastSpread = 0.05;
+constexpr double kMostDoubt = 0.7;  // m; sigma of its place; beyond, a range is no plane
 
 bool is_inside(const TeamInterval& interval, Timestamp stamp) {
   return stamp > interval.from && stamp <= interval.to;
@@ -55,18 +64,70 @@ std::vector<Sight> sights_of(const TeamInterval& interval, const TeamBelief& bel
   return all;
 }
 
+/// Which robots nobody sees, and which of them ranges locate.
+class Darkness {
+ public:
+  Darkness(const TeamInterval& interval, const TeamBelief& belief)
+      : interval_(interval), belief_(belief) {
+    std::map<RobotId, std::set<RobotId>> beacons;
+    for (const TeamRange& reading : interval.ranges) {
+      if (!is_inside(interval, reading.stamp)) continue;
+      const auto dark = dark_of(reading);
+      if (!dark) continue;
+      const RobotId beacon = *dark == reading.observer ? reading.neighbor : reading.observer;
+      if (belief.robots.at(beacon).is_trusted) beacons[*dark].insert(beacon);
+    }
+    for (const auto& [dark, seen] : beacons)
+      if (is_located(dark, seen)) located_.insert(dark);
+  }
+
+  /// Where everybody is seen, or the one that is not is located by ranges.
+  [[nodiscard]] bool allows(const TeamRange& reading) const {
+    if (!is_dark(reading.observer) && !is_dark(reading.neighbor)) return true;
+    const auto dark = dark_of(reading);
+    return dark && located_.contains(*dark);
+  }
+  /// If one of the two is in the dark, and the other is not.
+  [[nodiscard]] std::optional<RobotId> dark_of(const TeamRange& reading) const {
+    if (!belief_.robots.contains(reading.observer) || !belief_.robots.contains(reading.neighbor) ||
+        is_dark(reading.observer) == is_dark(reading.neighbor))
+      return std::nullopt;
+    return is_dark(reading.observer) ? reading.observer : reading.neighbor;
+  }
+
+ private:
+  [[nodiscard]] bool is_dark(RobotId id) const {
+    return interval_.to - belief_.robots.at(id).last_sighting > kDark;
+  }
+  [[nodiscard]] bool is_located(RobotId dark, const std::set<RobotId>& beacons) const {
+    if (beacons.size() < kLeastBeacons) return false;
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const RobotId beacon : beacons) {
+      const Eigen::Vector3d d =
+          belief_.robots.at(dark).motion.p_F - belief_.robots.at(beacon).motion.p_F;
+      spread += d * d.transpose() / d.squaredNorm();
+      if (!(belief_.position_covariance(dark, beacon).trace() < kMostDoubt * kMostDoubt))
+        return false;
+    }
+    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()(0) >= kLeastSpread;
+  }
+
+  const TeamInterval& interval_;
+  const TeamBelief& belief_;
+  std::set<RobotId> located_;
+};
+
 std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief& belief,
                                  TeamReadings::Stage stage) {
-  const auto is_dark = [&](RobotId id) {
-    return interval.to - belief.robots.at(id).last_sighting > kDark;
-  };
+  const Darkness darkness(interval, belief);
   std::map<std::pair<RobotId, RobotId>, Ranging> rangings;
   for (const TeamRange& reading : interval.ranges) {
     const auto [observer, neighbor] = std::pair(reading.observer, reading.neighbor);
     if (!is_inside(interval, reading.stamp) || !takes_part(belief, observer, neighbor, stage) ||
-        is_dark(observer) || is_dark(neighbor))
+        !darkness.allows(reading))
       continue;
-    rangings.try_emplace({observer, neighbor}, Ranging{observer, neighbor})
+    rangings
+        .try_emplace({observer, neighbor}, Ranging{observer, neighbor, darkness.dark_of(reading)})
         .first->second.ranges.push_back(&reading);
   }
   std::vector<Ranging> all;
@@ -79,11 +140,17 @@ std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief&
 struct Scene {
   const TeamInterval& interval;
   const TeamTrajectories& paths;
+  const TeamInstant& instant;
   const TeamBelief& belief;
 
   [[nodiscard]] TeamPair pair(RobotId observer, RobotId neighbor) const {
-    return {belief.robots.at(observer), belief.robots.at(neighbor), *interval.member(observer),
-            *interval.member(neighbor), paths.at(observer),         paths.at(neighbor)};
+    return {belief.robots.at(observer),
+            belief.robots.at(neighbor),
+            *interval.member(observer),
+            *interval.member(neighbor),
+            paths.at(observer),
+            paths.at(neighbor),
+            instant.states()};
   }
   [[nodiscard]] double time_s(Timestamp stamp) const { return to_seconds(stamp - interval.from); }
 };
@@ -130,7 +197,7 @@ TeamResidual gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
     sight.bearings.clear();
     return found;
   }
-  const Eigen::Matrix2d S = model->row().covariance(scene.belief.P);
+  const Eigen::Matrix2d S = model->row().covariance(scene.instant.covariance());
   const Eigen::LLT<Eigen::Matrix2d> factors(S);
   Agreement& agreement = camera.agreement[sight.neighbor];
   MeanResidual mean;
@@ -156,10 +223,10 @@ TeamResidual gate(const Scene& scene, TeamRangeBias& bias, Ranging& ranging) {
     const auto row = range_row(pair, bias, z->reading, scene.time_s(z->stamp), covariance);
     if (!row) return true;
     const double residual = row->residual.x();
-    variance = row->covariance(scene.belief.P)(0, 0);
+    variance = row->covariance(scene.instant.covariance())(0, 0);
     noise = z->reading.sigma_m * z->reading.sigma_m;
     const bool fits = residual * residual <= scene.interval.settings.range_gate * variance;
-    bias.add(ranging.observer, fits, residual);
+    if (!ranging.dark) bias.add(ranging.observer, fits, residual);
     mean.add({residual, 0.0}, fits);
     return !fits;
   });
@@ -210,12 +277,11 @@ std::optional<TeamRow> mean_of(const Scene& scene, const Ranging& ranging) {
   const TeamRangeBias& bias = scene.belief.ranges.at(ordered(ranging.observer, ranging.neighbor));
   const Eigen::Matrix3d covariance =
       scene.belief.position_covariance(ranging.observer, ranging.neighbor);
-  const double spread = std::sqrt(static_cast<double>(ranging.ranges.size()));
   std::optional<TeamRow> mean;
   double sum_m = 0.0;
   double count = 0.0;
   for (const TeamRange* z : ranging.ranges) {
-    const RangeReading weighed{z->reading.range_m, z->reading.sigma_m / spread};
+    const RangeReading weighed{z->reading.range_m, ranging.sigma_m()};
     const auto row = range_row(pair, bias, weighed, scene.time_s(z->stamp), covariance);
     if (!row) continue;
     mean = *row;
@@ -224,7 +290,7 @@ std::optional<TeamRow> mean_of(const Scene& scene, const Ranging& ranging) {
   }
   if (!mean) return std::nullopt;
   mean->residual.x() = sum_m / count;
-  if (!associate(mean->covariance(scene.belief.P)(0, 0), *mean)) return std::nullopt;
+  if (!associate(mean->covariance(scene.instant.covariance())(0, 0), *mean)) return std::nullopt;
   return mean;
 }
 
@@ -242,6 +308,27 @@ double Sight::sigma_rad() const {
   return std::sqrt(variance / static_cast<double>(bearings.size()));
 }
 
+double TeamReadings::time_s(const TeamInterval& interval) const {
+  double sum_s = 0.0;
+  std::size_t count = 0;
+  for (const Sight& sight : sights) {
+    for (const Bearing* z : sight.bearings) sum_s += to_seconds(z->stamp - interval.from);
+    count += sight.bearings.size();
+  }
+  for (const Ranging& ranging : rangings) {
+    for (const TeamRange* z : ranging.ranges) sum_s += to_seconds(z->stamp - interval.from);
+    count += ranging.ranges.size();
+  }
+  return sum_s / static_cast<double>(std::max<std::size_t>(1, count));
+}
+
+double Ranging::sigma_m() const {
+  if (dark) return kDarkSigma;
+  double variance = 0.0;
+  for (const TeamRange* z : ranges) variance += z->reading.sigma_m * z->reading.sigma_m;
+  return std::sqrt(variance) / static_cast<double>(ranges.size());
+}
+
 TeamReadings TeamReadings::of(const TeamInterval& interval, const TeamBelief& belief, Stage stage) {
   const auto accepts = [&](RobotId observer, RobotId neighbor, const TeamCamera& camera) {
     return !camera.is_refused && takes_part(belief, observer, neighbor, stage);
@@ -253,9 +340,9 @@ std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& be
   return sights_of(interval, belief, [](RobotId, RobotId, const TeamCamera&) { return true; });
 }
 
-void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelief& belief,
-          TeamReadings& readings, std::vector<TeamResidual>& residuals) {
-  const Scene scene{interval, paths, belief};
+void gate(const TeamInterval& interval, const TeamTrajectories& paths, const TeamInstant& instant,
+          TeamBelief& belief, TeamReadings& readings, std::vector<TeamResidual>& residuals) {
+  const Scene scene{interval, paths, instant, belief};
   for (Sight& sight : readings.sights) {
     residuals.push_back(gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight));
     for (const Bearing* z : sight.bearings) {
@@ -265,16 +352,20 @@ void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelie
       }
     }
   }
-  for (Ranging& ranging : readings.rangings)
+  for (Ranging& ranging : readings.rangings) {
     residuals.push_back(
         gate(scene, belief.ranges.at(ordered(ranging.observer, ranging.neighbor)), ranging));
+    if (ranging.dark && !ranging.ranges.empty())
+      belief.robots.at(*ranging.dark).last_fix = interval.to;
+  }
   std::erase_if(readings.sights, [](const Sight& s) { return s.bearings.empty(); });
   std::erase_if(readings.rangings, [](const Ranging& r) { return r.ranges.empty(); });
 }
 
 std::vector<TeamRow> linearized(const TeamInterval& interval, const TeamTrajectories& paths,
-                                const TeamBelief& belief, const TeamReadings& readings) {
-  const Scene scene{interval, paths, belief};
+                                const TeamInstant& instant, const TeamBelief& belief,
+                                const TeamReadings& readings) {
+  const Scene scene{interval, paths, instant, belief};
   std::vector<TeamRow> rows;
   rows.reserve(readings.sights.size() + readings.rangings.size());
   const auto add = [&](const std::optional<TeamRow>& row) {

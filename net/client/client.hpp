@@ -140,6 +140,7 @@ struct Status {
     std::uint64_t fused = 0;
     std::uint64_t refused = 0;
   };
+  /// How far a camera points from where its calibration says.
   struct Camera {
     std::vector<double> p_body_camera;  ///< [m]
     std::string state;                  ///< "calibrated", "turned" or "left_out"
@@ -156,6 +157,7 @@ struct Status {
     std::vector<Camera> cameras;
     std::vector<std::string> faults;
   };
+  /// The robots that the team's filter estimates.
   struct Team {
     std::optional<double> age_s;  ///< of the newest solution; empty without one
     std::vector<TeamRobot> robots;

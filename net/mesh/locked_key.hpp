@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// What `locked` returns.
 template <class Key>
 struct LockedKey {
   std::shared_ptr<const Key> key;  ///< overwritten at the end, and not in core files

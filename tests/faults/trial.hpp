@@ -56,6 +56,7 @@ struct Verdict {
   std::uint64_t hash = 0;         ///< of all poses
 };
 
+/// Whether a promise was not kept.
 [[nodiscard]] inline bool is_broken(const Verdict& verdict) { return !verdict.broken.empty(); }
 
 /// Trials of one world, which is simulated once. They are flown in the order of their first faults:

@@ -1,6 +1,7 @@
 /// Changes fields of a datagram's contents, as integers before they are coded.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -27,21 +28,23 @@ class FuzzBytes {
 /// pass, a byte with what becomes of the next one, and two bytes for its value if it needs one.
 class BodyChanger {
  public:
-  BodyChanger(FuzzBytes& input, int changes) : input_(input), left_(changes) { go_on(); }
+  BodyChanger(FuzzBytes& input, int changes) : input_(input), left_(changes) {}
 
   template <class Value>
   void bits(Value& value, unsigned count) {
-    const std::uint64_t most = count >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
-    if (is_next())
-      value = static_cast<Value>(
-          static_cast<std::uint64_t>(
-              changed(static_cast<std::int64_t>(value), {0, static_cast<std::int64_t>(most)})) &
-          most);
+    constexpr unsigned kMostOfASign = 62;
+    if (!is_next()) return;
+    const std::int64_t most = std::int64_t{1} << std::min(count, kMostOfASign);
+    const wire::Bounds bounds{count > kMostOfASign ? -most : 0, most - 1};
+    const auto bits = static_cast<std::uint64_t>(changed(static_cast<std::int64_t>(value), bounds));
+    value = static_cast<Value>(count < 64 ? bits & ((std::uint64_t{1} << count) - 1) : bits);
   }
   template <class Value>
   void number(Value& value, unsigned /*k*/) {
-    if (is_next())
-      value = static_cast<Value>(changed(static_cast<std::int64_t>(value), {0, 70000}));
+    constexpr std::int64_t kMost = 70000;  // more than any id
+    if (!is_next()) return;
+    const std::int64_t number = changed(static_cast<std::int64_t>(value), {0, kMost});
+    value = static_cast<Value>(std::max<std::int64_t>(0, number));
   }
   void delta(std::int64_t& value, std::int64_t /*predicted*/, unsigned /*k*/, wire::Bounds bounds,
              PeerMessageError /*outside*/) {
@@ -60,42 +63,47 @@ class BodyChanger {
   void expect(bool /*holds*/, PeerMessageError /*fault*/) {}
 
  private:
-  void go_on() { pass_ = left_ > 0 ? input_.next() : 0; }
-
   [[nodiscard]] bool is_next() {
-    if (left_ == 0 || pass_-- > 0) return false;
+    if (left_ == 0) return false;
+    if (!pass_) pass_ = input_.next();
+    if ((*pass_)-- > 0) return false;
+    pass_.reset();
     --left_;
-    go_on();
     return true;
   }
 
+  /// Never far beyond the bounds: the layout computes with the values.
   [[nodiscard]] std::int64_t changed(std::int64_t value, wire::Bounds bounds) {
-    const int kind = input_.next() % 8;
-    const std::int64_t drawn = input_.next() * 256 + input_.next();
     constexpr std::int64_t kDrawn = 65536;
-    switch (kind) {
-      case 0:
-        return bounds.min;
-      case 1:
-        return bounds.max;
-      case 2:
-        return 0;
-      case 3:
-        return value + drawn - kDrawn / 2;
-      case 4:
-        return value + (drawn - kDrawn / 2) * 1000;
-      case 5:  // no encoder writes it
-        return bounds.max + 1 + drawn;
-      case 6:
-        return value ^ std::int64_t{1} << (drawn % 62);
-      default:
-        return bounds.min + (bounds.max / kDrawn - bounds.min / kDrawn) * drawn;
-    }
+    const int kind = input_.next() % 8;
+    const std::int64_t high = input_.next();
+    const std::int64_t drawn = high * 256 + input_.next();
+    const auto from_kind = [&] {
+      switch (kind) {
+        case 0:
+          return bounds.min;
+        case 1:
+          return bounds.max;
+        case 2:
+          return std::int64_t{0};
+        case 3:
+          return value + drawn - kDrawn / 2;
+        case 4:
+          return value + (drawn - kDrawn / 2) * 1000;
+        case 5:  // no encoder writes it
+          return bounds.max + 1 + drawn;
+        case 6:
+          return value ^ (std::int64_t{1} << (drawn % 60));
+        default:
+          return bounds.min + (bounds.max / kDrawn - bounds.min / kDrawn) * drawn;
+      }
+    };
+    return std::clamp(from_kind(), bounds.min - kDrawn, bounds.max + kDrawn);
   }
 
   FuzzBytes& input_;
   int left_;
-  int pass_ = 0;  ///< fields until the next change
+  std::optional<int> pass_;  ///< fields until the next change
 };
 
 }  // namespace crepes

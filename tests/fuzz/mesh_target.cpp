@@ -46,7 +46,7 @@ void change_body(FuzzInput& datagram, FuzzBytes& input, int changes) {
 class Conversation {
  public:
   Conversation() {
-    constexpr Duration kWarmUp = std::chrono::milliseconds{1500};
+    constexpr Duration kWarmUp = std::chrono::seconds{4};
     pair_.run_for(kWarmUp);
     CREPES_EXPECT(!pair_.found().empty(), "the pair knows each other before it is misled");
   }

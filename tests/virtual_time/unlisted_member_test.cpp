@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "daemon/ctl/replay/swarm_replay.hpp"
 #include "tests/study/simulated_swarm.hpp"
@@ -11,7 +12,7 @@ namespace crepes {
 namespace {
 
 TEST(UnlistedMember, IsSeenAndHasNoTruth) {
-  const RobotId kUnlisted{4};
+  constexpr RobotId kUnlisted{4};
   SimConfig sim;
   sim.scenario = SimScenario::kFour;
   const SimWorld world(sim);

@@ -56,7 +56,7 @@ double sigma_of_spots(const std::vector<SightingResidual>& residuals) {
   return std::sqrt(sum / std::max(1.0, static_cast<double>(kept)));
 }
 
-void describe_robot(const SwarmSolution& solution, std::size_t r, RobotCalibration& robot) {
+void describe_robot(const SwarmSolution& solution, std::size_t r, CalibratedRobot& robot) {
   robot.after = solution.state.robots[r];
   if (solution.covariance.size() > 0) {
     const auto begin = static_cast<Eigen::Index>(r) * swarm_constants::kSize;
@@ -111,7 +111,7 @@ SwarmBatchResult calibrate_swarm(std::vector<RobotRecord> records,
   for (const RobotConstants& robot : guess) {
     priors.push_back(
         default_robot_priors(robot.camera.lens[2], problem.records()[priors.size()].noise));
-    RobotCalibration& calibration = result.robots.emplace_back();
+    CalibratedRobot& calibration = result.robots.emplace_back();
     calibration.before = robot;
     calibration.prior_sigma = priors.back();
   }

@@ -20,7 +20,7 @@ struct SwarmBatchSettings {
 };
 
 /// Of one robot.
-struct RobotCalibration {
+struct CalibratedRobot {
   RobotConstants before;
   RobotConstants after;
   RobotPriors prior_sigma = RobotPriors::Zero();  ///< in the order of `swarm_constants`
@@ -42,7 +42,7 @@ struct RobotCalibration {
 
 /// The calibrations of all robots, their quality, and the reasons to refuse them.
 struct SwarmBatchResult {
-  std::vector<RobotCalibration> robots;
+  std::vector<CalibratedRobot> robots;
   Eigen::MatrixXd covariance;  ///< of all constants, robot by robot
   double range_sigma_m = 0.0;  ///< of a single range, from the residuals
   double range_outliers = 0.0;

@@ -56,7 +56,7 @@ void check_robot(const std::vector<RobotRecord>& records, std::size_t r, const s
         name, seen, kLeastSwarmSightings));
 }
 
-void judge_robot(const RobotCalibration& robot, const std::string& name, SwarmBatchResult& result) {
+void judge_robot(const CalibratedRobot& robot, const std::string& name, SwarmBatchResult& result) {
   if (robot.spot_sigma_px > kMostSwarmSpotSigma_px)
     result.refusals.push_back(fmt::format(
         "residuals of {} px in {}'s camera: its lens is no Double Sphere, its time stamps jitter, "

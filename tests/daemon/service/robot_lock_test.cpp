@@ -1,13 +1,21 @@
 #include "daemon/service/robot_lock.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <utility>
 
 namespace crepes {
 namespace {
 
-// Ids that no other test uses: claims are of the whole machine.
-const RobotId kRobot{60017};
-const RobotId kOther{60018};
+/// Claims are of the whole machine, where other tests may run: ids of this process.
+RobotId id_of_this_process(int shift) {
+  constexpr int kIds = 60000;
+  return RobotId{static_cast<std::uint16_t>(1000 + (::getpid() + shift) % kIds)};
+}
+const RobotId kRobot = id_of_this_process(0);
+const RobotId kOther = id_of_this_process(30000);
 
 TEST(RobotLock, IsOnePerRobotOnAllInterfacesOfTheMachine) {
   const auto first = RobotLock::claim(kRobot, "bat0", 47474);

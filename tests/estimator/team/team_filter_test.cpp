@@ -538,6 +538,99 @@ TEST(TeamFilter, LocatesRobotsBeyondItsSizeThroughTheOthers) {
   EXPECT_EQ(solution.poses.size(), 4U);  // three of the filter, and the hidden one
 }
 
+/// Robots that the filter estimates itself, of a team that this robot sees.
+std::set<RobotId> estimated_jointly(const TeamSolution& solution) {
+  std::set<RobotId> robots;
+  for (const TeamPose& pose : solution.poses) robots.insert(pose.neighbor);
+  return robots;
+}
+
+// Robot 4 comes early and then loses all but one of the others. Robot 5 sees everybody.
+TEST(TeamFilter, ABetterConnectedRobotTakesThePlaceOfAPoorlyConnectedOne) {
+  static constexpr RobotId kPoor{4};
+  static constexpr RobotId kRich{5};
+  SimulatedTeam team(1, 5);
+  team.damage = [](TeamInterval& interval) { interval.settings.max_robots = 4; };
+  team.sees = [](RobotId a, RobotId b) { return a != kRich && b != kRich; };
+  TeamFilter filter;
+  EXPECT_TRUE(estimated_jointly(solution_after(team, filter, 3.0)).contains(kPoor));
+  team.sees = [](RobotId a, RobotId b) {
+    const std::set both{a, b};
+    return !both.contains(kPoor) || both.contains(RobotId{2});
+  };
+  static_cast<void>(solution_after(team, filter, 8.0));
+  for (double t = 0.0; t < 4.0; t += kIntervalSeconds) {
+    const TeamSolution solution = filter.step(team.next());
+    for (const RobotId robot : {RobotId{2}, RobotId{3}, kPoor, kRich}) {
+      const TeamPose* pose = find(solution, robot);  // of the poor one, through the others
+      ASSERT_NE(pose, nullptr) << robot.value;
+      EXPECT_LT(nees_of(*pose, team.truth(robot)), 30.0) << robot.value;
+    }
+  }
+}
+
+TEST(TeamFilter, EquallyConnectedRobotsKeepTheirPlaces) {
+  SimulatedTeam team(1, 6);
+  team.damage = [](TeamInterval& interval) { interval.settings.max_robots = 4; };
+  TeamFilter filter;
+  const auto first = estimated_jointly(solution_after(team, filter, 3.0));
+  EXPECT_EQ(first.size(), 3U);
+  for (double t = 0.0; t < 6.0; t += kIntervalSeconds)
+    ASSERT_EQ(estimated_jointly(filter.step(team.next())), first) << t;
+}
+
+/// What becomes of a robot that nobody sees any more, and that sees nobody.
+struct InTheDark {
+  int located = 0;  ///< teams in which its place is known to half a meter in the end
+  int poses = 0;
+  int beyond = 0;  ///< five sigma, of all robots
+};
+
+InTheDark in_the_dark(RobotId dark, double seconds, bool has_ranges) {
+  InTheDark result;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed, 6);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 4.0));
+    team.sees = [dark](RobotId i, RobotId j) { return i != dark && j != dark; };
+    if (!has_ranges) {
+      team.damage = [dark](TeamInterval& interval) {
+        std::erase_if(interval.ranges, [dark](const TeamRange& range) {
+          return range.observer == dark || range.neighbor == dark;
+        });
+      };
+    }
+    TeamSolution solution;
+    for (double t = 0.0; t < seconds; t += kIntervalSeconds) {
+      solution = filter.step(team.next());
+      for (const TeamPose& pose : solution.poses) {
+        ++result.poses;
+        if (position_nees_of(pose, team.truth(pose.neighbor)) > 35.0) ++result.beyond;
+      }
+    }
+    const TeamPose* pose = find(solution, dark == kSelf ? RobotId{2} : dark);
+    if (pose == nullptr) continue;
+    const Eigen::Matrix3d covariance = pose->covariance.topLeftCorner<3, 3>();
+    if (covariance.trace() < 0.25) ++result.located;
+  }
+  return result;
+}
+
+TEST(TeamFilter, RangesLocateARobotThatNobodySees) {
+  const InTheDark with = in_the_dark(RobotId{4}, 30.0, true);
+  EXPECT_EQ(with.beyond, 0) << "of " << with.poses;
+  EXPECT_GE(with.located, 5);
+  const InTheDark without = in_the_dark(RobotId{4}, 30.0, false);
+  EXPECT_EQ(without.beyond, 0) << "of " << without.poses;
+  EXPECT_EQ(without.located, 0);
+}
+
+TEST(TeamFilter, RangesLocateTheTeamForARobotThatSeesNobody) {
+  const InTheDark with = in_the_dark(kSelf, 30.0, true);
+  EXPECT_EQ(with.beyond, 0) << "of " << with.poses;
+  EXPECT_GE(with.located, 5);
+}
+
 // A chain of estimates has the errors of the others' cameras, too, which the filter has used.
 TEST(TeamFilter, RobotsBeyondItsSizeAreHonestOverSeeds) {
   static constexpr RobotId kHidden{6};

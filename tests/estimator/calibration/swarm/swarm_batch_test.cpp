@@ -82,7 +82,7 @@ TEST(SwarmBatch, FindsCamerasLeversAndDelaysOfAllRobots) {
   double square_before = 0.0;
   double square = 0.0;
   for (std::size_t r = 0; r < 3; ++r) {
-    const RobotCalibration& robot = found.robots[r];
+    const CalibratedRobot& robot = found.robots[r];
     const RobotPriors before = difference(robot.before, flight.truth[r]);
     const RobotPriors after = difference(robot.after, flight.truth[r]);
     EXPECT_LT(after.segment<3>(swarm_constants::kRotation).norm(), radians(0.3)) << r;
