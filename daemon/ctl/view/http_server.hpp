@@ -14,9 +14,9 @@ namespace crepes {
 
 /// Where the server listens, and its limits.
 struct HttpSettings {
-  std::string address = "127.0.0.1";  ///< numeric, IPv4 or IPv6
-  std::uint16_t port = 8080;          ///< 0: a free one
-  std::string name;                   ///< of the Server header
+  std::string address = "127.0.0.1";                ///< numeric, IPv4 or IPv6
+  std::uint16_t port = 8080;                        ///< 0: a free one
+  std::string name;                                 ///< of the Server header
   Duration request_time = std::chrono::seconds{5};  ///< in which a request must be complete
 };
 
