@@ -138,7 +138,6 @@ struct Fusion {
 /// What a sensor read, as it came: of a bearing u and the camera's place, both in the seeing
 /// robot's body; of a range the distance [m]. Poses have no numbers.
 using SensorReading = std::array<double, 6>;
-
 /// How many of its numbers a kind has.
 [[nodiscard]] constexpr std::size_t reading_size(MeasurementKind kind) {
   constexpr std::array<std::size_t, kMeasurementKindCount> kSizes{6, 6, 1, 1, 0, 0};
@@ -153,7 +152,6 @@ struct MeasurementRecord {
   Fusion fusion;
   SensorReading reading{};
 };
-
 /// The newest measurement of a kind.
 struct NewestReading {
   Timestamp stamp{};                    ///< when it was taken
