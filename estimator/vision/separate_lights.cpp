@@ -13,7 +13,7 @@ namespace crepes {
 namespace {
 
 constexpr int kLeastRise = 12;           // gray levels above the saddle to the next light
-constexpr double kContrastShare = 0.25;  // of the light's own height above the background
+constexpr double kContrastShare = 0.15;  // of the light's own height above the background
 constexpr double kCenterLevel = 0.3;     // of its height: what is below does not move its center
 constexpr std::int32_t kNoRegion = -1;
 

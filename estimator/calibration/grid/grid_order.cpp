@@ -226,24 +226,39 @@ bool are_sides(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return sine > kLeastSine && a.norm() < kMostRatio * b.norm() && b.norm() < kMostRatio * a.norm();
 }
 
-/// Grows from every light over every two of its neighbors until a whole grid is found.
+/// The best window of those that grow from `first` over any two of its neighbors.
+Growth::Window best_window_from(int first, std::span<const Eigen::Vector3d> directions,
+                                const GridShape& shape) {
+  const auto points = plane_at(directions[static_cast<std::size_t>(first)], directions);
+  const std::vector<int> near = nearest_to(first, points);
+  Growth::Window best;
+  for (const int along_row : near) {
+    for (const int along_column : near) {
+      if (!are_sides(points[static_cast<std::size_t>(along_row)],
+                     points[static_cast<std::size_t>(along_column)]))
+        continue;
+      Growth growth(points, shape);
+      if (!growth.start(first, along_row, along_column)) continue;
+      growth.grow();
+      if (auto window = growth.window(shape); window.score > best.score) best = std::move(window);
+      if (best.score == shape.leds()) return best;
+    }
+  }
+  return best;
+}
+
+/// Grows from one light after the other until a whole grid is found. Lights of a window that may be
+/// the grid would grow into the same one again, and are no longer started from.
 Growth::Window best_window(std::span<const Eigen::Vector3d> directions, const GridShape& shape) {
   Growth::Window best;
-  for (int first = 0; first < static_cast<int>(directions.size()); ++first) {
-    const auto points = plane_at(directions[static_cast<std::size_t>(first)], directions);
-    const std::vector<int> near = nearest_to(first, points);
-    for (const int along_row : near) {
-      for (const int along_column : near) {
-        if (!are_sides(points[static_cast<std::size_t>(along_row)],
-                       points[static_cast<std::size_t>(along_column)]))
-          continue;
-        Growth growth(points, shape);
-        if (!growth.start(first, along_row, along_column)) continue;
-        growth.grow();
-        if (auto window = growth.window(shape); window.score > best.score) best = std::move(window);
-        if (best.score == shape.leds()) return best;
-      }
-    }
+  std::vector<bool> is_done(directions.size(), false);
+  for (std::size_t first = 0; first < directions.size() && best.score < shape.leds(); ++first) {
+    if (is_done[first]) continue;
+    auto window = best_window_from(static_cast<int>(first), directions, shape);
+    if (window.score >= kLeastShare * shape.leds())
+      for (const Growth::Place& place : window.places)
+        is_done[static_cast<std::size_t>(place.light)] = true;
+    if (window.score > best.score) best = std::move(window);
   }
   return best;
 }
