@@ -79,7 +79,8 @@ TEST(SignalModel, KnowsHowASwingGoesOnWhileSamplesAreMissing) {
   for (const int strides : {2, 3, 4, 5}) {
     const Missed missed = missed_by(samples, strides);
 
-    EXPECT_LT(missed.predicted, 0.1 * missed.held) << strides;
+    // Two swings need four changes; rates that are held beyond a stride miss 0.5 to 0.8.
+    EXPECT_LT(missed.predicted, 0.25 * missed.held) << strides;
     EXPECT_NEAR(
         missed.innovation_density / (missed.predicted / std::sqrt(strides * kStride * kPeriod)),
         1.0, 0.4)
