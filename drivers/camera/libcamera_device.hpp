@@ -75,8 +75,8 @@ struct LibcameraFrame {
   std::uint32_t buffer = 0;
   std::uint64_t sequence = 0;
   bool is_whole = true;
-  std::optional<std::uint64_t> sensor_ns;  ///< on CLOCK_BOOTTIME, when the first row was exposed
-  double exposure_us = 0.0;                ///< 0: unknown
+  std::optional<std::uint64_t> sensor_ns{};  ///< on CLOCK_BOOTTIME, when the first row was exposed
+  double exposure_us = 0.0;                  ///< 0: unknown
 };
 
 /// A configured camera that is running; the destructor stops it. `requeue` may be called on any

@@ -57,8 +57,8 @@ struct BasicBearing {
 struct PairMounting {
   Eigen::Vector3d p_B_M = Eigen::Vector3d::Zero();  ///< our LED ring
   Eigen::Vector3d p_B_U = Eigen::Vector3d::Zero();  ///< our antenna
-  Eigen::Vector3d p_N_M = Eigen::Vector3d::Zero();
-  Eigen::Vector3d p_N_Q = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_N_M = Eigen::Vector3d::Zero();  ///< the neighbor's LED ring
+  Eigen::Vector3d p_N_Q = Eigen::Vector3d::Zero();  ///< the neighbor's antenna
 };
 
 /// The direction of up. Gravity determines roll and pitch only.

@@ -138,7 +138,7 @@ struct Fusion {
 /// What a sensor read, as it came: of a bearing u and the camera's place, both in the seeing
 /// robot's body; of a range the distance [m]. Poses have no numbers.
 using SensorReading = std::array<double, 6>;
-
+/// How many of its numbers a kind has.
 [[nodiscard]] constexpr std::size_t reading_size(MeasurementKind kind) {
   constexpr std::array<std::size_t, kMeasurementKindCount> kSizes{6, 6, 1, 1, 0, 0};
   return kSizes[static_cast<std::size_t>(kind)];
@@ -152,11 +152,11 @@ struct MeasurementRecord {
   Fusion fusion;
   SensorReading reading{};
 };
-
+/// The newest measurement of a kind.
 struct NewestReading {
-  Timestamp stamp{};  ///< when it was taken
-  Verdict verdict = Verdict::kNoState;
-  SensorReading reading{};
+  Timestamp stamp{};                    ///< when it was taken
+  Verdict verdict = Verdict::kNoState;  ///< what became of it
+  SensorReading reading{};              ///< as it came
 };
 
 /// The sensor calibration that the tight filter estimates.
@@ -248,7 +248,7 @@ struct NeighborStatus {
   std::array<VerdictCounts, kMeasurementKindCount> measurements{};  ///< [kind][verdict]
   /// Of each kind, whatever its outcome.
   std::array<std::optional<NewestReading>, kMeasurementKindCount> newest{};
-  PairMounting mounting;
+  PairMounting mounting;  ///< what these readings refer to
   /// Mean NIS for each dimension, of about the last fifty that were fused, by kind.
   std::array<std::optional<double>, kMeasurementKindCount> nis{};
   std::optional<CalibrationRecord> calibration;  ///< of its filter

@@ -14,11 +14,13 @@ namespace crepes::wire {
   return message.mark > 0 ? message.sequence / message.mark : message.sequence;
 }
 
+/// What `quantized` returns.
 struct QuantizedMessage {
   CodedBody body;           ///< all that a datagram might carry
   std::size_t refused = 0;  ///< measurements that are not finite or cannot be encoded
 };
 
+/// The message in integers, with as many copies as the limits say, whether they fit or not.
 [[nodiscard]] QuantizedMessage quantized(const OutgoingPeerMessage& message,
                                          const WireLimits& limits);
 

@@ -29,6 +29,7 @@ namespace crepes {
 
 class PeerSessions {
  public:
+  /// A run of a peer's program, from its start on.
   struct Session {
     std::uint64_t id = 0;
     LossMeter loss;                        ///< of the peer's datagrams, at us
@@ -52,12 +53,14 @@ class PeerSessions {
 
   /// Removes peers that are no longer members; adds the new ones.
   void set_members(const std::vector<RobotId>& members);
+  /// Whether it is a member, and not us.
   [[nodiscard]] bool knows(RobotId peer) const { return peers_.contains(peer); }
 
   /// A datagram of ours leaves.
   void record_sent(Timestamp at, std::uint32_t sequence, bool is_marked) {
     sent_.add(at, sequence, is_marked);
   }
+  /// What we sent in the last seconds.
   [[nodiscard]] const SentLog& sent() const { return sent_; }
 
   /// The counter of a datagram that is not new, by its header alone; empty if it may be. Changes no
@@ -82,11 +85,16 @@ class PeerSessions {
   [[nodiscard]] std::vector<ClockStatus> clocks() const;
   /// All peers that a datagram was received from, ordered by id.
   [[nodiscard]] std::vector<PeerTraffic> traffic(Timestamp now) const;
+  /// The latest datagram of a second robot that uses our id or a peer's.
   [[nodiscard]] const std::optional<DoubledId>& doubled_id() const { return doubled_; }
 
+  /// Datagrams and refusals; what sending and opening counts is added by the owner.
   [[nodiscard]] MeshCounters& counters() { return counters_; }
+  /// The same, to read.
   [[nodiscard]] const MeshCounters& counters() const { return counters_; }
+  /// Who hears whom, and what is to be forwarded.
   [[nodiscard]] MeshRelay& relay() { return relay_; }
+  /// The same, to read.
   [[nodiscard]] const MeshRelay& relay() const { return relay_; }
 
  private:

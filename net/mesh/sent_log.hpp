@@ -16,11 +16,13 @@ class SentLog {
  public:
   static constexpr Duration kMemory = std::chrono::seconds{10};
 
+  /// A datagram leaves at `at`.
   void add(Timestamp at, std::uint32_t sequence, bool is_marked) {
     sent_.push_back({at, sequence, is_marked});
     while (sent_.front().at <= at - kMemory) sent_.pop_front();
   }
 
+  /// When the latest datagram was sent.
   [[nodiscard]] std::optional<Timestamp> last() const {
     return sent_.empty() ? std::nullopt : std::optional(sent_.back().at);
   }
@@ -34,6 +36,7 @@ class SentLog {
     return is_known ? std::optional(found->at) : std::nullopt;
   }
 
+  /// Whether a recent datagram with this number was marked to be forwarded.
   [[nodiscard]] bool is_marked(std::uint32_t sequence) const {
     return std::ranges::any_of(
         sent_, [&](const Sent& sent) { return sent.sequence == sequence && sent.is_marked; });

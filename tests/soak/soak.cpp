@@ -15,6 +15,7 @@
 #include "daemon/service/logging.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/imu/witmotion.hpp"
+#include "drivers/uwb/nlink_encoder.hpp"
 #include "drivers/uwb/nlink_frame.hpp"
 #include "estimator/core/contract.hpp"
 #include "net/mesh/peer_message.hpp"

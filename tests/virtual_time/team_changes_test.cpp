@@ -134,9 +134,11 @@ TEST(TwoGroups, ThatMeetBecomeOne) {
   const Traces alone =
       flown(swarm, options, {{0.0, RobotId{2}, false}, {0.0, RobotId{4}, false}}, kDuration);
 
-  for (const auto& [pair, trace] : met)
-    if (first.contains(pair.first) != first.contains(pair.second))
+  for (const auto& [pair, trace] : met) {
+    if (first.contains(pair.first) != first.contains(pair.second)) {
       EXPECT_GT(trace.errors().front().true_s, 6.0);
+    }
+  }
   const Span together{8.0, kDuration};
   expect_poses(met, first, together);
   expect_poses(met, second, together);

@@ -30,7 +30,9 @@ TEST(UnlistedMember, IsSeenAndHasNoTruth) {
   ASSERT_EQ(report->robots.size(), 3U);
   std::uint64_t decodes = 0;
   for (const RobotReport& robot : report->robots) {
-    EXPECT_FALSE(robot.id_mistakes.contains(kUnlisted));
+    if (robot.id_mistakes) {
+      EXPECT_FALSE(robot.id_mistakes->contains(kUnlisted));
+    }
     for (const NeighborStatus& neighbor : robot.status.neighbors)
       if (neighbor.neighbor == kUnlisted) decodes += neighbor.id_decodes;
   }

@@ -14,6 +14,7 @@ namespace crepes {
 /// may write it, and whoever may look at the cameras may read it.
 class CoverageFile {
  public:
+  /// `socket` is that of the daemon's recordings.
   explicit CoverageFile(const std::filesystem::path& socket);
   CoverageFile(const CoverageFile&) = delete;
   CoverageFile& operator=(const CoverageFile&) = delete;

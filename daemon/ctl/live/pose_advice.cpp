@@ -9,7 +9,8 @@ namespace {
 /// In the order of NoPoseReason.
 constexpr std::array<std::string_view, 14> kAdvice{
     "",
-    "Check the mesh, net.interface, a firewall on UDP 47474, the key, and whether its crepesd runs.",
+    "Check the mesh, net.interface, a firewall on UDP 47474, the key, and whether its crepesd "
+    "runs.",
     "Out of reach, or its battery or daemon has stopped.",
     "Wait two seconds. If it stays, packets arrive in one direction only.",
     "See the IMU among the sensors.",

@@ -14,10 +14,10 @@ namespace crepes {
 
 /// Where the server listens, and its limits.
 struct HttpSettings {
-  std::string address = "127.0.0.1";  ///< numeric, IPv4 or IPv6
-  std::uint16_t port = 8080;          ///< 0: a free one
-  std::string name;                   ///< of the Server header
-  Duration request_time = std::chrono::seconds{5};
+  std::string address = "127.0.0.1";                ///< numeric, IPv4 or IPv6
+  std::uint16_t port = 8080;                        ///< 0: a free one
+  std::string name;                                 ///< of the Server header
+  Duration request_time = std::chrono::seconds{5};  ///< in which a request must be complete
 };
 
 /// At most 64 connections. For a further one, the oldest without a reply on its way is closed; if

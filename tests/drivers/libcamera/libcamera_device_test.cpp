@@ -15,7 +15,9 @@ TEST(LibcameraDevice, NamesACameraThatIsNotThere) {
   ASSERT_FALSE(device);
   EXPECT_EQ(device.error().code, ErrorCode::kNotFound);
   const std::vector<FoundCamera> found = find_libcamera_cameras();
-  if (found.empty()) EXPECT_EQ(device.error().message, "libcamera finds no camera");
+  if (found.empty()) {
+    EXPECT_EQ(device.error().message, "libcamera finds no camera");
+  }
   for (const FoundCamera& camera : found)
     EXPECT_NE(device.error().message.find(camera.device), std::string::npos);
 }

@@ -1,6 +1,6 @@
-#include "estimator/swarm/team_intake.hpp"
-
 #include <gtest/gtest.h>
+
+#include "estimator/swarm/team_intake.hpp"
 
 namespace crepes {
 namespace {
@@ -19,7 +19,8 @@ Report report_about(const std::vector<RobotId>& neighbors) {
   report.sender = RobotId{2};
   report.stamp = Timestamp{1s};
   for (const RobotId neighbor : neighbors) {
-    report.bearings.push_back({report.stamp, neighbor, Eigen::Vector3d::UnitX(), {}, 0.001});
+    report.bearings.push_back(
+        {report.stamp, neighbor, Eigen::Vector3d::UnitX(), Eigen::Vector3d::Zero(), 0.001});
     report.ranges.push_back({report.stamp, neighbor, 4.0, -80.0, -80.0});
   }
   return report;
@@ -27,7 +28,8 @@ Report report_about(const std::vector<RobotId>& neighbors) {
 
 ImuHistory resting() {
   ImuHistory imu;
-  for (Timestamp t{}; t <= Timestamp{2s}; t += 10ms) imu.push({t, {}, {0.0, 0.0, 9.81}});
+  for (Timestamp t{}; t <= Timestamp{2s}; t += 10ms)
+    imu.push({t, Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
   return imu;
 }
 

@@ -127,7 +127,7 @@ TEST(MeshRelay, StoresNoMoreForAFloodOfCopies) {
   relay.offer(datagram(), kBytes, address_of(kSender), kNow);
   const std::int64_t before = heap_bytes();
 
-  for (int i = 0; i < 100'000; ++i) ASSERT_TRUE(relay.note_copy(datagram(), address_of(kOther)));
+  for (int i = 0; i < 100'000; ++i) ASSERT_TRUE(relay.record_copy(datagram(), address_of(kOther)));
 
   EXPECT_LT(heap_bytes() - before, 1'000);
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "tests/support/simulated_grid.hpp"
@@ -54,21 +55,23 @@ TEST(GridCalibration, FindsTheLensFromTheResolutionAndARoughFieldOfView) {
   EXPECT_LT(found.lens_sigma_px, 0.15);
 }
 
-TEST(GridCalibration, ItsSigmasAreHonest) {
-  double nees = 0.0;
-  constexpr int kTrials = 12;
+// Two Double Spheres with other numbers may see the same, so that the numbers' own sigmas hold only
+// near one of them. What counts is where the lens puts directions in the picture.
+TEST(GridCalibration, ItsSigmaIsHonest) {
+  double squared = 0.0;
+  constexpr int kTrials = 6;
   for (int seed = 0; seed < kTrials; ++seed) {
     const auto found =
         calibrated(pictures_of(simulated::seen_grids(static_cast<std::uint64_t>(seed) + 10, 25, {}),
                                static_cast<std::uint64_t>(seed)));
     ASSERT_TRUE(found.refusals.empty()) << found.refusals.front();
-    const Eigen::VectorXd error = found.lens.numbers - simulated::grid_camera().numbers;
-    nees += error.dot(found.covariance.ldlt().solve(error)) / 6.0 / kTrials;
+    const double error_px = simulated::shape_error_px(found.lens, simulated::grid_camera(), 85.0);
+    squared += std::pow(error_px / found.lens_sigma_px, 2) / kTrials;
   }
 
-  // 72 degrees of freedom: 99.9 % lie within 0.52 and 1.62.
-  EXPECT_GT(nees, 0.52);
-  EXPECT_LT(nees, 1.62);
+  // Some five degrees of freedom a trial: of 30, 99.9 % lie within 0.37 and 2.
+  EXPECT_GT(squared, 0.37);
+  EXPECT_LT(squared, 2.0);
 }
 
 TEST(GridCalibration, StartsFromAFieldOfViewThatIsFarOff) {
