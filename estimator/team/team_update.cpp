@@ -96,13 +96,15 @@ void add_large_product(const MatrixXd& A, const MatrixXd& B, MatrixXd& C) {
   }
 }
 
-/// P -= G G^T. P stays symmetric to the bit.
+/// P -= G G^T of what is below the diagonal; what is above becomes its mirror image.
 void subtract_square(const MatrixXd& G, MatrixXd& P) {
   const Index n = P.rows();
   for (Index i = 0; i < n; i += kBlock) {
     const Index rows = std::min(kBlock, n - i);
     subtract_product(G.middleRows(i, rows), G.topRows(i + rows), P.block(i, 0, rows, i + rows));
     if (i > 0) P.block(0, i, i, rows) = P.block(i, 0, rows, i).transpose();
+    auto on_diagonal = P.block(i, i, rows, rows);
+    on_diagonal.triangularView<Eigen::StrictlyUpper>() = on_diagonal.transpose();
   }
 }
 

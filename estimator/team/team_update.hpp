@@ -23,7 +23,7 @@ class TeamUpdate {
   [[nodiscard]] bool is_valid() const { return is_valid_; }
   /// Of all states, from their mean.
   [[nodiscard]] const Eigen::VectorXd& correction() const { return correction_; }
-  /// P - G G^T, symmetric to the bit if P is. States that are not `corrected` keep their
+  /// P - G G^T, symmetric to the bit. States that are not `corrected` keep their
   /// covariance, and their correction is to be ignored (Schmidt's filter); their errors count all
   /// the same.
   void correct(const std::vector<bool>& corrected, Eigen::MatrixXd& P) const;
