@@ -23,9 +23,8 @@ struct TeamPose {
   Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
   /// Of the motion, and of the IMUs' biases: gyroscope and accelerometer of B, then of N.
   Covariance covariance = Covariance::Zero();
-  /// When anybody saw it, or it anybody, or ranges of robots that are seen located it.
-  Timestamp last_sighting{};
-  Duration clock_ahead{};  ///< its sensors' stamps are so much ahead of this robot's
+  Timestamp last_sighting{};  ///< when anybody saw it, or it anybody
+  Duration clock_ahead{};     ///< its sensors' stamps are so much ahead of this robot's
 
   [[nodiscard]] Matrix6d pose_covariance() const {
     Matrix6d of_pose;

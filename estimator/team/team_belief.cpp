@@ -252,7 +252,7 @@ TeamPose TeamBelief::team_pose(RobotId id, const TeamMember& member) const {
                 .T_B_N = {robot.motion.p_F + tau * robot.motion.v_F + 0.5 * tau * tau * a,
                           (robot.motion.q_F_B * so3_exp(tau * w)).normalized()},
                 .v_B_N = v,
-                .last_sighting = std::max(robot.last_sighting, robot.last_fix),
+                .last_sighting = robot.last_sighting,
                 .clock_ahead = from_seconds(tau)};
   pose.covariance.topLeftCorner<kMotion, kMotion>() = 0.5 * (of_motion + of_motion.transpose());
   pose.covariance.topRightCorner<kMotion, kBiases>() = with_biases;

@@ -1,13 +1,11 @@
 #include "estimator/team/team_readings.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <optional>
-#include <set>
 #include <tuple>
 #include <utility>
 
@@ -16,15 +14,8 @@
 namespace crepes {
 namespace {
 
-constexpr Duration kDark = std::chrono::seconds{1};  // a robot that nobody saw for so long
-// What hides a robot from all cameras may delay its ranges, too, for seconds: an error of 0.15 m
-// that lasts 2 s weighs as much as independent ones of this size in each interval.
-constexpr double kDarkSigma = 1.0;  // m
-// Ranges locate a robot in the dark if those who measure them are in different directions from it:
-// the least eigenvalue of the sum of u u^T.
-constexpr std::size_t kLeastBeacons = 3;
-constexpr double kLeastSpread = 0.05;
-constexpr double kMostDoubt = 0.7;  // m; sigma of its place; beyond, a range is no plane
+// Without bearings, repeated ranges make direction spuriously observable.
+constexpr Duration kDark = std::chrono::seconds{1};
 
 bool is_inside(const TeamInterval& interval, Timestamp stamp) {
   return stamp > interval.from && stamp <= interval.to;
@@ -64,70 +55,18 @@ std::vector<Sight> sights_of(const TeamInterval& interval, const TeamBelief& bel
   return all;
 }
 
-/// Which robots nobody sees, and which of them ranges locate.
-class Darkness {
- public:
-  Darkness(const TeamInterval& interval, const TeamBelief& belief)
-      : interval_(interval), belief_(belief) {
-    std::map<RobotId, std::set<RobotId>> beacons;
-    for (const TeamRange& reading : interval.ranges) {
-      if (!is_inside(interval, reading.stamp)) continue;
-      const auto dark = dark_of(reading);
-      if (!dark) continue;
-      const RobotId beacon = *dark == reading.observer ? reading.neighbor : reading.observer;
-      if (belief.robots.at(beacon).is_trusted) beacons[*dark].insert(beacon);
-    }
-    for (const auto& [dark, seen] : beacons)
-      if (is_located(dark, seen)) located_.insert(dark);
-  }
-
-  /// Where everybody is seen, or the one that is not is located by ranges.
-  [[nodiscard]] bool allows(const TeamRange& reading) const {
-    if (!is_dark(reading.observer) && !is_dark(reading.neighbor)) return true;
-    const auto dark = dark_of(reading);
-    return dark && located_.contains(*dark);
-  }
-  /// If one of the two is in the dark, and the other is not.
-  [[nodiscard]] std::optional<RobotId> dark_of(const TeamRange& reading) const {
-    if (!belief_.robots.contains(reading.observer) || !belief_.robots.contains(reading.neighbor) ||
-        is_dark(reading.observer) == is_dark(reading.neighbor))
-      return std::nullopt;
-    return is_dark(reading.observer) ? reading.observer : reading.neighbor;
-  }
-
- private:
-  [[nodiscard]] bool is_dark(RobotId id) const {
-    return interval_.to - belief_.robots.at(id).last_sighting > kDark;
-  }
-  [[nodiscard]] bool is_located(RobotId dark, const std::set<RobotId>& beacons) const {
-    if (beacons.size() < kLeastBeacons) return false;
-    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-    for (const RobotId beacon : beacons) {
-      const Eigen::Vector3d d =
-          belief_.robots.at(dark).motion.p_F - belief_.robots.at(beacon).motion.p_F;
-      spread += d * d.transpose() / d.squaredNorm();
-      if (!(belief_.position_covariance(dark, beacon).trace() < kMostDoubt * kMostDoubt))
-        return false;
-    }
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()(0) >= kLeastSpread;
-  }
-
-  const TeamInterval& interval_;
-  const TeamBelief& belief_;
-  std::set<RobotId> located_;
-};
-
 std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief& belief,
                                  TeamReadings::Stage stage) {
-  const Darkness darkness(interval, belief);
+  const auto is_dark = [&](RobotId id) {
+    return interval.to - belief.robots.at(id).last_sighting > kDark;
+  };
   std::map<std::pair<RobotId, RobotId>, Ranging> rangings;
   for (const TeamRange& reading : interval.ranges) {
     const auto [observer, neighbor] = std::pair(reading.observer, reading.neighbor);
     if (!is_inside(interval, reading.stamp) || !takes_part(belief, observer, neighbor, stage) ||
-        !darkness.allows(reading))
+        is_dark(observer) || is_dark(neighbor))
       continue;
-    rangings
-        .try_emplace({observer, neighbor}, Ranging{observer, neighbor, darkness.dark_of(reading)})
+    rangings.try_emplace({observer, neighbor}, Ranging{observer, neighbor})
         .first->second.ranges.push_back(&reading);
   }
   std::vector<Ranging> all;
@@ -226,7 +165,7 @@ TeamResidual gate(const Scene& scene, TeamRangeBias& bias, Ranging& ranging) {
     variance = row->covariance(scene.instant.covariance())(0, 0);
     noise = z->reading.sigma_m * z->reading.sigma_m;
     const bool fits = residual * residual <= scene.interval.settings.range_gate * variance;
-    if (!ranging.dark) bias.add(ranging.observer, fits, residual);
+    bias.add(ranging.observer, fits, residual);
     mean.add({residual, 0.0}, fits);
     return !fits;
   });
@@ -323,7 +262,6 @@ double TeamReadings::time_s(const TeamInterval& interval) const {
 }
 
 double Ranging::sigma_m() const {
-  if (dark) return kDarkSigma;
   double variance = 0.0;
   for (const TeamRange* z : ranges) variance += z->reading.sigma_m * z->reading.sigma_m;
   return std::sqrt(variance) / static_cast<double>(ranges.size());
@@ -352,12 +290,9 @@ void gate(const TeamInterval& interval, const TeamTrajectories& paths, const Tea
       }
     }
   }
-  for (Ranging& ranging : readings.rangings) {
+  for (Ranging& ranging : readings.rangings)
     residuals.push_back(
         gate(scene, belief.ranges.at(ordered(ranging.observer, ranging.neighbor)), ranging));
-    if (ranging.dark && !ranging.ranges.empty())
-      belief.robots.at(*ranging.dark).last_fix = interval.to;
-  }
   std::erase_if(readings.sights, [](const Sight& s) { return s.bearings.empty(); });
   std::erase_if(readings.rangings, [](const Ranging& r) { return r.ranges.empty(); });
 }

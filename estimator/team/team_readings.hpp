@@ -1,7 +1,6 @@
 /// The bearings and ranges of an interval, collected by camera and pair.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "estimator/team/team_belief.hpp"
@@ -26,7 +25,6 @@ struct Sight {
 struct Ranging {
   RobotId observer{};
   RobotId neighbor{};
-  std::optional<RobotId> dark{};  ///< the one of them that nobody sees
   std::vector<const TeamRange*> ranges{};
 
   /// Of their mean.

@@ -61,7 +61,6 @@ struct TeamRobot {
   int bias_index = 0;
   std::vector<TeamCamera> cameras{};
   Timestamp last_sighting{};
-  Timestamp last_fix{};  ///< in the dark, by the ranges of robots that are seen
   Timestamp since{};
   /// Measurements between a robot on probation and trusted robots correct the former only.
   bool is_trusted = false;
