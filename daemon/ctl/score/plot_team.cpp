@@ -163,7 +163,7 @@ std::string team_charts(const TeamData& team) {
   return section("Residuals of the team",
                  "Of what each robot measured, against what the team expected: the mean of the "
                  "normalized innovations squared. Honest covariances give 1; bearings give less, "
-                 "because vision.bearing_sigma_px is larger than their noise.",
+                 "because their configured noise is larger than theirs.",
                  residual_charts(team)) +
          section("What the team believes of each robot's sensors", "Bands are 3 sigma.",
                  calibration_charts_of_team(team));
