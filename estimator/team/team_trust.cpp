@@ -266,11 +266,12 @@ std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamB
   std::vector<RobotId> turned;
   for (const auto& [id, robot] : belief.robots) {
     if (is_strained(id, belief.stamp)) continue;
-    const bool was_realigned = is_realigned(id);
     for (const TeamCamera& camera : robot.cameras) {
       const bool contradicts = is_turned(belief.robots, id, camera);
+      // What a camera that may be turned has learned of late may be what strained the team.
+      const bool is_settling = is_realigned(id) || (camera.is_free && verdicts_.contains(id));
       const MisalignmentTest test =
-          was_realigned ? MisalignmentTest{} : tested(belief, camera, interval.settings.priors);
+          is_settling ? MisalignmentTest{} : tested(belief, camera, interval.settings.priors);
       if (!contradicts && test.chi2 <= kTurnedChi2) continue;
       convict(id, belief.stamp, turned_covariance(test.turn));
       turned.push_back(id);
