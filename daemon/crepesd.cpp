@@ -47,7 +47,7 @@ int run(const std::string& file) {
   print_lines("", checked.faults);
   if (!checked.faults.empty()) return kBadInput;
   Config* const config = &checked.config;
-  const auto lock = lock_robot(config->robot.id, config->net.interface, config->net.port);
+  auto lock = RobotLock::claim(config->robot.id, config->net.interface, config->net.port);
   if (!lock) return print(tl::unexpected(lock.error()));
   const Signals signals;
   const LogSession log(config->log.level);
@@ -62,7 +62,7 @@ int run(const std::string& file) {
   for (;;) {
     const Signal signal = signals.wait_for(next_check - machine.now());
     if (signal == Signal::kStop) break;
-    if (signal == Signal::kReload) reload(file, runtime, machine);
+    if (signal == Signal::kReload) reload(file, runtime, *lock, machine);
     if (machine.now() < next_check) continue;  // reloads do not delay the watchdog
     for (const std::string& loop : watchdog.check())
       log_message(LogLevel::kError, loop + ": this loop makes no progress");

@@ -9,6 +9,7 @@
 
 namespace crepes {
 
+/// What a serial device sends.
 enum class SerialProtocol : std::uint8_t {
   kNlink,
   kDwm1001Shell,

@@ -15,6 +15,7 @@
 
 namespace crepes {
 
+/// The bytes of a datagram and its source.
 struct Datagram {
   /// Truncated at UdpSocket::kMaxDatagram bytes.
   std::vector<std::uint8_t> bytes;

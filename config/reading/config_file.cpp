@@ -98,6 +98,17 @@ std::string to_string(const ConfigFault& fault) {
   return escaped(fmt::format("{}:{} {}{}", fault.file, line, key, fault.reason));
 }
 
+std::string to_string(const std::vector<ConfigFault>& faults) {
+  std::string lines;
+  for (const ConfigFault& fault : faults)
+    lines += fmt::format("{}{}", lines.empty() ? "" : "\n", to_string(fault));
+  return lines;
+}
+
+bool is_in_section(const ConfigFault& fault, std::string_view section) {
+  return is_inside(fault.key, section);
+}
+
 CheckedConfig check_config_text(const std::string& text, const std::string& file) {
   std::vector<ConfigFault> faults;
   const ConfigNode root = parse_config_tree(text, file, faults);
@@ -113,10 +124,7 @@ CheckedConfig check_config(const std::filesystem::path& path) {
 Result<Config> load_config(const std::filesystem::path& path) {
   CheckedConfig checked = check_config(path);
   if (checked.faults.empty()) return std::move(checked.config);
-  std::string message;
-  for (const ConfigFault& fault : checked.faults)
-    message += (message.empty() ? "" : "\n") + to_string(fault);
-  return fail(ErrorCode::kConfig, std::move(message));
+  return fail(ErrorCode::kConfig, to_string(checked.faults));
 }
 
 std::string write_config(const Config& config) {

@@ -3,9 +3,11 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "config/schema/config.hpp"
+#include "config/schema/section_name.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
@@ -20,6 +22,15 @@ struct ConfigFault {
 
 /// `file:line: key: reason`, in one line whatever the file contains.
 [[nodiscard]] std::string to_string(const ConfigFault& fault);
+/// A line for each fault; no line break at the end.
+[[nodiscard]] std::string to_string(const std::vector<ConfigFault>& faults);
+
+/// Whether the fault is in a section of the configuration, as in `is_in(fault, &Config::swarm)`.
+[[nodiscard]] bool is_in_section(const ConfigFault& fault, std::string_view section);
+template <class Section>
+[[nodiscard]] bool is_in(const ConfigFault& fault, Section Config::*section) {
+  return is_in_section(fault, section_name(section));
+}
 
 /// A file as read. `config` is valid only when there are no faults, and must not be used otherwise.
 struct CheckedConfig {

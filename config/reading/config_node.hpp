@@ -18,6 +18,7 @@ struct Place {
 
 /// A text, a list, a mapping, or nothing.
 struct ConfigNode {
+  /// What a node of the tree is.
   enum class Kind : std::uint8_t { kNothing, kText, kList, kMapping };
 
   Kind kind = Kind::kNothing;

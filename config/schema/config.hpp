@@ -25,6 +25,7 @@ enum class Change : std::uint8_t {
   kRestart,  ///< when the daemon starts again
 };
 
+/// Which robot this is.
 struct RobotConfig {
   RobotId id{};
 

@@ -4,6 +4,7 @@
 #include <net/if.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 namespace crepes {
@@ -30,6 +31,9 @@ void doubt_members(const SwarmConfig& swarm, Doubts& doubts) {
   }
 }
 
+/// The shortest slot of whole milliseconds that a camera of this rate can read [ms].
+double slot_of(double rate_hz) { return std::ceil(kFewFrames / rate_hz / kMillisecond - 1e-6); }
+
 void doubt_cameras(const Config& config, Doubts& doubts) {
   std::error_code status;
   for (std::size_t i = 0; i < config.cameras.size(); ++i) {
@@ -47,9 +51,9 @@ void doubt_cameras(const Config& config, Doubts& doubts) {
     const double frames = camera.calibration.rate_hz * config.swarm.slot_ms * kMillisecond;
     if (frames < kFewFrames) {
       doubts.push_back({key + ".rate_hz",
-                        fmt::format("gives {:.1f} frames a slot (swarm.slot_ms); two or more can "
-                                    "be read reliably",
-                                    frames)});
+                        fmt::format("gives {:.1f} frames a slot; two or more can be read reliably: "
+                                    "swarm.slot_ms: {:.0f}, and the same on the boards",
+                                    frames, slot_of(camera.calibration.rate_hz))});
     }
     if (camera.device.driver == CameraDriver::kFolder &&
         !std::filesystem::is_directory(camera.device.folder, status))

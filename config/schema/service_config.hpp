@@ -36,11 +36,13 @@ struct ViewConfig {
   }
 };
 
+/// The importance of a message.
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarning, kError };
 inline constexpr std::array kLogLevels{
     Choice{"debug", LogLevel::kDebug}, Choice{"info", LogLevel::kInfo},
     Choice{"warning", LogLevel::kWarning}, Choice{"error", LogLevel::kError}};
 
+/// The messages of the daemon.
 struct LogConfig {
   LogLevel level = LogLevel::kInfo;
 

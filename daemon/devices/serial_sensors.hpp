@@ -14,6 +14,7 @@
 
 namespace crepes {
 
+/// Everything that the ranging module needs of the configuration.
 struct UwbSensorSettings {
   UwbDeviceConfig device;
   UwbModules modules;
@@ -23,6 +24,7 @@ struct UwbSensorSettings {
   [[nodiscard]] bool operator==(const UwbSensorSettings&) const = default;
 };
 
+/// Everything that the inertial sensor needs of the configuration.
 struct ImuSensorSettings {
   ImuDeviceConfig device;
   double rate_hz = 0.0;  ///< expected sample rate

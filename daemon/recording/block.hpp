@@ -1,4 +1,4 @@
-/// What the daemon says on the socket of recordings, and how a tool reads it.
+/// The messages of the daemon on the socket of recordings, and how a tool reads them.
 #pragma once
 
 #include <optional>
@@ -25,7 +25,7 @@ class BlockStream {
 
   /// Sends a line.
   [[nodiscard]] Result<void> request(std::string_view request);
-  /// Waits at most `patience_ms` for data. Returns false once the daemon has hung up.
+  /// Waits at most `patience_ms` for data. Returns false once the daemon has closed the connection.
   [[nodiscard]] Result<bool> receive(int patience_ms);
   /// The next complete block, if it has arrived.
   [[nodiscard]] Result<std::optional<Block>> next();

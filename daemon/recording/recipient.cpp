@@ -48,13 +48,13 @@ bool Recipient::read_requests() {
        end = received_.find('\n')) {
     const std::string line = received_.substr(0, end);
     received_.erase(0, end + 1);
-    if (!take(line)) return false;
+    if (!parse_request(line)) return false;
   }
   return received_.size() < kMaxLine;
 }
 
 /// A recording is one request, and the only one of its connection; looks are many.
-bool Recipient::take(const std::string& line) {
+bool Recipient::parse_request(const std::string& line) {
   const bool is_look = line.starts_with(kLookRequest);
   if (records() || (!is_look && !request_.empty())) return false;
   request_ = line;

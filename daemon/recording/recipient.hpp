@@ -17,7 +17,7 @@ inline constexpr std::string_view kPicturesRequest = "RECORD 1 pictures";
 /// Followed by the index of a camera. Each such line asks for one picture.
 inline constexpr std::string_view kLookRequest = "LOOK 1 ";
 
-/// Never blocks. What it says is at most a few short lines.
+/// Never blocks. Its requests are at most a few short lines.
 class Recipient {
  public:
   explicit Recipient(UniqueFd socket) : socket_(std::move(socket)) {}
@@ -25,7 +25,7 @@ class Recipient {
   [[nodiscard]] int descriptor() const { return socket_.get(); }
   [[nodiscard]] bool records() const { return request_.starts_with(kRecordRequest); }
   [[nodiscard]] bool records_pictures() const { return request_ == kPicturesRequest; }
-  /// The camera of which it waits for a picture. Nobody who has not read the last one.
+  /// The camera of which it requests a picture. Empty until the tool has read the last one.
   [[nodiscard]] std::optional<std::uint8_t> looks_at() const {
     return is_idle() ? camera_ : std::nullopt;
   }
@@ -38,7 +38,7 @@ class Recipient {
   void put(std::string text);
   /// The picture that it waited for.
   void put_look(std::string text);
-  /// Says why it is not served; the end of the connection is near.
+  /// Sends the reason why it is not served; the connection ends soon.
   void refuse(std::string_view reason);
 
   /// Reads requests and sends what the socket accepts without blocking. Returns whether the tool is
@@ -47,7 +47,7 @@ class Recipient {
 
  private:
   [[nodiscard]] bool read_requests();
-  [[nodiscard]] bool take(const std::string& line);
+  [[nodiscard]] bool parse_request(const std::string& line);
   [[nodiscard]] bool send_some();
 
   UniqueFd socket_;

@@ -62,7 +62,7 @@ class Recorder {
       while (stage_.events.try_pop()) continue;
       missed_before_ = stage_.events.dropped();
     }
-    look();
+    answer_pictures();
   }
 
  private:
@@ -153,7 +153,7 @@ class Recorder {
   }
 
   /// Sends the pictures to those who look, once the robots in them are known or should be.
-  void look() {
+  void answer_pictures() {
     while (auto sighting = stage_.sightings.try_pop()) {
       if (sightings_.size() == kMaxSightings) sightings_.pop_front();
       sightings_.push_back(std::move(*sighting));

@@ -8,8 +8,8 @@
 
 namespace crepes {
 
-/// Listens, without blocking, for the owner and the group of this process. Replaces a socket file
-/// on which nobody listens any more.
+/// Listens without blocking. The owner and the group of this process may connect. Replaces a socket
+/// file that no process listens on.
 [[nodiscard]] Result<UniqueFd> listen_unix(const std::string& path);
 [[nodiscard]] Result<UniqueFd> connect_unix(const std::string& path);
 

@@ -1,6 +1,7 @@
 #include "daemon/service/reload.hpp"
 
 #include <sstream>
+#include <utility>
 
 #include "config/reading/config_file.hpp"
 #include "daemon/service/logging.hpp"
@@ -22,12 +23,21 @@ void refuse(const Error& error, Runtime& runtime) {
   runtime.report_refused_reload(error.message);
 }
 
+/// The mesh that is wanted is claimed before, and the old one released after the change.
+Result<ConfigChange> reconfigure(const Config& wanted, Runtime& runtime, RobotLock& lock) {
+  auto moved = lock.moved_to(wanted.net.interface, wanted.net.port);
+  if (!moved) return tl::unexpected(moved.error());
+  auto change = runtime.reconfigure(wanted);
+  if (change && *moved) lock = std::move(**moved);
+  return change;
+}
+
 }  // namespace
 
-void reload(const std::string& file, Runtime& runtime, const Clock& machine) {
+void reload(const std::string& file, Runtime& runtime, RobotLock& lock, const Clock& machine) {
   Watchdog::notify_reloading(machine.now());
-  const auto change =
-      load_config(file).and_then([&](const Config& wanted) { return runtime.reconfigure(wanted); });
+  const auto change = load_config(file).and_then(
+      [&](const Config& wanted) { return reconfigure(wanted, runtime, lock); });
   if (!change) {
     refuse(change.error(), runtime);
   } else {

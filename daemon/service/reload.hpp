@@ -4,13 +4,15 @@
 #include <string>
 
 #include "daemon/runtime.hpp"
+#include "daemon/service/robot_lock.hpp"
 #include "estimator/core/clock.hpp"
 
 namespace crepes {
 
 /// Applies the live changes in `file`. Reports the changes that need a restart in the log and in
-/// STATUS. A faulty file changes nothing, and all its faults are logged. `machine` is the clock
-/// whose time systemd expects.
-void reload(const std::string& file, Runtime& runtime, const Clock& machine);
+/// STATUS. A faulty file changes nothing, and all its faults are logged. `lock` follows to another
+/// mesh; one on which a daemon has the robot's id is refused. `machine` is the clock whose time
+/// systemd expects.
+void reload(const std::string& file, Runtime& runtime, RobotLock& lock, const Clock& machine);
 
 }  // namespace crepes

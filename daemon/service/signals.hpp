@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// What a signal asks for.
 enum class Signal : std::uint8_t { kNone, kStop, kReload };
 
 /// Construct it before any thread starts. Threads inherit the blocked signals, so that only

@@ -13,8 +13,11 @@ constexpr Duration kHealthPeriod = std::chrono::seconds{1};
 
 }  // namespace
 
-HealthReport::HealthReport(std::string name, const StageContext& context)
-    : name_(std::move(name)), context_(context), period_start_(context.clock.now()) {}
+HealthReport::HealthReport(std::string name, const StageContext& context, bool is_calibrated)
+    : name_(std::move(name)),
+      context_(context),
+      is_calibrated_(is_calibrated),
+      period_start_(context.clock.now()) {}
 
 bool HealthReport::is_due() const { return context_.clock.now() - period_start_ >= kHealthPeriod; }
 
@@ -25,6 +28,7 @@ void HealthReport::publish(const std::string& message, SensorTotals totals) {
   status.name = name_;
   status.rate_hz = static_cast<double>(measurements_) / elapsed_s;
   status.ok = message.empty();
+  status.is_calibrated = is_calibrated_;
   status.message = message;
   status.totals = std::move(totals);
   context_.report(std::move(status));

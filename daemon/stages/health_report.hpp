@@ -14,7 +14,7 @@ namespace crepes {
 class HealthReport {
  public:
   /// `context` must outlive this.
-  HealthReport(std::string name, const StageContext& context);
+  HealthReport(std::string name, const StageContext& context, bool is_calibrated = true);
 
   void count(std::size_t measurements) { measurements_ += measurements; }
   [[nodiscard]] bool is_due() const;
@@ -28,6 +28,7 @@ class HealthReport {
  private:
   std::string name_;
   const StageContext& context_;
+  bool is_calibrated_;
   Timestamp period_start_;
   std::size_t measurements_ = 0;
   std::string logged_;

@@ -32,6 +32,8 @@ Result<UdpSocket> MeshSocket::open() {
   auto socket =
       UdpSocket::open_broadcast(config_.interface, static_cast<std::uint16_t>(config_.port));
   if (socket && !keys->empty()) log_message(LogLevel::kInfo, "mesh: " + *keys);
+  if (socket && keys_may_be_swapped())
+    log_message(LogLevel::kWarning, fmt::format("mesh: {}", kKeysUnlocked));
   return socket;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "estimator/core/result.hpp"
@@ -17,6 +18,9 @@
 #include "net/udp_socket.hpp"
 
 namespace crepes {
+
+inline constexpr std::string_view kKeysUnlocked =
+    "keys may be written to swap: their memory cannot be locked; raise LimitMEMLOCK (ulimit -l)";
 
 /// A socket and its keys, reopened when the interface disappears and returns. While a key cannot be
 /// read there is no socket, so nothing leaves unsealed or unsigned by mistake. Changes are logged.
@@ -33,6 +37,10 @@ class MeshSocket {
   [[nodiscard]] const std::optional<PacketSigner>& signer() const { return signer_; }
   /// The current fault; empty without one.
   [[nodiscard]] const std::string& fault() const { return fault_; }
+  /// True if the system does not lock the memory of a key.
+  [[nodiscard]] bool keys_may_be_swapped() const {
+    return (seal_ && !seal_->is_locked()) || (signer_ && !signer_->is_locked());
+  }
   [[nodiscard]] int descriptor() const { return socket_ ? socket_->descriptor() : -1; }
 
  private:

@@ -54,23 +54,6 @@ std::string key_warning(const NetSettings& settings) {
                      ids.size() - signing, ids.size());
 }
 
-AirTotals air_totals(const PeerLink& link, Timestamp now) {
-  AirTotals totals{
-      .at = now,
-      .sent = link.counters()[MeshCounter::kSent] + link.counters()[MeshCounter::kForwarded],
-      .sent_bytes =
-          link.counters()[MeshCounter::kSentBytes] + link.counters()[MeshCounter::kForwardedBytes],
-      .received = link.counters()[MeshCounter::kReceived],
-      .received_bytes = link.counters()[MeshCounter::kReceivedBytes],
-      .lost = 0,
-      .of_peers = {}};
-  for (const PeerTraffic& traffic : link.traffic(now)) {
-    totals.lost += traffic.lost;
-    totals.of_peers[traffic.peer] = traffic.received + traffic.lost;
-  }
-  return totals;
-}
-
 /// The net thread's state.
 class NetLoop {
  public:
@@ -124,7 +107,7 @@ class NetLoop {
   void every_second() {
     next_second_ = clock_.now() + std::chrono::seconds{1};
     key_monitor_.update(link_);
-    const AirTotals before = std::exchange(air_totals_, air_totals(link_, clock_.now()));
+    const AirTotals before = std::exchange(air_totals_, link_.air_totals(clock_.now()));
     air_ = air_share(before, air_totals_, settings_.send.broadcasts);
     notify_service();
   }
@@ -133,6 +116,12 @@ class NetLoop {
     const std::string doubled = doubled_ids_.fault(clock_.now());
     if (!mesh_.fault().empty()) return mesh_.fault();
     return doubled.empty() ? key_monitor_.fault() : doubled;
+  }
+
+  [[nodiscard]] std::string mesh_warning() const {
+    const std::string keys = key_warning(settings_);
+    if (!mesh_.keys_may_be_swapped()) return keys;
+    return std::string(kKeysUnlocked) + (keys.empty() ? "" : "; ") + keys;
   }
 
   /// Sends the status line to systemd if it has changed.
@@ -229,7 +218,7 @@ class NetLoop {
     status.traffic = link_.traffic(status.stamp);
     status.mesh = {.is_sealed = mesh_.seal().has_value(),
                    .is_signed = mesh_.signer().has_value(),
-                   .warning = key_warning(settings_),
+                   .warning = mesh_warning(),
                    .air = air_};
     status.queues = stage_.queues();
     status.network = link_.counters().totals();

@@ -45,6 +45,7 @@ class NetInbox {
   UniqueFd wake_;
 };
 
+/// The settings slice of this stage.
 struct NetSettings {
   RobotId self{};
   std::map<RobotId, std::string> members;  ///< names, this robot's included

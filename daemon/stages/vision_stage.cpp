@@ -130,7 +130,7 @@ SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::ui
 void run_vision(const VisionStage& stage, const StageContext& context,
                 const std::stop_token& stop) {
   std::optional<SpotDetector> detector;
-  HealthReport health(stage.camera_name + " spots", context);
+  HealthReport health(stage.camera_name + " spots", context, stage.is_calibrated);
   Rejected rejected;
   Delays delays;
   SpotLevels levels;

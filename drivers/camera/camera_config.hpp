@@ -12,12 +12,14 @@
 
 namespace crepes {
 
+/// The program interface of a camera.
 enum class CameraDriver : std::uint8_t { kNone, kFolder, kAravis, kV4l2, kLibcamera, kMindVision };
 inline constexpr std::array kCameraDrivers{
     Choice{"none", CameraDriver::kNone},           Choice{"folder", CameraDriver::kFolder},
     Choice{"aravis", CameraDriver::kAravis},       Choice{"v4l2", CameraDriver::kV4l2},
     Choice{"libcamera", CameraDriver::kLibcamera}, Choice{"mindvision", CameraDriver::kMindVision}};
 
+/// What starts an exposure.
 enum class CameraTrigger : std::uint8_t { kFree, kHardware };
 inline constexpr std::array kCameraTriggers{Choice{"free", CameraTrigger::kFree},
                                             Choice{"hardware", CameraTrigger::kHardware}};

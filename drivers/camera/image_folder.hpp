@@ -14,6 +14,7 @@ namespace crepes {
 /// The image in a file, in grey and without a stamp. Errors name the file.
 [[nodiscard]] Result<Frame> read_gray_image(const std::filesystem::path& file);
 
+/// The file of a picture and its stamp.
 struct RecordedPicture {
   Timestamp stamp{};
   std::filesystem::path file;

@@ -20,6 +20,7 @@ class CsvFile {
  public:
   static constexpr std::size_t kMaxColumns = 48;
 
+  /// How the line of column names begins.
   enum class Header { kHash, kPlain };
 
   [[nodiscard]] static Result<CsvFile> open(const std::filesystem::path& file, std::size_t columns,

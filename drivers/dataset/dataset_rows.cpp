@@ -100,7 +100,7 @@ void append_bearing_row(std::string& text, Timestamp frame, const Bearing& beari
   append_row(text, to_ns(frame), bearing.neighbor.value, u_px, v_px, u_B.x(), u_B.y(), u_B.z(),
              bearing.sigma_rad);
   text.back() = ',';
-  text += "read\n";
+  text += bearing.how == Naming::kRead ? "read\n" : "predicted\n";
 }
 
 }  // namespace crepes

@@ -24,8 +24,7 @@ void append_rows(std::string& text, const SpotFrame& frame);
 [[nodiscard]] std::vector<ImuSample> imu_samples(std::string_view rows);
 [[nodiscard]] std::vector<SpotFrame> spot_frames(std::string_view rows);
 
-/// A bearing in the picture of `frame`, at the pixel `u_px`, `v_px`. `how` is always read: the
-/// tracker reports a robot only while its blinking is read.
+/// A bearing in the picture of `frame`, at the pixel `u_px`, `v_px`.
 void append_bearing_row(std::string& text, Timestamp frame, const Bearing& bearing, double u_px,
                         double v_px);
 

@@ -22,7 +22,21 @@ Result<void> write_text(const fs::path& file, std::string_view text, std::ios::o
               fmt::format("{}: {}", file.string(), std::generic_category().message(errno)));
 }
 
+/// Gives the written part its final name.
+Result<void> publish_part(const fs::path& file) {
+  std::error_code status;
+  fs::rename(part_of(file), file, status);
+  if (!status) return {};
+  return fail(ErrorCode::kIo, fmt::format("{}: {}", file.string(), status.message()));
+}
+
 }  // namespace
+
+Result<void> replace_text_file(const fs::path& file, std::string_view text) {
+  return write_text(part_of(file), text, std::ios::trunc).and_then([&] {
+    return publish_part(file);
+  });
+}
 
 Result<PartFile> PartFile::create(fs::path file, std::string_view header) {
   std::error_code status;
@@ -46,10 +60,7 @@ void PartFile::flush() {
 Result<void> PartFile::publish() {
   flush();
   if (failure_) return tl::unexpected(*failure_);
-  std::error_code status;
-  fs::rename(part_of(file_), file_, status);
-  if (!status) return {};
-  return fail(ErrorCode::kIo, fmt::format("{}: {}", file_.string(), status.message()));
+  return publish_part(file_);
 }
 
 }  // namespace crepes

@@ -10,6 +10,10 @@
 
 namespace crepes {
 
+/// Replaces a text file at once: readers see the former content or the new one.
+[[nodiscard]] Result<void> replace_text_file(const std::filesystem::path& file,
+                                             std::string_view text);
+
 /// A text file that is written as NAME.part. `publish` renames it to NAME.
 class PartFile {
  public:

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <optional>
+#include <tuple>
 
 #include "drivers/base/number_text.hpp"
 #include "drivers/dataset/csv_file.hpp"
@@ -11,7 +12,8 @@ namespace crepes {
 namespace {
 
 constexpr std::size_t kFirstResidual = 5;
-constexpr std::size_t kInnovationColumns = kFirstResidual + 2 * Fusion::kMaxDimension;
+constexpr std::size_t kFirstReading = kFirstResidual + 2 * Fusion::kMaxDimension;
+constexpr std::size_t kInnovationColumns = kFirstReading + std::tuple_size_v<SensorReading>;
 constexpr std::size_t kStates = CalibrationRecord::kNames.size();
 
 void append_cell(std::string& text, double value) {
@@ -57,6 +59,8 @@ bool read_row(const CsvFile& csv, MeasurementRecord& record, DatasetFaults& faul
         !csv.read(kFirstResidual + 2 * i + 1, fusion.sigma.at(i), faults))
       return false;
   }
+  for (std::size_t i = 0; i < reading_size(record.kind); ++i)
+    if (!csv.read(kFirstReading + i, record.reading.at(i), faults)) return false;
   return true;
 }
 
@@ -91,6 +95,8 @@ Result<std::vector<Record>> read_file(const std::filesystem::path& file, std::si
 std::string innovation_file_header() {
   std::string header = "t_ns,kind,verdict,nis,dof";
   for (std::size_t i = 0; i < Fusion::kMaxDimension; ++i) header += fmt::format(",r{0},s{0}", i);
+  for (std::size_t i = 0; i < std::tuple_size_v<SensorReading>; ++i)
+    header += fmt::format(",z{}", i);
   return header;
 }
 
@@ -107,6 +113,13 @@ void append_innovation_row(std::string& text, const MeasurementRecord& record) {
       append_cell(text, fusion.sigma.at(i));
     } else {
       text += ",,";
+    }
+  }
+  for (std::size_t i = 0; i < record.reading.size(); ++i) {
+    if (i < reading_size(record.kind)) {
+      append_cell(text, record.reading.at(i));
+    } else {
+      text += ',';
     }
   }
   text += '\n';

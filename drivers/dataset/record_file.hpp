@@ -11,8 +11,9 @@
 
 namespace crepes {
 
-/// t_ns,kind,verdict,nis,dof,r0,s0,...,r8,s8: residual and its sigma (root of S_ii) by component;
-/// the components beyond `dof` are empty.
+/// t_ns,kind,verdict,nis,dof,r0,s0,...,r8,s8,z0,...,z5: residual and its sigma (root of S_ii) by
+/// component; the components beyond `dof` are empty, and those of `SensorReading` that the kind has
+/// not.
 [[nodiscard]] std::string innovation_file_header();
 void append_innovation_row(std::string& text, const MeasurementRecord& record);
 /// Any bad row is an error.

@@ -26,6 +26,7 @@ struct IioScan {
   std::optional<Eigen::Vector3d> accel_mps2;
 };
 
+/// The quantities that a buffer delivers.
 struct IioQuantities {
   bool rate = false;
   bool acceleration = false;
@@ -39,6 +40,7 @@ struct IioQuantities {
 /// Sampling begins when this is opened and ends when it is destroyed.
 class IioBuffer {
  public:
+  /// Totals since the buffer was opened.
   struct Counts {
     std::uint64_t stamps_refused = 0;  ///< scans that are of another time, or of the past
     std::uint64_t clock_restarts = 0;  ///< of a clock other than CLOCK_MONOTONIC

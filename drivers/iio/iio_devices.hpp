@@ -17,6 +17,7 @@ struct IioPaths {
   std::filesystem::path dev = "/dev";
 };
 
+/// A device of the kernel in sysfs.
 struct IioDevice {
   std::string id;     ///< as in "iio:device0"
   std::string name;   ///< of the chip, as in "icm42688-gyro"
@@ -32,7 +33,7 @@ struct IioDevice {
 /// All that measure rate or acceleration, by id.
 [[nodiscard]] std::vector<IioDevice> find_iio_devices(const IioPaths& paths);
 
-/// The name of the chip, without what tells its gyroscope from its accelerometer.
+/// The name of the chip, without the suffix of its gyroscope or accelerometer.
 [[nodiscard]] std::string_view chip_of(std::string_view name);
 
 /// The devices of an IMU; both may be the same.
@@ -46,6 +47,7 @@ struct IioImuDevices {
 /// own is taken. kNotFound: there is none now.
 [[nodiscard]] Result<IioImuDevices> choose_iio_imu(const IioPaths& paths, std::string_view port);
 
+/// The devices of one inertial sensor.
 struct FoundIioImu {
   std::string port;  ///< what names it, for `choose_iio_imu`
   IioImuDevices devices;

@@ -89,7 +89,7 @@ Result<void> IioImu::read_once(std::chrono::milliseconds timeout,
     });
   }
   if (read && has_rates && polled_) read = read_polled();
-  for (const ImuSample& sample : pairing_.take()) forward(sample, sink);
+  for (const ImuSample& sample : pairing_.drain()) forward(sample, sink);
   return read;
 }
 

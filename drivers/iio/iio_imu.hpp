@@ -18,6 +18,7 @@ namespace crepes {
 /// rates arrive. Samples are in the axes of the board that the mount matrices name.
 class IioImu {
  public:
+  /// Totals since the sensor was opened.
   struct Counts {
     ImuCounts samples;
     std::uint64_t unpaired = 0;        ///< rates without an acceleration before and after them

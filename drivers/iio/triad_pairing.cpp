@@ -2,7 +2,7 @@
 
 namespace crepes {
 
-std::vector<ImuSample> TriadPairing::take() {
+std::vector<ImuSample> TriadPairing::drain() {
   std::vector<ImuSample> samples;
   while (!rates_.empty()) {
     const StampedTriad rate = rates_.front();

@@ -11,6 +11,7 @@
 
 namespace crepes {
 
+/// A rate or an acceleration, and its time.
 struct StampedTriad {
   Timestamp stamp;
   Eigen::Vector3d value;
@@ -28,7 +29,7 @@ class TriadPairing {
   }
 
   /// The samples that are complete, in order. A rate waits for the next acceleration.
-  [[nodiscard]] std::vector<ImuSample> take();
+  [[nodiscard]] std::vector<ImuSample> drain();
 
   /// Rates without acceleration, but for those before the first.
   [[nodiscard]] std::uint64_t unpaired() const { return unpaired_; }

@@ -31,7 +31,7 @@ std::uint16_t crc_of(Bytes bytes, std::uint16_t crc) {
 
 ImuReading read_hi91(Bytes payload) {
   return {.verdict = ImuVerdict::kSample,
-          .gyro_radps = vector_at<float>(payload, 24) * kRadPerDeg,
+          .gyro_radps = vector_at<float>(payload, 24) * radians(1.0),
           .accel_mps2 = vector_at<float>(payload, 12) * kGravityMps2,
           .time = DeviceTime::ticks(unsigned_at(payload, 8, 4), std::chrono::milliseconds{1}, 32)};
 }

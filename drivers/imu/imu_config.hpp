@@ -12,6 +12,7 @@
 
 namespace crepes {
 
+/// What an inertial sensor sends.
 enum class ImuProtocol : std::uint8_t {
   kAuto,
   kWitMotion,

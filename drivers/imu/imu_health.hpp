@@ -15,6 +15,7 @@ namespace crepes {
 /// users. Pure.
 class ImuHealth {
  public:
+  /// Totals since the start.
   struct Counts {
     std::uint64_t dropped = 0;  ///< samples that are missing
     std::uint64_t stuck = 0;    ///< samples refused because the values had not changed for too long

@@ -15,6 +15,7 @@
 
 namespace crepes {
 
+/// What became of a message.
 enum class ImuVerdict : std::uint8_t {
   kSample,
   kOther,      ///< a frame without rate or acceleration

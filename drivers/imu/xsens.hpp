@@ -20,6 +20,7 @@ enum class XsensQuantity : std::uint8_t {
   kNone,
 };
 
+/// The items of one message.
 struct XsensMessage {
   XsensQuantity quantity = XsensQuantity::kNone;
   /// Of increments: the rotation [rad] and the change of velocity [m/s] of one output period.

@@ -44,7 +44,7 @@ std::string describe(led_fault fault) {
     case LED_BAD_PATTERN:
       return "a pattern must have 8 to 32 slots and change";
     case LED_BAD_TIME:
-      return "slots must last 2 to 50 ms, duty periods 10 to 200 ms, a test 60 s at most";
+      return "slots must last 2 to 70 ms, duty periods 10 to 200 ms, a test 60 s at most";
     case LED_BAD_BRIGHTNESS:
       return "brightness must lie between 0 and 100 %";
     case LED_BAD_FLASH:

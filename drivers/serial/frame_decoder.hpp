@@ -23,6 +23,7 @@ enum class FrameKind : std::uint8_t {
   kComplete,     ///< a frame of `length` bytes
 };
 
+/// Whether bytes begin with a frame, and its length.
 struct FrameCheck {
   FrameKind kind = FrameKind::kNone;
   std::size_t length = 0;

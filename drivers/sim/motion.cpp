@@ -82,7 +82,7 @@ BodyState Motion::at(double t_s, const SteeredState& steered) const {
   const Attitude attitude =
       rule == AttitudeRule::kEuler
           ? euler_attitude(*this, t_s, heading)
-          : thrust_attitude(heading, a_W_B + kWorldGravityMps2 * Eigen::Vector3d::UnitZ(),
+          : thrust_attitude(heading, a_W_B + kNominalGravityMps2 * Eigen::Vector3d::UnitZ(),
                             position_derivative(3));
   return {.T_W_B = {position_derivative(0), attitude.q_W_B.normalized()},
           .v_W_B = position_derivative(1),

@@ -5,16 +5,14 @@
 #include <vector>
 
 #include "drivers/sim/velocity_lag.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/core/pose.hpp"
 
 namespace crepes {
 
-/// Of the simulated world. Recordings were made with it: changing it to the standard value would
-/// change all of them.
-inline constexpr double kWorldGravityMps2 = 9.81;
-
 /// One coordinate over time: a line plus sines.
 struct Wave {
+  /// One sine of a wave.
   struct Sine {
     double amplitude;
     double omega_radps;
@@ -37,10 +35,11 @@ struct BodyState {
 
   /// The output of an ideal accelerometer: +9.81 upwards at rest [m/s^2], body axes.
   [[nodiscard]] Eigen::Vector3d specific_force() const {
-    return T_W_B.q.conjugate() * (a_W_B + kWorldGravityMps2 * Eigen::Vector3d::UnitZ());
+    return T_W_B.q.conjugate() * (a_W_B + kNominalGravityMps2 * Eigen::Vector3d::UnitZ());
   }
 };
 
+/// How the attitude follows from the motion.
 enum class AttitudeRule {
   kEuler,   ///< yaw, pitch and roll as given: hand-held robots, wheels
   kThrust,  ///< z along the specific force, yaw as given: multirotors

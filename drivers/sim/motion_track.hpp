@@ -25,7 +25,7 @@ class MotionTrackWriter {
   [[nodiscard]] static Result<MotionTrackWriter> create(const std::filesystem::path& file,
                                                         std::size_t robots);
 
-  /// The next record: where each robot is when its time begins, and what it is told.
+  /// The next record: where each robot is when its time begins, and its command.
   [[nodiscard]] Result<void> append(const std::vector<SteeredState>& robots);
   /// World time at which the next record begins.
   [[nodiscard]] double next_s() const { return kTrackPeriod * static_cast<double>(records_); }

@@ -34,6 +34,9 @@ class RingRenderer {
   /// Accepts a frame of `render` for reuse; its pixels must be unchanged.
   void recycle(Frame frame);
 
+  /// How the camera truly is mounted.
+  [[nodiscard]] const Pose& T_C_B() const { return T_C_B_; }
+
   /// LEDs appear this many times as bright as at first.
   void set_brightness(double factor) { brightness_ = factor; }
 

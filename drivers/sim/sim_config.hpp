@@ -9,6 +9,7 @@
 
 namespace crepes {
 
+/// The robots of the simulated world and their motions.
 enum class SimScenario : std::uint8_t {
   kTwo,
   kFour,

@@ -14,6 +14,7 @@ namespace crepes {
 /// The errors of one sensor triad:  measured = (I + S) true + bias(t) + noise.
 class SimTriad {
  public:
+  /// The sigmas of the errors that a sensor is drawn with.
   struct Sigmas {
     double bias;
     double random_walk;  ///< of the bias [unit/s/sqrt(Hz)]

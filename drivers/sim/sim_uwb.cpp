@@ -8,6 +8,7 @@
 #include <string>
 
 #include "drivers/sim/seeded_noise.hpp"
+#include "drivers/uwb/nlink_encoder.hpp"
 
 namespace crepes {
 namespace {

@@ -3,8 +3,8 @@
 
 namespace crepes {
 
-/// One coordinate of a robot that was told a velocity: three equal first-order lags, in closed form
-/// from the moment of the command on. Position, velocity, acceleration and jerk are continuous
+/// One coordinate of a robot with a commanded velocity: three equal first-order lags, in closed
+/// form from the moment of the command on. Position, velocity, acceleration and jerk are continuous
 /// where one command follows another.
 struct VelocityLag {
   static constexpr double kRate = 6.0;  ///< of each of the lags [rad/s]: half a second in all

@@ -51,7 +51,7 @@ Motion hovering(WaveSource waves, double x, double y, double height, double yaw)
           .x = waves.wander(x, 0.6, 0.17),
           .y = waves.wander(y, 0.6, 0.17),
           .z = waves.wander(height, 0.35, 0.13),
-          .yaw = waves.wander(yaw, 20.0 * kRadPerDeg, 0.12),
+          .yaw = waves.wander(yaw, radians(20.0), 0.12),
           .pitch = {},
           .roll = {}};
 }
@@ -68,7 +68,7 @@ Motion ground_robot(WaveSource waves, double radius, double bearing) {
           .x = waves.wander(radius * std::cos(bearing), 0.5, 0.09),
           .y = waves.wander(radius * std::sin(bearing), 0.5, 0.09),
           .z = {.offset = 0.3},
-          .yaw = waves.wander(bearing + kPi, 20.0 * kRadPerDeg, 0.1),
+          .yaw = waves.wander(bearing + kPi, radians(20.0), 0.1),
           .pitch = {},
           .roll = {}};
 }
@@ -81,9 +81,9 @@ Motion hand_held(WaveSource waves, double bearing) {
                 .x = waves.wander(0.0, 0.15, 0.6),
                 .y = waves.wander(0.0, 0.15, 0.6),
                 .z = waves.wander(1.4, 0.25, 0.5),
-                .yaw = waves.wander(bearing + kPi, 45.0 * kRadPerDeg, 0.8),
-                .pitch = waves.wander(0.0, 25.0 * kRadPerDeg, 0.9),
-                .roll = waves.wander(0.0, 35.0 * kRadPerDeg, 0.7)};
+                .yaw = waves.wander(bearing + kPi, radians(45.0), 0.8),
+                .pitch = waves.wander(0.0, radians(25.0), 0.9),
+                .roll = waves.wander(0.0, radians(35.0), 0.7)};
   motion.x.sines.push_back({kRadius, kTurn, bearing + kPi / 2.0});  // radius cos(bearing + turn t)
   motion.y.sines.push_back({kRadius, kTurn, bearing});
   motion.yaw.slope_ps = kTurn;
@@ -94,7 +94,7 @@ Motion hand_held(WaveSource waves, double bearing) {
 Motion resting(WaveSource waves, double x, double y, double z, double yaw) {
   const auto near = [&waves](double place) { return Wave{.offset = waves.within(place, 0.1)}; };
   const auto askew = [&waves](double angle) {
-    return Wave{.offset = waves.within(angle, 2.0 * kRadPerDeg)};
+    return Wave{.offset = waves.within(angle, radians(2.0))};
   };
   return {.rule = AttitudeRule::kEuler,
           .x = near(x),
@@ -105,7 +105,7 @@ Motion resting(WaveSource waves, double x, double y, double z, double yaw) {
           .roll = askew(0.0)};
 }
 
-/// A multirotor in a light wind, which is told where to fly; it begins near a place.
+/// A multirotor in a light wind, which follows commands; it begins near a place.
 Motion steered(WaveSource waves, double x, double y, double spread, double yaw) {
   const double near_x = waves.within(x, spread);
   const double near_y = waves.within(y, spread);
@@ -113,7 +113,7 @@ Motion steered(WaveSource waves, double x, double y, double spread, double yaw) 
           .x = waves.wander(near_x, 0.08, 0.1),
           .y = waves.wander(near_y, 0.08, 0.1),
           .z = waves.wander(waves.within(1.4, 0.1), 0.05, 0.1),
-          .yaw = waves.wander(yaw, 3.0 * kRadPerDeg, 0.1),
+          .yaw = waves.wander(yaw, radians(3.0), 0.1),
           .pitch = {},
           .roll = {}};
 }

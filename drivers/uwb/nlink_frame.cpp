@@ -1,10 +1,10 @@
 #include "drivers/uwb/nlink_frame.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "drivers/serial/byte_fields.hpp"
+#include "drivers/uwb/nlink_layout.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/core/contract.hpp"
 
@@ -14,122 +14,6 @@ namespace {
 constexpr std::uint8_t kNlinkHeader = 0x55;
 constexpr std::uint8_t kIotHeader = 0x6a;
 constexpr std::uint8_t kLastRole = 6;
-constexpr std::size_t kMostNodes = 255;
-
-/// A kind with nodes: a fixed part that ends with the number of nodes, the nodes, a checksum.
-/// Offsets are from the frame, or from the node where the name says so; 0: the kind has no such
-/// field.
-struct Layout {
-  NlinkKind kind;
-  std::string_view name;
-  std::size_t id = 5;          ///< of the module
-  std::size_t id_size = 1;     ///< of module ids
-  std::size_t role = 4;        ///< of the module
-  bool has_node_roles = true;  ///< before the nodes' ids
-  std::size_t local_time = 0;
-  std::size_t system_time = 0;
-  std::size_t voltage = 0;
-  std::size_t count = 0;
-  std::size_t node_size = 0;  ///< with user data: of what precedes them
-  std::size_t node_id = 1;
-  std::size_t node_range = 0;
-  std::size_t node_powers = 0;
-  std::size_t node_time = 0;
-  std::size_t node_angle = 0;
-  std::size_t node_position = 0;
-  std::size_t node_user_data = 0;       ///< their number
-  std::size_t node_user_data_size = 2;  ///< of that number
-  std::size_t node_user_data_unit = 1;  ///< bytes each
-
-  [[nodiscard]] std::size_t first_node() const { return count + 1; }
-};
-
-constexpr std::array kLayouts{
-    Layout{.kind = NlinkKind::kNodeFrame0,
-           .name = "NodeFrame0",
-           .count = 10,
-           .node_size = 4,
-           .node_user_data = 2},
-    Layout{.kind = NlinkKind::kNodeFrame1,
-           .name = "NodeFrame1",
-           .local_time = 10,
-           .system_time = 6,
-           .voltage = 24,
-           .count = 26,
-           .node_size = 20,
-           .node_position = 2},
-    Layout{.kind = NlinkKind::kNodeFrame2,
-           .name = "NodeFrame2",
-           .local_time = 102,
-           .system_time = 6,
-           .voltage = 116,
-           .count = 118,
-           .node_size = 13,
-           .node_range = 2,
-           .node_powers = 5,
-           .node_time = 7},
-    Layout{.kind = NlinkKind::kNodeFrame3,
-           .name = "NodeFrame3",
-           .local_time = 6,
-           .system_time = 10,
-           .voltage = 18,
-           .count = 20,
-           .node_size = 7,
-           .node_range = 2,
-           .node_powers = 5},
-    Layout{.kind = NlinkKind::kNodeFrame4,
-           .name = "NodeFrame4",
-           .has_node_roles = false,
-           .local_time = 10,
-           .system_time = 6,
-           .voltage = 18,
-           .count = 20,
-           .node_size = 5,
-           .node_id = 0,
-           .node_user_data = 4,
-           .node_user_data_size = 1,
-           .node_user_data_unit = 4},
-    Layout{.kind = NlinkKind::kAoaNodeFrame0,
-           .name = "AOA NodeFrame0",
-           .local_time = 6,
-           .system_time = 10,
-           .voltage = 18,
-           .count = 20,
-           .node_size = 11,
-           .node_range = 2,
-           .node_powers = 7,
-           .node_angle = 5},
-    Layout{.kind = NlinkKind::kNodeFrame5,
-           .name = "NodeFrame5",
-           .id_size = 4,
-           .local_time = 9,
-           .system_time = 13,
-           .voltage = 21,
-           .count = 23,
-           .node_size = 10,
-           .node_range = 5,
-           .node_powers = 8},
-    Layout{.kind = NlinkKind::kNodeFrame6,
-           .name = "NodeFrame6",
-           .id_size = 4,
-           .count = 13,
-           .node_size = 7,
-           .node_user_data = 5},
-    // As in nlink_unpack/nlink_iot_frame0.c of github.com/nooploop-dev/nlink_parser; no recording.
-    Layout{.kind = NlinkKind::kIotFrame0,
-           .name = "IoT Frame0",
-           .id = 4,
-           .id_size = 4,
-           .role = 0,
-           .has_node_roles = false,
-           .count = 13,
-           .node_size = 14,
-           .node_id = 0,
-           .node_range = 4,
-           .node_powers = 11,
-           .node_user_data = 13,
-           .node_user_data_size = 1},
-};
 
 /// TagFrame0 has eight ranges, to anchors 0 to 7, instead of nodes.
 constexpr std::size_t kTagLength = 128;
@@ -157,9 +41,9 @@ constexpr std::size_t kAccelerationOffset = 12;
 constexpr std::size_t kAngles = 36;
 constexpr std::size_t kQuaternion = 42;
 
-const Layout* layout_of(NlinkKind kind) {
-  const auto* const found = std::ranges::find(kLayouts, kind, &Layout::kind);
-  return found == kLayouts.end() ? nullptr : found;
+const NlinkLayout* layout_of(NlinkKind kind) {
+  const auto* const found = std::ranges::find(kNlinkLayouts, kind, &NlinkLayout::kind);
+  return found == kNlinkLayouts.end() ? nullptr : found;
 }
 
 /// Empty: no frame of this protocol. Needs two bytes.
@@ -189,14 +73,14 @@ Eigen::Vector4d wxyz_at(Bytes bytes, std::size_t at) {
   return wxyz;
 }
 
-std::size_t user_data_size(Bytes bytes, const Layout& layout, std::size_t node) {
+std::size_t user_data_size(Bytes bytes, const NlinkLayout& layout, std::size_t node) {
   if (layout.node_user_data == 0) return 0;
   return layout.node_user_data_unit *
          unsigned_at(bytes, node + layout.node_user_data, layout.node_user_data_size);
 }
 
 /// Whether the nodes received so far can fill a frame of `length` bytes.
-bool nodes_can_fill(Bytes bytes, const Layout& layout, std::size_t length) {
+bool nodes_can_fill(Bytes bytes, const NlinkLayout& layout, std::size_t length) {
   const std::size_t end = length - 1;
   const std::size_t count = bytes[layout.count];
   if (layout.node_user_data == 0) return layout.first_node() + count * layout.node_size == end;
@@ -209,7 +93,7 @@ bool nodes_can_fill(Bytes bytes, const Layout& layout, std::size_t length) {
   return at == end;
 }
 
-bool has_known_roles(Bytes frame, const Layout& layout) {
+bool has_known_roles(Bytes frame, const NlinkLayout& layout) {
   if (layout.role != 0 && frame[layout.role] > kLastRole) return false;
   if (!layout.has_node_roles) return true;
   for (std::size_t at = layout.first_node(); at + 1 < frame.size();
@@ -276,7 +160,7 @@ NlinkFrame decode_tag(Bytes frame) {
   return decoded;
 }
 
-NlinkNode decode_node(Bytes frame, const Layout& layout, std::size_t at) {
+NlinkNode decode_node(Bytes frame, const NlinkLayout& layout, std::size_t at) {
   NlinkNode node;
   if (layout.has_node_roles) node.role = frame[at];
   node.module = static_cast<std::uint32_t>(unsigned_at(frame, at + layout.node_id, layout.id_size));
@@ -295,27 +179,17 @@ NlinkNode decode_node(Bytes frame, const Layout& layout, std::size_t at) {
   return node;
 }
 
-void append(std::vector<std::uint8_t>& out, std::uint32_t value, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) {
-    out.push_back(static_cast<std::uint8_t>(value >> 8U * i & 0xffU));
-  }
-}
-
-std::uint32_t power_code(double dbm) {
-  return static_cast<std::uint32_t>(std::clamp(std::lround(-2.0 * dbm), 0L, 255L));
-}
-
 }  // namespace
 
 std::string_view name_of(NlinkKind kind) {
   if (kind == NlinkKind::kAnchorFrame0) return "AnchorFrame0";
-  const Layout* layout = layout_of(kind);
+  const NlinkLayout* layout = layout_of(kind);
   return layout == nullptr ? "TagFrame0" : layout->name;
 }
 
 bool has_ranges(NlinkKind kind) {
   if (kind == NlinkKind::kAnchorFrame0) return false;
-  const Layout* layout = layout_of(kind);
+  const NlinkLayout* layout = layout_of(kind);
   return layout == nullptr || layout->node_range != 0;
 }
 
@@ -327,7 +201,7 @@ FrameCheck examine_nlink(Bytes bytes) {
   if (!kind) return {};
   if (kind == NlinkKind::kTagFrame0) return examine_tag(bytes);
   if (kind == NlinkKind::kAnchorFrame0) return examine_anchor(bytes);
-  const Layout* layout = layout_of(*kind);
+  const NlinkLayout* layout = layout_of(*kind);
   if (layout == nullptr) return {};
 
   // The length field and the number of nodes must agree.
@@ -348,7 +222,7 @@ NlinkFrame decode_nlink(Bytes frame) {
   CREPES_EXPECT(kind.has_value(), "a whole frame");
   if (kind == NlinkKind::kTagFrame0) return decode_tag(frame);
   if (kind == NlinkKind::kAnchorFrame0) return {.kind = NlinkKind::kAnchorFrame0};
-  const Layout* layout = layout_of(*kind);
+  const NlinkLayout* layout = layout_of(*kind);
   CREPES_EXPECT(layout != nullptr, "a whole frame of a known kind");
   NlinkFrame decoded{
       .kind = *kind,
@@ -366,33 +240,6 @@ NlinkFrame decode_nlink(Bytes frame) {
     decoded.nodes.push_back(decode_node(frame, *layout, at));
   }
   return decoded;
-}
-
-std::vector<std::uint8_t> encode_node_frame3(std::uint8_t module, std::uint32_t system_time_ms,
-                                             const std::vector<NlinkNode>& nodes) {
-  constexpr std::uint8_t kRoleNode = 0;
-  constexpr std::uint32_t kMillivolts = 4950;
-  constexpr std::size_t kFixed = 21;
-  constexpr std::size_t kPerNode = 7;
-  CREPES_EXPECT(nodes.size() <= kMostNodes, "the number of nodes is one byte");
-  std::vector<std::uint8_t> out{kNlinkHeader, static_cast<std::uint8_t>(NlinkKind::kNodeFrame3)};
-  append(out, static_cast<std::uint32_t>(kFixed + nodes.size() * kPerNode + 1), 2);
-  append(out, kRoleNode, 1);
-  append(out, module, 1);
-  append(out, system_time_ms, 4);  // the module's own time
-  append(out, system_time_ms, 4);  // the network's time
-  append(out, 0, 4);
-  append(out, kMillivolts, 2);
-  append(out, static_cast<std::uint32_t>(nodes.size()), 1);
-  for (const NlinkNode& node : nodes) {
-    append(out, kRoleNode, 1);
-    append(out, node.module, 1);
-    append(out, static_cast<std::uint32_t>(std::lround(node.range_m * 1000.0)), 3);
-    append(out, power_code(node.first_path_dbm), 1);
-    append(out, power_code(node.received_dbm), 1);
-  }
-  out.push_back(byte_sum(out));
-  return out;
 }
 
 }  // namespace crepes

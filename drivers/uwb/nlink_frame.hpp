@@ -79,9 +79,4 @@ inline constexpr std::size_t kLongestNlinkFrame = 119 + 255 * 13 + 1;  ///< Node
 /// the kind is read.
 [[nodiscard]] NlinkFrame decode_nlink(Bytes frame);
 
-/// The frame that a module with role NODE sends; times are milliseconds of the module's clock.
-[[nodiscard]] std::vector<std::uint8_t> encode_node_frame3(std::uint8_t module,
-                                                           std::uint32_t system_time_ms,
-                                                           const std::vector<NlinkNode>& nodes);
-
 }  // namespace crepes

@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// What a ranging module sends.
 enum class UwbProtocol : std::uint8_t {
   kAuto,
   kLinkTrack,

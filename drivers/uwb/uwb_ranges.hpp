@@ -39,12 +39,14 @@ struct UwbDistance {
   std::optional<std::uint32_t> from = std::nullopt;
 };
 
+/// The ranges of one frame, or why it has none.
 struct UwbReading {
   std::vector<UwbDistance> distances = {};
   std::optional<DeviceTime> time = std::nullopt;  ///< of modules that have a clock
   std::string_view no_ranges = {};                ///< the name of a frame that never has ranges
 };
 
+/// Totals of a parser, by reason.
 struct UwbCounts {
   std::uint64_t ranges = 0;
   std::uint64_t unknown_modules = 0;  ///< ranges to modules that no member carries
@@ -97,6 +99,7 @@ concept UwbProtocolFormat = FrameProtocol<Protocol> && requires(Bytes frame) {
   { Protocol::kNoRanges } -> std::convertible_to<std::string_view>;
 };
 
+/// Turns frames of any protocol into ranges, and counts the refused ones.
 template <UwbProtocolFormat Protocol>
 class UwbFrameParser {
  public:

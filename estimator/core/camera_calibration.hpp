@@ -11,10 +11,12 @@
 
 namespace crepes {
 
+/// The projection of a camera, under the names of Kalibr.
 enum class CameraModelKind : std::uint8_t { kDoubleSphere, kPinhole };
 inline constexpr std::array kCameraModels{Choice{"ds", CameraModelKind::kDoubleSphere},
                                           Choice{"pinhole", CameraModelKind::kPinhole}};
 
+/// The distortion of a camera, under the names of Kalibr.
 enum class DistortionModel : std::uint8_t { kNone, kEquidistant };
 inline constexpr std::array kDistortionModels{Choice{"none", DistortionModel::kNone},
                                               Choice{"equidistant", DistortionModel::kEquidistant}};

@@ -5,10 +5,11 @@
 
 namespace crepes {
 
-/// Standard gravity [m/s^2].
+/// Standard gravity [m/s^2]: the unit g of data sheets.
 inline constexpr double kGravityMps2 = 9.80665;
+/// Gravity where nobody has measured it [m/s^2]. Recordings of simulated worlds were made with it.
+inline constexpr double kNominalGravityMps2 = 9.81;
 
-inline constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 inline constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 /// An angle in degrees, in radians.

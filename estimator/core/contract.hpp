@@ -6,6 +6,7 @@
 
 namespace crepes::detail {
 
+/// Prints the condition and the place on stderr, and aborts.
 [[noreturn]] inline void contract_violated(const char* condition, const char* why, const char* file,
                                            int line) {
   std::fprintf(stderr, "%s:%d: contract violated: %s (%s)\n", file, line, why, condition);

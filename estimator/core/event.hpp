@@ -4,6 +4,7 @@
 #include <variant>
 
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/team_solution.hpp"
 
 namespace crepes {
 

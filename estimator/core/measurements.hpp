@@ -36,6 +36,12 @@ struct BasicUwbRange {
   double received_dbm = 0.0;
 };
 
+/// How the light of a bearing got its ID.
+enum class Naming : std::uint8_t {
+  kRead,       ///< from its blinking, up to this frame
+  kPredicted,  ///< it is where and when the board is expected; its blinking is still to be read
+};
+
 /// The direction in which a robot's camera sees the LED ring of `neighbor`.
 template <class Time>
 struct BasicBearing {
@@ -44,6 +50,15 @@ struct BasicBearing {
   Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();   ///< unit direction, observer's body axes
   Eigen::Vector3d p_B_C = Eigen::Vector3d::Zero();  ///< the camera's optical center in the body [m]
   double sigma_rad = 0.0;                           ///< one sigma across the direction
+  Naming how = Naming::kRead;                       ///< those of a report are read
+};
+
+/// The lever arms that readings of a pair refer to: rings of LEDs and antennas, in each one's body.
+struct PairMounting {
+  Eigen::Vector3d p_B_M = Eigen::Vector3d::Zero();  ///< our LED ring
+  Eigen::Vector3d p_B_U = Eigen::Vector3d::Zero();  ///< our antenna
+  Eigen::Vector3d p_N_M = Eigen::Vector3d::Zero();  ///< the neighbor's LED ring
+  Eigen::Vector3d p_N_Q = Eigen::Vector3d::Zero();  ///< the neighbor's antenna
 };
 
 /// The direction of up. Gravity determines roll and pitch only.
@@ -113,6 +128,7 @@ struct RelativePoseEdge {
   RobotId to{};
   GaussianPose T_from_to;
   Eigen::Vector3d v_from_to = Eigen::Vector3d::Zero();  ///< R_W_from^T (v_W_to - v_W_from)
+  Timestamp estimated{};  ///< when; the pair had seen each other just before
 };
 
 /// Input of the graph: all edges at one instant.
@@ -135,53 +151,6 @@ struct GraphSolution {
   std::vector<GraphPose> poses;  ///< ordered by neighbor; unreachable robots are absent
   double cost = 0.0;
   int iterations = 0;
-};
-
-/// One robot as the team's filter knows it, in this robot's body frame.
-struct TeamPose {
-  RobotId neighbor{};
-  Pose T_B_N;
-  Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
-  /// Of [p, v, theta], theta a right perturbation.
-  Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
-  Timestamp last_sighting{};  ///< when anybody saw it, or it anybody
-  Duration clock_ahead{};     ///< its sensors' stamps are so much ahead of this robot's
-};
-
-/// What the team's filter knows of a robot's IMU.
-struct ImuBiasEstimate {
-  RobotId robot{};
-  Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
-  Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d gyro_scale = Eigen::Matrix3d::Zero();  ///< the rate reads (I + scale) w + bias
-  double gyro_sigma_radps = 0.0;                         ///< root mean square of the axes
-  double accel_sigma_mps2 = 0.0;
-};
-
-/// A robot whose sensors contradict the rest of the team.
-struct TeamFault {
-  enum class Kind : std::uint8_t {
-    kCameraTurned,   ///< its bearings are used with the misalignment that the team found
-    kCameraRefused,  ///< it contradicts the team whatever its misalignment
-    kRanges,         ///< its ranges are refused
-    kClock,          ///< its stamps are used with the offset that the team found
-    kGyro,           ///< it reads other rates than its cameras show; the robot is left out
-  };
-  RobotId robot{};
-  Kind kind = Kind::kCameraTurned;
-  /// [rad] of a camera, [m] of ranges, positive if they are too long, [s] of a clock, positive if
-  /// it is ahead, [rad/s] of a gyroscope.
-  double size = 0.0;
-
-  [[nodiscard]] bool operator==(const TeamFault&) const = default;
-};
-
-/// The team's answer, in this robot's body frame at `stamp`.
-struct TeamSolution {
-  Timestamp stamp{};
-  std::vector<TeamPose> poses;          ///< ordered by neighbor
-  std::vector<ImuBiasEstimate> biases;  ///< of this robot and of all in `poses`
-  std::vector<TeamFault> faults;
 };
 
 }  // namespace crepes

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/team_solution.hpp"
 
 namespace crepes {
 
@@ -20,6 +21,7 @@ enum class PoseMode : std::uint8_t {
   kPredicted,  ///< coasting on the IMUs
 };
 
+/// As it is called in POSE and in files.
 [[nodiscard]] constexpr std::string_view name_of(PoseMode mode) {
   constexpr std::array<std::string_view, 3> kNames{"direct", "graph", "predicted"};
   return kNames[static_cast<std::size_t>(mode)];
@@ -66,6 +68,7 @@ enum class NoPoseReason : std::uint8_t {
   kUncertain,      ///< known worse than 1 m or 20 deg
 };
 
+/// In words, for STATUS.
 [[nodiscard]] constexpr std::string_view name_of(NoPoseReason reason) {
   constexpr std::array<std::string_view, 14> kNames{"none",
                                                     "never heard",
@@ -95,12 +98,14 @@ enum class Verdict : std::uint8_t {
 };
 inline constexpr std::size_t kVerdictCount = 6;
 
+/// As it is called in STATUS and in files.
 [[nodiscard]] constexpr std::string_view name_of(Verdict verdict) {
   constexpr std::array<std::string_view, kVerdictCount> kNames{"fused", "gated",    "degenerate",
                                                                "late",  "no_state", "skipped"};
   return kNames[static_cast<std::size_t>(verdict)];
 }
 
+/// Who measured what.
 enum class MeasurementKind : std::uint8_t {
   kBearing,      ///< our camera, the neighbor's ring
   kPeerBearing,  ///< its camera, our ring
@@ -111,6 +116,7 @@ enum class MeasurementKind : std::uint8_t {
 };
 inline constexpr std::size_t kMeasurementKindCount = 6;
 
+/// As it is called in STATUS and in files.
 [[nodiscard]] constexpr std::string_view name_of(MeasurementKind kind) {
   constexpr std::array<std::string_view, kMeasurementKindCount> kNames{
       "bearing", "peer_bearing", "range", "peer_range", "raw_pose", "graph_pose"};
@@ -129,12 +135,28 @@ struct Fusion {
   std::array<double, kMaxDimension> sigma{};     ///< roots of S's diagonal
 };
 
+/// What a sensor read, as it came: of a bearing u and the camera's place, both in the seeing
+/// robot's body; of a range the distance [m]. Poses have no numbers.
+using SensorReading = std::array<double, 6>;
+/// How many of its numbers a kind has.
+[[nodiscard]] constexpr std::size_t reading_size(MeasurementKind kind) {
+  constexpr std::array<std::size_t, kMeasurementKindCount> kSizes{6, 6, 1, 1, 0, 0};
+  return kSizes[static_cast<std::size_t>(kind)];
+}
+
 /// One measurement of a neighbor, with its result.
 struct MeasurementRecord {
   RobotId neighbor{};
   Timestamp stamp{};  ///< when it was taken
   MeasurementKind kind = MeasurementKind::kBearing;
   Fusion fusion;
+  SensorReading reading{};
+};
+/// The newest measurement of a kind.
+struct NewestReading {
+  Timestamp stamp{};                    ///< when it was taken
+  Verdict verdict = Verdict::kNoState;  ///< what became of it
+  SensorReading reading{};              ///< as it came
 };
 
 /// The sensor calibration that the tight filter estimates.
@@ -162,9 +184,19 @@ struct CalibrationRecord {
   std::array<double, kSize> sigma{};
 };
 
+/// What the team's filter found over an interval that ends at `stamp`.
+struct TeamRecord {
+  Timestamp stamp{};
+  std::vector<TeamResidual> residuals;
+  std::vector<RobotCalibration> calibrations;
+  std::vector<TeamFault> faults;
+};
+
+/// The outcome of each measurement, and calibrations over time.
 struct Records {
   std::vector<MeasurementRecord> measurements;
   std::vector<CalibrationRecord> calibrations;
+  std::vector<TeamRecord> team{};
 };
 
 using VerdictCounts = std::array<std::uint64_t, kVerdictCount>;
@@ -180,20 +212,46 @@ enum class ImuFault : std::uint8_t {
 inline constexpr std::size_t kImuFaultCount = 5;
 using ImuFaultCounts = std::array<std::uint64_t, kImuFaultCount>;
 
+/// As it is called in STATUS and in reports.
 [[nodiscard]] constexpr std::string_view name_of(ImuFault fault) {
   constexpr std::array<std::string_view, kImuFaultCount> kNames{"implausible", "spike", "jump",
                                                                 "hangs", "saturated"};
   return kNames[static_cast<std::size_t>(fault)];
 }
 
+/// How well measurements of a kind agree with what was expected of them.
+struct ResidualStatus {
+  std::optional<double> nis;  ///< mean for each dimension, of those fused recently; honest: 1
+  std::uint64_t fused = 0;
+  std::uint64_t refused = 0;
+};
+
+/// A robot as the team's filter knows it.
+struct TeamRobotStatus {
+  RobotCalibration calibration;
+  std::array<ResidualStatus, kTeamResidualKindCount> residuals{};  ///< of what it measured
+  std::vector<TeamFault> faults;
+};
+
+/// All robots that the team's filter estimates, with this one.
+struct TeamStatus {
+  Timestamp stamp{};  ///< of the latest solution
+  std::vector<TeamRobotStatus> robots;
+};
+
+/// The state of one neighbor, for STATUS.
 struct NeighborStatus {
   RobotId neighbor{};
   std::string name;
   NoPoseReason reason = NoPoseReason::kNeverHeard;
   std::optional<NeighborPose> pose;
   std::array<VerdictCounts, kMeasurementKindCount> measurements{};  ///< [kind][verdict]
-  /// When the newest of a kind was taken, whatever its outcome.
-  std::array<std::optional<Timestamp>, kMeasurementKindCount> newest{};
+  /// Of each kind, whatever its outcome.
+  std::array<std::optional<NewestReading>, kMeasurementKindCount> newest{};
+  PairMounting mounting;  ///< what these readings refer to
+  /// Mean NIS for each dimension, of about the last fifty that were fused, by kind.
+  std::array<std::optional<double>, kMeasurementKindCount> nis{};
+  std::optional<CalibrationRecord> calibration;  ///< of its filter
   /// Measured minus expected, own and the neighbor's ranges: the mean of about the last sixteen
   /// [m].
   std::optional<double> range_residual_m;
@@ -203,6 +261,13 @@ struct NeighborStatus {
   std::vector<TeamFault> faults;        ///< what the team finds wrong with it
 };
 
+/// Lights that were named where and when their board was expected, before their blinking was read.
+struct PredictedIds {
+  std::uint64_t confirmed = 0;    ///< read afterwards
+  std::uint64_t unconfirmed = 0;  ///< not read as predicted within 0.3 s; no filter used them
+};
+
+/// The state of the estimator, for STATUS.
 struct EstimatorStatus {
   std::vector<NeighborStatus> neighbors;  ///< all members but this robot, ordered by id
   std::optional<Tilt> tilt;
@@ -210,6 +275,8 @@ struct EstimatorStatus {
   std::uint64_t refused_samples = 0;  ///< NaN, out of range, stamp that goes back, refused_imu
   ImuFaultCounts refused_imu{};       ///< of our IMU, by reason
   std::vector<TeamFault> faults;      ///< what the team finds wrong with us
+  PredictedIds predicted_ids;
+  std::optional<TeamStatus> team;
 };
 
 }  // namespace crepes

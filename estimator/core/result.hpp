@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// The kind of a failure.
 enum class ErrorCode {
   kIo,        ///< a device, file or socket failed
   kFormat,    ///< bytes or text that do not parse
@@ -17,6 +18,7 @@ enum class ErrorCode {
   kBusy,      ///< the system accepts no more at present; earlier requests are not affected
 };
 
+/// Why something failed, in words, with the context of its callers.
 struct Error {
   ErrorCode code;
   std::string message;
@@ -30,6 +32,7 @@ struct Error {
 template <class T>
 using Result = tl::expected<T, Error>;
 
+/// A failure that converts to any `Result`.
 [[nodiscard]] inline tl::unexpected<Error> fail(ErrorCode code, std::string message) {
   return tl::unexpected<Error>(Error{code, std::move(message)});
 }

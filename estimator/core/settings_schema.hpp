@@ -23,6 +23,7 @@ struct Bounds {
   double max;
 };
 
+/// A value of an enumeration and its name in the configuration.
 template <class Enum>
 struct Choice {
   std::string_view name;

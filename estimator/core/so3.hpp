@@ -27,6 +27,9 @@ namespace crepes {
 [[nodiscard]] Eigen::Quaterniond shortest_rotation(const Eigen::Vector3d& from,
                                                    const Eigen::Vector3d& to);
 
+/// The angle between two directions [rad], also where it is small or almost pi.
+[[nodiscard]] double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
 /// Heading of `q` about z, the first angle of Z-Y-X Euler angles [rad].
 [[nodiscard]] double yaw_of(const Eigen::Quaterniond& q);
 

@@ -61,7 +61,7 @@ struct SwarmConfig {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("slot_ms", slot_ms, Bounds{2, 50}, "duration of one slot of a blink pattern");
+    v.field("slot_ms", slot_ms, Bounds{2, 70}, "duration of one slot of a blink pattern");
     v.field("period_ms", period_ms, Bounds{10, 200}, "period of a duty-coded board");
     v.reference("members_file",
                 "instead of members: a file with only the section swarm, shared by all robots");

@@ -30,6 +30,7 @@ struct PeerClock {
 using Timestamp = MonoClock::time_point;
 using PeerTimestamp = PeerClock::time_point;
 
+/// As a floating point number [s].
 [[nodiscard]] constexpr double to_seconds(Duration d) {
   return static_cast<double>(d.count()) * 1e-9;
 }
@@ -39,6 +40,7 @@ using PeerTimestamp = PeerClock::time_point;
   return Duration{static_cast<std::int64_t>(seconds * 1e9)};
 }
 
+/// Nanoseconds since the zero of the clock.
 template <class Clock>
 [[nodiscard]] constexpr std::int64_t to_ns(std::chrono::time_point<Clock, Duration> t) {
   return t.time_since_epoch().count();

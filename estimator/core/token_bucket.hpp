@@ -11,6 +11,7 @@ namespace crepes {
 /// Starts full. Time that goes back adds nothing and removes nothing.
 class TokenBucket {
  public:
+  /// How many tokens are added a second, and how many fit.
   struct Rate {
     double per_s;
     double burst;

@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// The cost of an edge of the pose graph.
 enum class GraphCost : std::uint8_t { kLie, kPaper };
 inline constexpr std::array kGraphCosts{Choice{"lie", GraphCost::kLie},
                                         Choice{"paper", GraphCost::kPaper}};

@@ -39,6 +39,7 @@ struct NominalState {
 /// perturbation (N's axes), all others are additive. Measurements depend on the first `kSeen`
 /// states; the others act through the propagation.
 struct ErrorState {
+  /// The first row of each part of the error.
   enum Index : int {
     kP = 0,
     kV = 3,

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -29,15 +30,11 @@ constexpr PerSensor kMostVibration{.gyro = 3.0, .accel = 30.0};
 // Samples after a jump are plausible if they show gravity where it was, and turn as it does.
 constexpr double kLeastForce = 0.5 * kGravityMps2;
 constexpr double kMostForce = 2.0 * kGravityMps2;
-constexpr double kMostTurned = 45.0 * kRadPerDeg;
-constexpr double kMostContradiction = 30.0 * kRadPerDeg;
+constexpr double kMostTurned = radians(45.0);
+constexpr double kMostContradiction = radians(30.0);
 constexpr double kMostGrowth = 4.0;  // of the gyroscope's noise, if the accelerometer's is the same
 constexpr Duration kOutdated = std::chrono::seconds{5};  // gravity's direction before the jump
 constexpr double kForceShare = 0.05;                     // of one sample in the smoothed force
-
-double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 PerSensor distance(const ImuSample& a, const ImuSample& b) {
   return {(a.gyro_radps - b.gyro_radps).norm(), (a.accel_mps2 - b.accel_mps2).norm()};
@@ -79,9 +76,7 @@ void InnovationScale::add(double size) {
   const std::size_t n = std::min(count_, kKept);
   if (n < kLeast) return;
   std::array<double, kKept> sorted = sizes_;
-  const std::span kept = std::span(sorted).first(n);
-  std::ranges::nth_element(kept, kept.begin() + static_cast<std::ptrdiff_t>(n / 2));
-  median_ = kept[n / 2];
+  median_ = upper_median(std::span(sorted).first(n));
   is_known_ = true;
 }
 
@@ -149,7 +144,8 @@ void ImuGuard::compare(const ImuSample& sample) {
   // The scale learns from refused samples too: a vibration that begins must not be refused for
   // long.
   if (reference_ && !has_jumped_)
-    learn(innovation(sample, held_count_ > 0 ? reference_of_held(held_count_ - 1) : *reference_));
+    update_sigmas(
+        innovation(sample, held_count_ > 0 ? reference_of_held(held_count_ - 1) : *reference_));
   const bool is_in_doubt = held_count_ > 0 || has_jumped_;
   if (reference_ && is_in_doubt) {
     judge(sample);
@@ -160,7 +156,7 @@ void ImuGuard::compare(const ImuSample& sample) {
   }
 }
 
-void ImuGuard::learn(const PerSensor& innovation) {
+void ImuGuard::update_sigmas(const PerSensor& innovation) {
   gyro_.add(innovation.gyro);
   accel_.add(innovation.accel);
 }
@@ -309,7 +305,7 @@ bool ImuGuard::held_are_plausible() const {
 
 void ImuGuard::restart_from_held() {
   for (std::size_t i = 2; i < held_count_; ++i)
-    learn(innovation(held_.at(i), reference_of_held(i - 1)));
+    update_sigmas(innovation(held_.at(i), reference_of_held(i - 1)));
   reference_.reset();
   force_.setZero();
   believe_held(0);

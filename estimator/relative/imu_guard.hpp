@@ -17,6 +17,7 @@ namespace crepes {
 /// Ronchetti 2009, "Robust Statistics", 5.1).
 class InnovationScale {
  public:
+  /// Adds the size of an innovation.
   void add(double size);
   [[nodiscard]] double median() const { return median_; }
   /// False before there are enough.
@@ -81,7 +82,7 @@ class ImuGuard {
 
   void compare(const ImuSample& sample);
   void judge(const ImuSample& sample);
-  void learn(const PerSensor& innovation);
+  void update_sigmas(const PerSensor& innovation);
   void believe(const ImuSample& sample);
   void believe_held(std::size_t from);
   void drop_held(ImuFault fault);

@@ -40,6 +40,7 @@ template <int S, int N>
 [[nodiscard]] auto seen_columns(const PartitionedCovariance<S, N>& P) {
   return P.seen_columns();
 }
+/// Of a plain covariance, all columns.
 template <int N>
 [[nodiscard]] const Eigen::Matrix<double, N, N>& seen_columns(
     const Eigen::Matrix<double, N, N>& P) {
@@ -83,6 +84,7 @@ void correct_covariance(const UpdateOutcome<M, N>& outcome, PartitionedCovarianc
   const auto of_hidden = outcome.G.template bottomRows<N - S>();
   subtract_product(of_hidden, of_hidden, P.hidden());
 }
+/// P <- P - G G^T .
 template <int M, int N>
 void correct_covariance(const UpdateOutcome<M, N>& outcome, Eigen::Matrix<double, N, N>& P) {
   subtract_product(outcome.G, outcome.G, P);

@@ -30,6 +30,7 @@ struct DirectionReading {
   double sigma_rad = 0.0;
 };
 
+/// A range and its noise.
 struct RangeReading {
   double range_m = 0.0;
   double sigma_m = 0.0;
@@ -54,6 +55,7 @@ class NeighborFilter {
   void set_noise(const ProcessNoise& noise) { noise_ = noise; }
 
   [[nodiscard]] Timestamp stamp() const { return stamp_; }
+  /// Propagates the state to `to` by the IMUs of both robots.
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
 
   /// Our camera on the neighbor's ring.
@@ -61,6 +63,7 @@ class NeighborFilter {
   /// The neighbor's camera on our ring.
   Fusion fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,
                            double gate_nis);
+  /// Corrects the state by the distance between two antennas.
   Fusion fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
                     const Eigen::Vector3d& p_N_Q, double gate_nis);
   /// A pose whose errors may be correlated with this filter and with earlier such poses: covariance
@@ -74,6 +77,7 @@ class NeighborFilter {
   /// Bearings of this kind come from another camera from now on, with another misalignment.
   void reset_misalignment(MeasurementKind kind, double misalignment_rad);
 
+  /// One Gaussian of a split, and its weight.
   struct Part;
   /// Splits the Gaussian along its most uncertain attitude axis into parts that are narrow enough
   /// for one linearization. Their weighted sum approximates the whole.
@@ -98,6 +102,7 @@ class NeighborFilter {
   ProcessNoise noise_;
 };
 
+/// One Gaussian of a split, and its weight.
 struct NeighborFilter::Part {
   NeighborFilter filter;
   double log_weight = 0.0;  ///< up to a constant

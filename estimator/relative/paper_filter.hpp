@@ -17,6 +17,7 @@ namespace crepes {
 /// freedom: a common turn of both frames changes nothing that can be measured, so only the pose's
 /// own covariance is ever published.
 struct PaperError {
+  /// The first row of each part of the error.
   enum Index : int { kP = 0, kV = 3, kThetaA = 6, kThetaB = 9, kSize = 12 };
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Covariance = Eigen::Matrix<double, kSize, kSize>;

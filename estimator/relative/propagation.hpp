@@ -41,6 +41,7 @@ struct PropagationJacobian {
   Eigen::Matrix<double, 9, 9> by_motion;
   Eigen::Matrix<double, 9, 12> by_rates;  ///< columns w_B, a_B, w_N, a_N
 };
+/// The derivative of the motion after a step by the motion before it and by the rates.
 [[nodiscard]] PropagationJacobian propagation_jacobian(const RelativeMotion& before,
                                                        const RelativeMotion& after,
                                                        const BodyRates& body,

@@ -9,9 +9,6 @@ namespace {
 
 using E = ErrorState;
 
-// Density of ranges without line of sight that were not recognized, for each true range.
-constexpr double kFalseRanges = 0.05;  // 1/m
-
 // Where the curvature's variance exceeds this share of the range's, ranges correct along the line.
 constexpr double kMaxCurvature = 0.1;
 
@@ -60,7 +57,7 @@ RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double 
   fusion.sigma[0] = std::sqrt(expected);
   // The probability that the range is true. One that is more likely false is refused.
   const double density = std::exp(fusion.log_likelihood);
-  const double is_true = density / (density + kFalseRanges);
+  const double is_true = density / (density + kFalseRangeDensity);
   const bool fits = fusion.nis <= gate_nis && is_true >= 0.5;
   fusion.verdict = fits ? Verdict::kFused : Verdict::kGated;
   if (fusion.verdict == Verdict::kGated || predicted <= curved) return update;

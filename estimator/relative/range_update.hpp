@@ -5,6 +5,10 @@
 
 namespace crepes {
 
+/// Density of ranges without line of sight that were not recognized, for each true range [1/m]. The
+/// same for the pairs' filters, their hypotheses and the team's filter.
+inline constexpr double kFalseRangeDensity = 0.05;
+
 struct RangeUpdate {
   Fusion fusion;
   ErrorState::Vector correction = ErrorState::Vector::Zero();  ///< to be injected

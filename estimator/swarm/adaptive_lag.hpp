@@ -14,6 +14,7 @@ class AdaptiveLag {
  public:
   explicit AdaptiveLag(Duration least) : least_(least), lag_(least) {}
 
+  /// Sets the lower limit.
   void set_least(Duration least) {
     least_ = least;
     lag_ = std::clamp(lag_, least_, most());

@@ -15,6 +15,7 @@ class BoundedFifo {
  public:
   BoundedFifo() { readings_.reserve(kCapacity); }
 
+  /// Adds the newest reading.
   void add(const Reading& reading) {
     if (readings_.size() == kCapacity) readings_.erase(readings_.begin());
     readings_.push_back(reading);

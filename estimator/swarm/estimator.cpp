@@ -17,6 +17,7 @@
 #include "estimator/swarm/report_composer.hpp"
 #include "estimator/swarm/robot_state.hpp"
 #include "estimator/swarm/team_intake.hpp"
+#include "estimator/swarm/team_log.hpp"
 #include "estimator/vision/blink_tracker.hpp"
 
 namespace crepes {
@@ -116,12 +117,13 @@ struct Estimator::State {
   Outputs handle(const Tick& tick);
 
   [[nodiscard]] bool runs_team_filter() const {
-    return graph_enabled && uses_team_filter && filters.profile == Profile::kTight;
+    return graph_enabled && uses_team_filter && filters.traits.has_team_filter;
   }
   /// Null without samples.
   [[nodiscard]] const ImuHistory* imu_of(RobotId robot) const;
   [[nodiscard]] GraphProblem graph_problem(const std::vector<NeighborEstimate>& own) const;
   [[nodiscard]] std::optional<TeamInterval> team_interval(Timestamp now);
+  [[nodiscard]] ExpectedBoard expected_board(const NeighborPose& pose) const;
 
   RobotId id;
   RobotState self;
@@ -138,12 +140,14 @@ struct Estimator::State {
   PeriodicTimer report_timer;
   PeriodicTimer graph_timer;
   Timestamp last_tick = kNever;
+  std::vector<ExpectedBoard> expected;  ///< by the poses of the last tick
   SwarmConfig swarm;
   FilterSettings filters;
   VisionConfig vision;
   bool keeps_records = false;
-  std::vector<TeamFault> faults;  ///< of the latest team solution
+  TeamLog team_log;
   std::uint64_t unknown_senders = 0;
+  std::uint64_t used_samples = 0;
   std::uint64_t refused_samples = 0;
 };
 
@@ -177,7 +181,7 @@ void Estimator::State::reconfigure(const EstimatorSettings& settings) {
   graph_enabled = settings.solves_graph;
   uses_team_filter = settings.uses_team_filter;
   team_size = settings.team_size;
-  if (!runs_team_filter()) faults.clear();
+  if (!runs_team_filter()) team_log.clear();
   report_timer = PeriodicTimer(period_of(settings.report_rate_hz));
   graph_timer = PeriodicTimer(period_of(settings.graph_rate_hz));
 }
@@ -188,6 +192,7 @@ Outputs Estimator::State::handle(const ImuSample& sample) {
       ++refused_samples;
       continue;
     }
+    ++used_samples;
     self.tilt = tilt_filter.tilt();
     for (BlinkTracker& tracker : trackers) tracker.add_imu(believed);
   }
@@ -202,7 +207,7 @@ Outputs Estimator::State::handle(const UwbRange& range) {
   }
   UwbRange corrected = range;
   corrected.range_m -= delay_between(swarm, id, range.neighbor);
-  neighbor->second.add_range(corrected);
+  neighbor->second.add(corrected);
   composer.add(corrected);
   return {};
 }
@@ -213,17 +218,31 @@ Outputs Estimator::State::handle(const SpotFrame& frame) {
     return {};
   }
   Outputs outputs;
-  outputs.bearings = trackers[frame.camera].step(frame);
+  BlinkTracker& tracker = trackers[frame.camera];
+  outputs.bearings = tracker.step(frame, expected);
   // IDs are read through any lens; a direction through a guessed one would be degrees off.
   if (!is_calibrated[frame.camera]) return {};
   // A robot that sees its own code sees itself in a mirror.
   std::erase_if(outputs.bearings,
                 [&](const Bearing& bearing) { return !neighbors.contains(bearing.neighbor); });
+  // What was named because a pose expects it there says nothing about the pose until it is read.
+  for (const Bearing& bearing : tracker.confirmed())
+    if (neighbors.contains(bearing.neighbor)) neighbors.at(bearing.neighbor).add(bearing);
   for (const Bearing& bearing : outputs.bearings) {
-    neighbors.at(bearing.neighbor).add_bearing(bearing);
+    if (bearing.how != Naming::kRead) continue;
+    neighbors.at(bearing.neighbor).add(bearing);
     composer.add(bearing);
   }
   return outputs;
+}
+
+ExpectedBoard Estimator::State::expected_board(const NeighborPose& pose) const {
+  const Eigen::Vector3d p_N_M = member_of(swarm, pose.neighbor).p_body_led;
+  return {.robot = pose.neighbor,
+          .stamp = pose.stamp,
+          .p_B_M = pose.T_B_N.pose * p_N_M,
+          .v_B_M = pose.v_B_N,
+          .covariance_m2 = pose.T_B_N.covariance.topLeftCorner<3, 3>()};
 }
 
 Outputs Estimator::State::handle(const ReceivedReport& received) {
@@ -233,7 +252,7 @@ Outputs Estimator::State::handle(const ReceivedReport& received) {
     return {};
   }
   neighbor->second.add_report(received, self);
-  graph_builder.add_report(received.report);
+  graph_builder.add_report(received.report, swarm);
   if (!runs_team_filter()) return {};
   const ImuHistory& imu = neighbor->second.robot_state().imu;
   const double w = imu.empty() ? 0.0 : imu.newest().gyro_radps.norm();
@@ -244,15 +263,15 @@ Outputs Estimator::State::handle(const ReceivedReport& received) {
 Outputs Estimator::State::handle(const GraphSolution& solution) {
   for (const GraphPose& pose : solution.poses) {
     const auto neighbor = neighbors.find(pose.neighbor);
-    if (neighbor != neighbors.end()) neighbor->second.add_graph_pose(solution.stamp, pose);
+    if (neighbor != neighbors.end()) neighbor->second.add(StampedGraphPose{solution.stamp, pose});
   }
   return {};
 }
 
 Outputs Estimator::State::handle(const TeamSolution& solution) {
   constexpr Duration kRefusal = std::chrono::milliseconds{300};  // some solutions
-  faults = solution.faults;
-  const bool is_gyro_false = std::ranges::any_of(faults, [this](const TeamFault& fault) {
+  team_log.add(solution);
+  const bool is_gyro_false = std::ranges::any_of(solution.faults, [this](const TeamFault& fault) {
     return fault.robot == id && fault.kind == TeamFault::Kind::kGyro;
   });
   if (is_gyro_false) {
@@ -260,15 +279,19 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
     tilt_filter.restart();
   }
   const auto bias_of = [&](RobotId robot) {
-    const auto found = std::ranges::find(solution.biases, robot, &ImuBiasEstimate::robot);
-    return found == solution.biases.end() ? ImuBiasEstimate{} : *found;
+    const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
+    return found == solution.calibrations.end() ? ImuBiasEstimate{} : found->imu;
   };
   for (const TeamPose& pose : solution.poses) {
     const auto neighbor = neighbors.find(pose.neighbor);
     if (neighbor != neighbors.end())
-      neighbor->second.add_team_pose(solution.stamp, pose, bias_of(id), bias_of(pose.neighbor));
+      neighbor->second.add(TeamEstimate{solution.stamp, pose, bias_of(id), bias_of(pose.neighbor)});
   }
-  return {};
+  Outputs outputs;
+  if (keeps_records)
+    outputs.records.team.push_back(
+        {solution.stamp, solution.residuals, solution.calibrations, solution.faults});
+  return outputs;
 }
 
 const ImuHistory* Estimator::State::imu_of(RobotId robot) const {
@@ -303,12 +326,14 @@ Outputs Estimator::State::handle(const Tick& tick) {
 
   Outputs outputs;
   std::vector<NeighborEstimate> estimates;
+  expected.clear();
   for (auto& [robot, neighbor] : neighbors) {
     neighbor.tick(tick.stamp, self);
     append(neighbor.outcomes().drain_records(), outputs.records);
     if (auto estimate = neighbor.output().estimate()) estimates.push_back(*estimate);
     if (auto pose = neighbor.output().published()) {
       if (const auto tilt = self.tilt_at(pose->stamp)) pose->up_B = tilt->up_B;
+      expected.push_back(expected_board(*pose));
       outputs.poses.push_back(std::move(*pose));
     }
   }
@@ -316,7 +341,7 @@ Outputs Estimator::State::handle(const Tick& tick) {
     outputs.report = composer.compose(tick.stamp, self, estimates);
   }
   if (outputs.report && runs_team_filter()) {
-    graph_builder.add_report(*outputs.report);
+    graph_builder.add_report(*outputs.report, swarm);
     team_intake.add_own_report(*outputs.report, swarm, filters);
   }
   if (graph_enabled && !self.imu.empty() && graph_timer.is_due(tick.stamp)) {
@@ -346,15 +371,12 @@ void Estimator::keep_records() {
   for (auto& [robot, neighbor] : state_->neighbors) neighbor.outcomes().keep_records();
 }
 
+std::uint64_t Estimator::used_samples() const { return state_->used_samples; }
+
 EstimatorStatus Estimator::status() const {
   EstimatorStatus status;
-  const auto faults_of = [this](RobotId robot) {
-    std::vector<TeamFault> of_robot;
-    std::ranges::copy_if(state_->faults, std::back_inserter(of_robot),
-                         [robot](const TeamFault& fault) { return fault.robot == robot; });
-    return of_robot;
-  };
-  status.faults = faults_of(state_->id);
+  status.faults = state_->team_log.faults_of(state_->id);
+  status.team = state_->team_log.status();
   for (const auto& [robot, neighbor] : state_->neighbors) {
     NeighborStatus one = neighbor.status();
     for (const BlinkTracker& tracker : state_->trackers) {
@@ -362,8 +384,13 @@ EstimatorStatus Estimator::status() const {
       const auto found = decodes.find(robot);
       if (found != decodes.end()) one.id_decodes += found->second;
     }
-    one.faults = faults_of(robot);
+    one.faults = state_->team_log.faults_of(robot);
     status.neighbors.push_back(std::move(one));
+  }
+  for (const BlinkTracker& tracker : state_->trackers) {
+    const PredictedIds ids = tracker.status().predicted_ids;
+    status.predicted_ids.confirmed += ids.confirmed;
+    status.predicted_ids.unconfirmed += ids.unconfirmed;
   }
   status.tilt = state_->self.tilt;
   status.unknown_senders = state_->unknown_senders;

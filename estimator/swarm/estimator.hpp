@@ -33,6 +33,7 @@ class Estimator {
   Estimator& operator=(const Estimator&) = delete;
   ~Estimator();
 
+  /// Handles one event, and returns what follows from it.
   [[nodiscard]] Outputs step(const Event& event);
   /// Applies other settings with the same `self` and `cameras`. Filters keep their state, unless
   /// the profile or a mounting changes. Members may be added and removed. If `vision` or a code
@@ -40,6 +41,8 @@ class Estimator {
   void reconfigure(const EstimatorSettings& settings);
   /// From now on `Outputs::records` contains every measurement. Changes nothing else.
   void keep_records();
+  /// Of our IMU. With `EstimatorStatus::refused_samples` these are all, but for the latest.
+  [[nodiscard]] std::uint64_t used_samples() const;
   [[nodiscard]] EstimatorStatus status() const;
 
  private:

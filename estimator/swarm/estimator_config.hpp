@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// The filter of a neighbor: ours, or that of the paper (IROS 2023).
 enum class Profile : std::uint8_t { kTight, kPaper };
 inline constexpr std::array kProfiles{Choice{"tight", Profile::kTight},
                                       Choice{"paper", Profile::kPaper}};

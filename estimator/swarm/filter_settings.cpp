@@ -15,7 +15,11 @@ constexpr double kLooseBearing = 0.05;  // rad
 
 ProfileTraits traits_of(Profile profile) {
   const bool tight = profile == Profile::kTight;
-  return {.fuses_single_readings = tight, .hypotheses_compete = tight, .starts_one_way = tight};
+  return {.has_bias_states = tight,
+          .fuses_single_readings = tight,
+          .hypotheses_compete = tight,
+          .starts_one_way = tight,
+          .has_team_filter = tight};
 }
 
 }  // namespace
@@ -23,8 +27,7 @@ ProfileTraits traits_of(Profile profile) {
 FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuNoise& imu,
                                const RangeNoise& range) {
   FilterSettings s;
-  s.profile = estimator.profile;
-  s.traits = traits_of(s.profile);
+  s.traits = traits_of(estimator.profile);
   s.lag = from_seconds(estimator.lag_ms * 1e-3);
   s.recent = from_seconds(estimator.predicted_after_s);
   s.forget = from_seconds(estimator.forget_after_s);
@@ -39,8 +42,8 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuNoise&
   if (range.bias_sigma_m > 0.0)
     s.noise.range_bias_return = 0.5 * std::pow(s.noise.range_bias_walk / range.bias_sigma_m, 2);
 
-  if (s.profile == Profile::kPaper) {
-    // The paper's filter has no bias states: noise replaces the effect of a bias over kBiasTime.
+  if (!s.traits.has_bias_states) {
+    // Noise replaces the effect of a bias over kBiasTime.
     s.noise.accel_density =
         std::hypot(s.noise.accel_density, imu.accelerometer_bias_sigma * std::sqrt(kBiasTime));
     s.noise.gyro_density =

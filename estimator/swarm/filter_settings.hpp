@@ -16,15 +16,18 @@ struct Gates {
   double raw_pose = 0.0;
 };
 
-/// The consequences of the profile, besides the type of the filter.
+/// The consequences of the profile: the only place where it is decided.
 struct ProfileTraits {
+  bool has_bias_states = true;        ///< `NeighborFilter`; otherwise `PaperFilter`
   bool fuses_single_readings = true;  ///< bearings and ranges; otherwise raw poses
   bool hypotheses_compete = true;     ///< otherwise each raw pose replaces the filter
   bool starts_one_way = true;         ///< a track may start from bearings of one direction
+  bool has_team_filter = true;        ///< otherwise the pose graph estimates the team
+
+  [[nodiscard]] bool operator==(const ProfileTraits&) const = default;
 };
 
 struct FilterSettings {
-  Profile profile = Profile::kTight;
   ProfileTraits traits;
   Duration lag{};
   Duration recent{};  ///< a measurement within this makes a pose direct
@@ -39,6 +42,7 @@ struct FilterSettings {
   double late_path_db = 0.0;
 };
 
+/// Derives the settings of the filters.
 [[nodiscard]] FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuNoise& imu,
                                              const RangeNoise& range);
 

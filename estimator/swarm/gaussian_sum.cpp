@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/relative/range_update.hpp"
+
 namespace crepes {
 namespace {
 
-// Density of clutter for each true reading: per steradian and per meter.
-constexpr double kFalseBearings = 0.1;
-constexpr double kFalseRanges = 0.05;
+constexpr double kFalseBearings = 0.1;  // density of clutter for each true one [1/sr]
 
 // Squared Mahalanobis distance of a pose, by the covariance of the other.
 double distance2(const GaussianPose& from, const Pose& to) {
@@ -21,7 +21,7 @@ double distance2(const GaussianPose& from, const Pose& to) {
 double log_likelihood_ratio(const Fusion& fusion, MeasurementKind kind) {
   if (fusion.verdict != Verdict::kFused) return 0.0;  // clutter under both hypotheses
   const bool is_range = kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange;
-  return fusion.log_likelihood - std::log(is_range ? kFalseRanges : kFalseBearings);
+  return fusion.log_likelihood - std::log(is_range ? kFalseRangeDensity : kFalseBearings);
 }
 
 GaussianSum::GaussianSum(const NeighborTrack& whole) {

@@ -27,7 +27,9 @@ class GaussianSum {
   /// Parts of equal weight.
   explicit GaussianSum(std::vector<NeighborTrack> parts);
 
+  /// Sets the process noise of all parts.
   void set_noise(const ProcessNoise& noise);
+  /// Propagates all parts to `to`.
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Corrects every part with the candidate that is most likely for the heaviest part.
   Association fuse(std::span<const Measurement> candidates, const PairMounting& mounting,

@@ -1,5 +1,6 @@
 #include "estimator/swarm/graph_problem_builder.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -15,6 +16,10 @@ constexpr Duration kMaxExtrapolation = std::chrono::milliseconds{200};
 // Errors that IMU integration adds to a propagated estimate.
 constexpr double kSpeedError = 0.1;  // m/s
 constexpr double kTurnError = 0.02;  // rad/s
+
+bool is_of_swarm(RobotId robot, const SwarmConfig& swarm) {
+  return std::ranges::find(swarm.members, robot, &MemberConfig::id) != swarm.members.end();
+}
 
 bool is_covered(const ImuHistory& imu, Timestamp from, Timestamp to) {
   if (to < from) std::swap(from, to);
@@ -37,14 +42,14 @@ RelativePoseEdge propagated_edge(RobotId from, const NeighborEstimate& estimate,
   const double dt = to_seconds(stamp - estimate.stamp);
   covariance.diagonal().head<3>().array() += kSpeedError * kSpeedError * dt * dt;
   covariance.diagonal().tail<3>().array() += kTurnError * kTurnError * dt * dt;
-  return {from, estimate.neighbor, {motion.T_B_N, covariance}, motion.v_B_N};
+  return {from, estimate.neighbor, {motion.T_B_N, covariance}, motion.v_B_N, estimate.stamp};
 }
 
 }  // namespace
 
-void GraphProblemBuilder::add_report(const Report& report) {
+void GraphProblemBuilder::add_report(const Report& report, const SwarmConfig& swarm) {
   for (const NeighborEstimate& estimate : report.estimates) {
-    if (estimate.neighbor == report.sender) continue;
+    if (estimate.neighbor == report.sender || !is_of_swarm(estimate.neighbor, swarm)) continue;
     const auto key = std::pair(report.sender, estimate.neighbor);
     const auto known = estimates_.find(key);
     if (known == estimates_.end() || known->second.stamp < estimate.stamp) {
@@ -58,7 +63,8 @@ GraphProblem GraphProblemBuilder::build(Timestamp stamp, RobotId self,
                                         const ImuOf& imu_of) const {
   GraphProblem problem{.stamp = stamp, .self = self, .edges = {}};
   for (const NeighborEstimate& estimate : own) {
-    problem.edges.push_back({self, estimate.neighbor, estimate.T_B_N, estimate.v_B_N});
+    problem.edges.push_back(
+        {self, estimate.neighbor, estimate.T_B_N, estimate.v_B_N, estimate.stamp});
   }
   for (const auto& [pair, estimate] : estimates_) {
     if (std::chrono::abs(stamp - estimate.stamp) > kMaxEstimateAge) continue;

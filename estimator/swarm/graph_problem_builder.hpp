@@ -7,6 +7,7 @@
 
 #include "estimator/core/imu_history.hpp"
 #include "estimator/core/measurements.hpp"
+#include "estimator/core/swarm_config.hpp"
 
 namespace crepes {
 
@@ -16,7 +17,9 @@ class GraphProblemBuilder {
   /// The IMU of a robot, own or as it reports it; null where there is none.
   using ImuOf = std::function<const ImuHistory*(RobotId)>;
 
-  void add_report(const Report& report);
+  /// Keeps the estimates of a report for the next problem; those of robots that are no members are
+  /// ignored.
+  void add_report(const Report& report, const SwarmConfig& swarm);
 
   /// Edges at `stamp`: own estimates, which are at `stamp` already, then those of others not older
   /// than half a second, propagated by the IMUs of both robots.

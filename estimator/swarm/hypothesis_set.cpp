@@ -37,7 +37,7 @@ constexpr auto kIsWorse = [](const auto& a, const auto& b) {
 }  // namespace
 
 void HypothesisSet::reconfigure(const FilterSettings& settings) {
-  if (settings.profile != settings_.profile) clear();
+  if (settings.traits != settings_.traits) clear();
   settings_ = settings;
   for (Hypothesis& hypothesis : hypotheses_) hypothesis.sum.set_noise(settings.noise);
 }

@@ -20,6 +20,7 @@ class CorrectionBudget {
   [[nodiscard]] bool allows(Timestamp now, double reserve = 0.0) {
     return left_.refill(now) > reserve;
   }
+  /// Subtracts corrections of one filter.
   void spend(std::size_t corrections) { left_.consume(static_cast<double>(corrections)); }
 
  private:
@@ -55,6 +56,7 @@ class HypothesisSet {
   /// Replaces all hypotheses by the graph's pose. Always true.
   bool initialize(Timestamp stamp, const GraphPose& first);
 
+  /// Propagates all hypotheses to `to`.
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Corrects each hypothesis with the most likely reading of a group of alternatives, the leader
   /// first, as far as the budget allows. Returns the leader's association.

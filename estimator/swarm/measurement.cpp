@@ -14,6 +14,16 @@ bool are_alternatives(const Measurement& a, const Measurement& b) {
 
 }  // namespace
 
+SensorReading reading_of(const Measurement& measurement) {
+  if (const auto* bearing = std::get_if<DirectionReading>(&measurement.reading)) {
+    const Eigen::Vector3d& u = bearing->u;
+    const Eigen::Vector3d& p = bearing->camera;
+    return {u.x(), u.y(), u.z(), p.x(), p.y(), p.z()};
+  }
+  const auto* range = std::get_if<RangeReading>(&measurement.reading);
+  return range == nullptr ? SensorReading{} : SensorReading{range->range_m};
+}
+
 std::span<const Measurement> leading_group(std::span<const Measurement> ordered) {
   const auto end = std::find_if(ordered.begin(), ordered.end(), [&](const Measurement& m) {
     return !are_alternatives(m, ordered.front());

@@ -33,6 +33,9 @@ struct Measurement {
       reading;
 };
 
+/// What the sensor read; empty for poses.
+[[nodiscard]] SensorReading reading_of(const Measurement& measurement);
+
 /// The measurements at the front of `ordered` with the same kind, stamp and camera. They are
 /// alternatives: at most one of them is true. `ordered` must not be empty.
 [[nodiscard]] std::span<const Measurement> leading_group(std::span<const Measurement> ordered);

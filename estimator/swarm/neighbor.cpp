@@ -20,12 +20,13 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
     : id_(neighbor.id),
       name_(neighbor.name),
       self_id_(self.id),
+      mounting_(mounting_of(self, neighbor)),
       recent_(settings.recent),
       forget_(settings.forget),
       intake_(neighbor.id, settings),
       initiator_(self, neighbor, settings),
-      hypotheses_(settings, mounting_of(self, neighbor)),
-      publisher_(neighbor.id, mounting_of(self, neighbor), settings) {}
+      hypotheses_(settings, mounting_),
+      publisher_(neighbor.id, mounting_, settings) {}
 
 void Neighbor::reconfigure(const FilterSettings& settings) {
   recent_ = settings.recent;
@@ -36,12 +37,16 @@ void Neighbor::reconfigure(const FilterSettings& settings) {
   publisher_.reconfigure(settings);
 }
 
-void Neighbor::add_bearing(const Bearing& bearing) {
+void Neighbor::add(const NeighborInput& input) {
+  std::visit([this](const auto& one) { add_input(one); }, input);
+}
+
+void Neighbor::add_input(const Bearing& bearing) {
   initiator_.add_bearing(bearing);
   intake_.add_bearing(bearing);
 }
 
-void Neighbor::add_range(const UwbRange& range) {
+void Neighbor::add_input(const UwbRange& range) {
   if (intake_.add_range(range, MeasurementKind::kRange))
     initiator_.add_range(range.stamp, range.range_m);
 }
@@ -70,7 +75,8 @@ void Neighbor::add_report(const ReceivedReport& received, const RobotState& self
   }
 }
 
-void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
+void Neighbor::add_input(const StampedGraphPose& input) {
+  const auto& [stamp, pose] = input;
   const bool sighted =
       !hypotheses_.empty() &&
       stamp - hypotheses_.leader().heaviest().last_sighting() <= recent_ + intake_.buffer().lag();
@@ -81,10 +87,7 @@ void Neighbor::add_graph_pose(Timestamp stamp, const GraphPose& pose) {
   }
 }
 
-void Neighbor::add_team_pose(Timestamp stamp, const TeamPose& pose, const ImuBiasEstimate& bias_B,
-                             const ImuBiasEstimate& bias_N) {
-  publisher_.add_team_pose({stamp, pose, bias_B, bias_N});
-}
+void Neighbor::add_input(const TeamEstimate& estimate) { publisher_.add_team_pose(estimate); }
 
 void Neighbor::tick(Timestamp now, const RobotState& self) {
   publisher_.clear();
@@ -120,7 +123,8 @@ void Neighbor::fuse_released(Timestamp now, const RobotState& self) {
                                            : Association{.fusion{.verdict = Verdict::kNoState}};
     const Fusion other{.verdict = usable ? Verdict::kGated : Verdict::kNoState};
     for (std::size_t i = 0; i < group.size(); ++i)
-      outcomes().add(first.stamp, first.kind, i == association.chosen ? association.fusion : other);
+      outcomes().add(first.stamp, first.kind, i == association.chosen ? association.fusion : other,
+                     reading_of(group[i]));
   }
   hypotheses_.prune();
   // Without readings the filter advances too: IMU samples are kept for a limited time, and the cost
@@ -152,6 +156,8 @@ NeighborStatus Neighbor::status() const {
   status.reason = reason_;
   status.pose = publisher_.published();
   intake_.outcomes().write_to(status);
+  status.mounting = mounting_;
+  if (!hypotheses_.empty()) status.calibration = hypotheses_.leader().heaviest().calibration();
   status.refused_imu = body_.guard.refused();
   if (!body_.imu.empty()) status.newest_imu = body_.imu.newest().stamp;
   return status;

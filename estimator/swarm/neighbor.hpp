@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <variant>
 
 #include "estimator/core/outputs.hpp"
 #include "estimator/core/swarm_config.hpp"
@@ -14,6 +15,13 @@
 
 namespace crepes {
 
+/// A pose of the graph's solution and its time.
+struct StampedGraphPose {
+  Timestamp stamp;
+  GraphPose pose;
+};
+using NeighborInput = std::variant<Bearing, UwbRange, StampedGraphPose, TeamEstimate>;
+
 /// Readings enter through the intake and wait in its reorder buffer until the lag has passed. Each
 /// tick fuses the released ones or starts hypotheses from them. Poses do not wait: the publisher
 /// predicts them from a copy of the filter.
@@ -24,13 +32,10 @@ class Neighbor {
   /// Keeps the state of the estimation, except for another profile.
   void reconfigure(const FilterSettings& settings);
 
-  void add_bearing(const Bearing& bearing);
-  void add_range(const UwbRange& range);
+  /// Our own measurements of it, and its pose by the team's estimate.
+  void add(const NeighborInput& input);
+  /// A report of the neighbor; `self` is the state of our robot.
   void add_report(const ReceivedReport& received, const RobotState& self);
-  void add_graph_pose(Timestamp stamp, const GraphPose& pose);
-  /// With what the team's filter knows of our IMU and of the neighbor's.
-  void add_team_pose(Timestamp stamp, const TeamPose& pose, const ImuBiasEstimate& bias_B,
-                     const ImuBiasEstimate& bias_N);
 
   /// Advances to `now`: fuses the released readings and updates the pose.
   void tick(Timestamp now, const RobotState& self);
@@ -43,12 +48,17 @@ class Neighbor {
   [[nodiscard]] const RobotState& robot_state() const { return body_; }
 
  private:
+  void add_input(const Bearing& bearing);
+  void add_input(const UwbRange& range);
+  void add_input(const StampedGraphPose& input);
+  void add_input(const TeamEstimate& estimate);
   void fuse_released(Timestamp now, const RobotState& self);
   [[nodiscard]] NoPoseReason reason(Timestamp now, const RobotState& self) const;
 
   RobotId id_;
   std::string name_;
   RobotId self_id_;
+  PairMounting mounting_;
   Duration recent_;
   Duration forget_;
 

@@ -32,7 +32,7 @@ double largest_sigma(const Eigen::Matrix3d& covariance) {
 template <class First>
 std::variant<NeighborFilter, PaperFilter> make_filter(Timestamp stamp, const First& first,
                                                       const FilterSettings& settings) {
-  if (settings.profile == Profile::kPaper) return PaperFilter(stamp, first, settings.noise);
+  if (!settings.traits.has_bias_states) return PaperFilter(stamp, first, settings.noise);
   return NeighborFilter(stamp, first, settings.noise, settings.priors);
 }
 

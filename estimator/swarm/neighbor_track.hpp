@@ -16,14 +16,6 @@
 
 namespace crepes {
 
-/// The lever arms that readings refer to.
-struct PairMounting {
-  Eigen::Vector3d p_B_M;  ///< our LED ring
-  Eigen::Vector3d p_B_U;  ///< our antenna
-  Eigen::Vector3d p_N_M;
-  Eigen::Vector3d p_N_Q;
-};
-
 /// Long before any stamp, yet safe to subtract from one.
 inline constexpr Timestamp kNever{Duration{std::numeric_limits<std::int64_t>::min() / 4}};
 
@@ -41,9 +33,11 @@ class NeighborTrack {
   /// With the prior of the speed.
   NeighborTrack(Timestamp stamp, const GaussianPose& T_B_N, const FilterSettings& settings);
 
+  /// Sets the process noise.
   void set_noise(const ProcessNoise& noise);
 
   [[nodiscard]] Timestamp stamp() const;
+  /// Propagates the filter to `to` by the IMUs of both robots.
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Index of the candidate with the smallest NIS. The candidates have the same kind and were taken
   /// at `stamp()`. The first one if they are poses.
@@ -52,6 +46,7 @@ class NeighborTrack {
   /// Corrects with a reading taken at `stamp()`.
   Fusion fuse(const Measurement& measurement, const PairMounting& mounting, const Gates& gates);
 
+  /// One track of a split, and its weight.
   struct Part;
   /// NeighborFilter::split; the paper's filter is one part.
   [[nodiscard]] std::vector<Part> split() const;
@@ -104,6 +99,7 @@ class NeighborTrack {
   std::optional<Eigen::Vector3d> p_N_C_;
 };
 
+/// One track of a split, and its weight.
 struct NeighborTrack::Part {
   NeighborTrack track;
   double log_weight = 0.0;  ///< up to a constant

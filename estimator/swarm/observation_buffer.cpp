@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/core/quantile.hpp"
+
 namespace crepes {
 namespace {
 
@@ -110,11 +112,9 @@ std::optional<RangeReading> ObservationBuffer::range_at(Timestamp t) const {
     if (std::chrono::abs(range.stamp - t) <= kRangeReach) near.push_back(range.range_m);
   }
   if (near.empty()) return std::nullopt;
-  const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
-  std::nth_element(near.begin(), middle, near.end());
   const double sigma_m =
       near.size() > 1 ? range_sigma_m_ : std::hypot(range_sigma_m_, kOutlierSigma);
-  return RangeReading{*middle, sigma_m};
+  return RangeReading{upper_median(near), sigma_m};
 }
 
 Sighting ObservationBuffer::sighting(const Bearing& bearing, const Tilt& tilt,

@@ -21,13 +21,17 @@ class ObservationBuffer {
   ObservationBuffer(MemberConfig self, MemberConfig neighbor, double calibration_sigma_rad,
                     double range_sigma_m);
 
+  /// Sets the noise of bearings' calibration and of ranges.
   void set_sigmas(double calibration_sigma_rad, double range_sigma_m) {
     calibration_sigma_rad_ = calibration_sigma_rad;
     range_sigma_m_ = range_sigma_m;
   }
 
+  /// A bearing of our cameras.
   void add_own_bearing(const Bearing& bearing);
+  /// A bearing of the neighbor's cameras.
   void add_peer_bearing(const Bearing& bearing);
+  /// A range of either module.
   void add_range(Timestamp stamp, double range_m);
 
   /// Raw poses at the stamp of `peer_bearing`, one for each own bearing near that instant; or why

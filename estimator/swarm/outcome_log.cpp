@@ -1,9 +1,12 @@
 #include "estimator/swarm/outcome_log.hpp"
 
-#include <algorithm>
-
 namespace crepes {
 namespace {
+
+/// Moves a mean over about the last `memory` values.
+void follow(std::optional<double>& mean, double value, double memory) {
+  mean = mean.value_or(value) + (value - mean.value_or(value)) / memory;
+}
 
 bool is_range(MeasurementKind kind) {
   return kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange;
@@ -11,16 +14,21 @@ bool is_range(MeasurementKind kind) {
 
 }  // namespace
 
-void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion) {
+void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion,
+                     const SensorReading& reading) {
   ++counts_[static_cast<std::size_t>(kind)][static_cast<std::size_t>(fusion.verdict)];
-  std::optional<Timestamp>& newest = newest_[static_cast<std::size_t>(kind)];
-  newest = std::max(newest.value_or(stamp), stamp);
-  if (is_range(kind) && fusion.dimension > 0) {
-    constexpr double kMemory = 16.0;  // measurements
-    const double mean = range_residual_m_.value_or(fusion.residual[0]);
-    range_residual_m_ = mean + (fusion.residual[0] - mean) / kMemory;
+  // Of alternatives, which have the same stamp, the one that was fused.
+  std::optional<NewestReading>& newest = newest_[static_cast<std::size_t>(kind)];
+  if (!newest || stamp > newest->stamp ||
+      (stamp == newest->stamp && newest->verdict != Verdict::kFused))
+    newest = NewestReading{stamp, fusion.verdict, reading};
+  if (fusion.dimension > 0) {
+    if (is_range(kind)) follow(range_residual_m_, fusion.residual[0], 16.0);
+    if (fusion.verdict == Verdict::kFused)
+      follow(nis_.at(static_cast<std::size_t>(kind)),
+             fusion.nis / static_cast<double>(fusion.dimension), 50.0);
   }
-  if (keeps_records_) records_.measurements.push_back({neighbor_, stamp, kind, fusion});
+  if (keeps_records_) records_.measurements.push_back({neighbor_, stamp, kind, fusion, reading});
 }
 
 void OutcomeLog::add(std::optional<CalibrationRecord> calibration) {
@@ -32,6 +40,7 @@ void OutcomeLog::add(std::optional<CalibrationRecord> calibration) {
 void OutcomeLog::write_to(NeighborStatus& status) const {
   status.measurements = counts_;
   status.newest = newest_;
+  status.nis = nis_;
   status.range_residual_m = range_residual_m_;
 }
 

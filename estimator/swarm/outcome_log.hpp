@@ -15,17 +15,21 @@ class OutcomeLog {
   void keep_records() { keeps_records_ = true; }
   [[nodiscard]] Records drain_records() { return std::exchange(records_, {}); }
 
-  void add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion);
+  /// Counts the outcome of a measurement, and records it if asked to, with what was read.
+  void add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion,
+           const SensorReading& reading = {});
+  /// Records a calibration, if asked to.
   void add(std::optional<CalibrationRecord> calibration);
   [[nodiscard]] bool keeps_records() const { return keeps_records_; }
 
-  /// Fills in `measurements`, `newest` and `range_residual_m`.
+  /// Fills in `measurements`, `newest`, `nis` and `range_residual_m`.
   void write_to(NeighborStatus& status) const;
 
  private:
   RobotId neighbor_;
   std::array<VerdictCounts, kMeasurementKindCount> counts_{};
-  std::array<std::optional<Timestamp>, kMeasurementKindCount> newest_{};
+  std::array<std::optional<NewestReading>, kMeasurementKindCount> newest_{};
+  std::array<std::optional<double>, kMeasurementKindCount> nis_{};
   std::optional<double> range_residual_m_;
   bool keeps_records_ = false;
   Records records_;

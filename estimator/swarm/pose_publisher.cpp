@@ -114,9 +114,7 @@ void PosePublisher::update_team(Timestamp now, const RobotState& self, const Rob
               : team_sees        ? PoseMode::kGraph
                                  : PoseMode::kPredicted;
   pose.T_B_N.pose = team.T_B_N;
-  const auto& P = team.covariance;
-  pose.T_B_N.covariance << P.topLeftCorner<3, 3>(), P.topRightCorner<3, 3>(),
-      P.bottomLeftCorner<3, 3>(), P.bottomRightCorner<3, 3>();
+  pose.T_B_N.covariance = team.pose_covariance();
   pose.v_B_N = team.v_B_N;
   pose.age_s = std::max(0.0, to_seconds(stamp - std::max(sighted, team.last_sighting)));
   pose.reset_counter = starts_;

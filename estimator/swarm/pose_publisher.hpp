@@ -9,6 +9,14 @@
 
 namespace crepes {
 
+/// A neighbor's pose by the team's filter, with what that knows of both IMUs.
+struct TeamEstimate {
+  Timestamp stamp;
+  TeamPose pose;
+  ImuBiasEstimate bias_B;
+  ImuBiasEstimate bias_N;
+};
+
 /// Predicts the leading filter to the newest own IMU sample at each tick. The graph's solution
 /// corrects the published pose only: it contains this filter's own estimate, and fusing it would
 /// count the same readings twice.
@@ -16,6 +24,7 @@ class PosePublisher {
  public:
   PosePublisher(RobotId neighbor, PairMounting mounting, const FilterSettings& settings);
 
+  /// Applies to the next predictions.
   void reconfigure(const FilterSettings& settings);
 
   /// A reading or sample has arrived for `stamp`.
@@ -29,13 +38,6 @@ class PosePublisher {
               const HypothesisSet& hypotheses, ReadingIntake& intake);
   /// Ignored without a pose at or after `stamp`.
   void add_graph_correction(Timestamp stamp, const GraphPose& pose);
-
-  struct TeamEstimate {
-    Timestamp stamp;
-    TeamPose pose;
-    ImuBiasEstimate bias_B;
-    ImuBiasEstimate bias_N;
-  };
   /// Replaces the former one.
   void add_team_pose(TeamEstimate estimate) { team_ = std::move(estimate); }
   /// Carries the newest team pose to now.

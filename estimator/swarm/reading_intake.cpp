@@ -9,7 +9,7 @@ ReadingIntake::ReadingIntake(RobotId neighbor, const FilterSettings& settings)
 
 void ReadingIntake::reconfigure(const FilterSettings& settings) {
   // The waiting readings are meant for the filter of the former profile.
-  if (settings.profile != settings_.profile) buffer_.clear();
+  if (settings.traits != settings_.traits) buffer_.clear();
   settings_ = settings;
   buffer_.set_least_lag(settings.lag);
 }
@@ -32,7 +32,7 @@ void ReadingIntake::add_peer_bearing(const Bearing& bearing, double sigma_rad) {
 
 bool ReadingIntake::add_range(const UwbRange& range, MeasurementKind kind) {
   if (!screen_.accepts(range, settings_)) {
-    outcomes_.add(range.stamp, kind, {.verdict = Verdict::kGated});
+    outcomes_.add(range.stamp, kind, {.verdict = Verdict::kGated}, {range.range_m});
     return false;
   }
   last_.ranged = std::max(last_.ranged, range.stamp);
@@ -43,10 +43,11 @@ bool ReadingIntake::add_range(const UwbRange& range, MeasurementKind kind) {
 void ReadingIntake::enqueue(Measurement measurement) {
   const MeasurementKind kind = measurement.kind;
   const Timestamp stamp = measurement.stamp;
+  const SensorReading reading = reading_of(measurement);
   const bool is_pose = kind == MeasurementKind::kRawPose || kind == MeasurementKind::kGraphPose;
   if (!is_pose && !settings_.traits.fuses_single_readings) return;
   if (!buffer_.push(std::move(measurement))) {
-    outcomes_.add(stamp, kind, {.verdict = Verdict::kLate});
+    outcomes_.add(stamp, kind, {.verdict = Verdict::kLate}, reading);
   } else {
     earliest_new_ = std::min(earliest_new_.value_or(stamp), stamp);
   }

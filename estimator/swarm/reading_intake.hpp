@@ -26,14 +26,18 @@ class ReadingIntake {
  public:
   ReadingIntake(RobotId neighbor, const FilterSettings& settings);
 
+  /// Another profile drops the waiting readings.
   void reconfigure(const FilterSettings& settings);
 
+  /// A report of the neighbor arrived.
   void add_report_stamp(Timestamp stamp);
+  /// A bearing of our cameras.
   void add_bearing(const Bearing& bearing);
   /// `sigma_rad` replaces that of the bearing.
   void add_peer_bearing(const Bearing& bearing, double sigma_rad);
   /// `kind` is that of our own module or of the neighbor's. False if the range is refused.
   bool add_range(const UwbRange& range, MeasurementKind kind);
+  /// Queues a reading that the profile fuses; counts it if it is late.
   void enqueue(Measurement measurement);
 
   [[nodiscard]] const LastContact& last_contact() const { return last_; }

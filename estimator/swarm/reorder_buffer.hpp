@@ -20,6 +20,7 @@ class ReorderBuffer {
 
   explicit ReorderBuffer(Duration least) : lag_(least) {}
 
+  /// Sets the lower limit of the lag.
   void set_least_lag(Duration least) { lag_.set_least(least); }
   [[nodiscard]] Duration lag() const { return lag_.value(); }
 

@@ -18,7 +18,9 @@ class ReportComposer {
  public:
   explicit ReportComposer(RobotId self) : self_(self) {}
 
+  /// A bearing for the next report.
   void add(const Bearing& bearing) { newest_[bearing.neighbor].push_back(bearing); }
+  /// A range for the next report.
   void add(const UwbRange& range) { ranges_.add(range); }
 
   /// Empty before there is a tilt: peers could do nothing with the rest.

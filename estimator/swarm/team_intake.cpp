@@ -50,7 +50,7 @@ void TeamIntake::add_report(const Report& report, double turn_sigma_rad, const S
   for (Bearing bearing : report.bearings) {
     if (!is_other_member(bearing.neighbor, report.sender, swarm)) continue;
     bearing.sigma_rad = std::max(std::hypot(bearing.sigma_rad, turn_sigma_rad), kLeastBearingSigma);
-    note_delay(bearing.stamp);
+    record_delay(bearing.stamp);
     if (bearings_.size() < kMaxWaiting) bearings_.push_back({report.sender, bearing});
   }
   for (const UwbRange& range : report.ranges) {
@@ -71,13 +71,13 @@ void TeamIntake::add_own_report(const Report& report, const SwarmConfig& swarm,
   add_report(news, 0.0, swarm, settings);
 }
 
-void TeamIntake::note_delay(Timestamp stamp) {
+void TeamIntake::record_delay(Timestamp stamp) {
   if (now_ != kNever) lag_.add(now_ - stamp);
 }
 
 void TeamIntake::add_range(RobotId observer, const UwbRange& range,
                            const FilterSettings& settings) {
-  note_delay(range.stamp);
+  record_delay(range.stamp);
   if (ranges_.size() >= kMaxWaiting) return;
   if (!screens_[pair_of(observer, range.neighbor)].accepts(range, settings)) return;
   ranges_.push_back(

@@ -39,7 +39,7 @@ class TeamIntake {
                                                   const ImuOf& imu_of);
 
  private:
-  void note_delay(Timestamp stamp);
+  void record_delay(Timestamp stamp);
   void add_range(RobotId observer, const UwbRange& range, const FilterSettings& settings);
 
   std::vector<TeamBearing> bearings_;

@@ -70,7 +70,8 @@ void TrackInitiator::initialize(std::span<const Measurement> group, const ImuHis
   const Timestamp stamp = group.front().stamp;
   if (!hypotheses.has_budget_for(group.size(), stamp)) {
     for (const Measurement& measurement : group)
-      outcomes.add(stamp, measurement.kind, {.verdict = Verdict::kSkipped});
+      outcomes.add(stamp, measurement.kind, {.verdict = Verdict::kSkipped},
+                   reading_of(measurement));
     return;
   }
   hypotheses.advance_to(stamp, imu_B, imu_N);

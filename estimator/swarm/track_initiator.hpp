@@ -18,9 +18,12 @@ class TrackInitiator {
   TrackInitiator(const MemberConfig& self, const MemberConfig& neighbor,
                  const FilterSettings& settings);
 
+  /// Applies to the next readings.
   void reconfigure(const FilterSettings& settings);
 
+  /// A bearing of our cameras.
   void add_bearing(const Bearing& bearing) { observations_.add_own_bearing(bearing); }
+  /// A range of either module.
   void add_range(Timestamp stamp, double range_m) { observations_.add_range(stamp, range_m); }
   /// Queues the raw poses that the bearing completes, if `hypotheses` need one.
   void add_peer_bearing(const Bearing& bearing, const RobotState& self, const RobotState& neighbor,

@@ -2,11 +2,13 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "estimator/core/quantile.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -82,12 +84,6 @@ struct Half {
   }
 };
 
-double middle_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// The median in each component, so that single false bearings do not count.
 std::optional<Eigen::Vector2d> median_residual(const TeamPair& pair, const TeamCamera& camera,
                                                const SightModel& model, const Half& half,
@@ -100,7 +96,7 @@ std::optional<Eigen::Vector2d> median_residual(const TeamPair& pair, const TeamC
     x.push_back(residual->x());
     y.push_back(residual->y());
   }
-  return Eigen::Vector2d(middle_of(x), middle_of(y));
+  return Eigen::Vector2d(upper_median(x), upper_median(y));
 }
 
 Direction direction_of(const SightModel& model, const Eigen::Vector2d& residual) {
@@ -111,8 +107,26 @@ Direction direction_of(const SightModel& model, const Eigen::Vector2d& residual)
           .across = model.across()};
 }
 
+/// Of what a gyroscope reads, by its biases and scale errors.
+Eigen::Matrix3d rate_covariance(const TeamBelief& belief, const TeamRobot& robot,
+                                const TeamMember& member) {
+  Eigen::Vector4d by = Eigen::Vector4d::Unit(0);
+  for (const ImuMean& mean : member.imu)
+    by.tail<3>() += mean.gyro_radps / static_cast<double>(member.imu.size());
+  constexpr std::array<int, 4> kParts{0, 6, 9, 12};  // the bias, and the scale's columns
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (std::size_t a = 0; a < kParts.size(); ++a) {
+    for (std::size_t b = 0; b < kParts.size(); ++b)
+      covariance +=
+          by(Eigen::Index(a)) * by(Eigen::Index(b)) *
+          belief.P.block<3, 3>(robot.bias_index + kParts[a], robot.bias_index + kParts[b]);
+  }
+  return covariance;
+}
+
 std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajectories& paths,
-                                const TeamBelief& belief, const Sight& sight) {
+                                const TeamInstant& instant, const TeamBelief& belief,
+                                const Sight& sight) {
   const std::size_t count = sight.bearings.size() / 2;
   if (count == 0) return std::nullopt;
   std::vector<const Bearing*> sorted = sight.bearings;
@@ -124,9 +138,13 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   const double t2_s = second.time_s(interval.from);
   if (t2_s - t1_s < kLeastTime) return std::nullopt;
 
-  const TeamPair pair{belief.robots.at(sight.observer), belief.robots.at(sight.neighbor),
-                      *interval.member(sight.observer), *interval.member(sight.neighbor),
-                      paths.at(sight.observer),         paths.at(sight.neighbor)};
+  const TeamPair pair{belief.robots.at(sight.observer),
+                      belief.robots.at(sight.neighbor),
+                      *interval.member(sight.observer),
+                      *interval.member(sight.neighbor),
+                      paths.at(sight.observer),
+                      paths.at(sight.neighbor),
+                      instant.states()};
   const TeamCamera& camera = pair.observer.cameras[sight.camera];
   const auto before = SightModel::at(pair, camera, t1_s, sight.sigma_rad());
   const auto after = SightModel::at(pair, camera, t2_s, sight.sigma_rad());
@@ -142,12 +160,17 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   row.H.leftCols(row.size) =
       (turn * row.H.leftCols(row.size)).eval() - before->row().H.leftCols(row.size);
   row.variance += before->row().variance;
-  return Change{.first = direction_of(*before, *r1),
+  Change change{.first = direction_of(*before, *r1),
                 .second = direction_of(*after, *r2),
                 .turn = turn,
-                .first_covariance = before->row().covariance(belief.P),
-                .covariance = row.covariance(belief.P),
+                .first_covariance = before->row().covariance(instant.covariance()),
+                .covariance = row.covariance(instant.covariance()),
                 .time_s = t2_s - t1_s};
+  // The instant has no part of the gyroscope's errors from the first half to the second.
+  change.covariance += change.by_rate() *
+                       rate_covariance(belief, pair.observer, pair.observer_arms) *
+                       change.by_rate().transpose();
+  return change;
 }
 
 /// The turn of the camera that explains the first half.
@@ -168,10 +191,10 @@ struct CameraTurn {
   }
 };
 
-std::optional<GyroContradiction> contradiction(std::span<const Change> changes) {
+GyroCheck check_of(std::span<const Change> changes) {
   const CameraTurn turn(changes);
   std::ptrdiff_t unlikely = 0;
-  double sum = 0.0;
+  GyroCheck check;
   LeastSquares rate(kAnyRate);
   for (const Change& change : changes) {
     const Eigen::Vector2d residual = change.residual(turn.R);
@@ -179,31 +202,31 @@ std::optional<GyroContradiction> contradiction(std::span<const Change> changes) 
     const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
     const double chi2 = residual.dot(S.llt().solve(residual));
     unlikely += chi2 > kUnlikely ? 1 : 0;
-    sum += chi2;
+    check.chi2 += chi2;
+    check.dimension += 2;
     rate.add(residual, S, change.by_rate());
   }
   const Eigen::Vector3d mean = rate.mean();
   const double explained = rate.weighed.dot(mean);
   const bool is_common = unlikely >= 2 && 2 * unlikely > std::ssize(changes);
-  if (!is_common || explained <= kExplained * sum) return std::nullopt;
-  return GyroContradiction{.chi2 = explained, .rate_radps = mean.norm()};
+  if (is_common && explained > kExplained * check.chi2)
+    check.contradiction = {.chi2 = explained, .rate_radps = mean.norm()};
+  return check;
 }
 
 }  // namespace
 
-std::map<RobotId, GyroContradiction> gyro_contradictions(const TeamInterval& interval,
-                                                         const TeamTrajectories& paths,
-                                                         const TeamBelief& belief) {
+std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
+                                         const TeamTrajectories& paths, const TeamBelief& belief) {
+  const TeamInstant instant(belief, paths, 0.5 * to_seconds(interval.to - interval.from));
   std::map<RobotId, std::vector<Change>> changes;
   for (const Sight& sight : all_sights(interval, belief)) {
-    if (const auto change = change_of(interval, paths, belief, sight))
+    if (const auto change = change_of(interval, paths, instant, belief, sight))
       changes[sight.observer].push_back(*change);
   }
-  std::map<RobotId, GyroContradiction> contradictions;
-  for (const auto& [robot, seen] : changes) {
-    if (const auto found = contradiction(seen)) contradictions.emplace(robot, *found);
-  }
-  return contradictions;
+  std::map<RobotId, GyroCheck> checks;
+  for (const auto& [robot, seen] : changes) checks.emplace(robot, check_of(seen));
+  return checks;
 }
 
 }  // namespace crepes

@@ -91,6 +91,7 @@ FreeMotionAt RobotTrajectory::advanced(const FreeMotionAt& from, const Step& ste
   const Eigen::Matrix3d R = from.motion.R();
   const Eigen::Matrix3d H = step.half.toRotationMatrix();
   FreeMotionAt to;
+  to.t_s = from.t_s + dt;
   to.motion = step.moved(from.motion);
 
   const Eigen::Matrix3d v_by_theta = -dt * R * hat(H * step.f);

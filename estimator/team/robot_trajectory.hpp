@@ -27,6 +27,7 @@ struct FreeMotionAt {
   static constexpr int kBias = 15;
   static constexpr int kStart = kMotion + kBias;  ///< [p, v, theta] at the beginning, bias
 
+  double t_s = 0.0;  ///< after the beginning
   FreeMotion motion;
   Eigen::Matrix<double, kMotion, kStart> by_start;
   Eigen::Matrix<double, kMotion, kMotion> noise;  ///< covariance that the IMU's noise has added

@@ -9,19 +9,20 @@
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
+#include "estimator/team/motion_image.hpp"
 
 namespace crepes {
 namespace {
 
 constexpr int kMotion = FreeMotionAt::kMotion;
 constexpr int kBias = FreeMotionAt::kBias;
-// A pair's range bias is mostly its modules' antenna delays, the same toward everybody: so much of
-// its variance. The rest is the pair's own, and drifts.
+// The share of a pair's range-bias variance that its two modules' antenna delays explain. A delay
+// is the same in all pairs of a module. The rest belongs to the pair alone, and drifts.
 constexpr double kShareOfModules = 0.8;
-// An accelerometer's scale errors act as a bias that changes while the robot turns, and keeps its
-// direction for so long.
+// An accelerometer's scale errors act as a bias that changes while the robot turns. This is its
+// correlation time.
 constexpr double kTurnMemory = 1.0;  // s
-// What the mesh's clocks leave.
+// Errors of the clock offsets that the mesh estimates.
 constexpr double kClockSigma = 3e-3;  // s
 constexpr double kClockWalk = 1e-4;   // s/sqrt(s)
 
@@ -35,13 +36,8 @@ double turn_rate(const TeamMember& member) {
 /// How a robot's errors at the next keyframe follow from those at the last one.
 struct Moved {
   int index = 0;
-  int bias_index = 0;
-  int clock_index = 0;
-  Eigen::Matrix<double, kMotion, kMotion> by_motion{};
-  Eigen::Matrix<double, kMotion, kBias> by_bias{};
-  Eigen::Matrix<double, kMotion, kBias> by_self_bias{};
+  MotionImage image{};
   Eigen::Matrix<double, kMotion, kMotion> by_self{};  ///< by this robot's motion at the end
-  Eigen::Vector3d p_by_clock{};
   Eigen::Matrix<double, kMotion, kMotion> noise{};
 };
 
@@ -50,55 +46,62 @@ struct Moved {
 /// because the robot is there tau before the new frame begins, and their errors
 ///   dp' = R_S^T (dp - dp_S + tau dv_S + v_S dtau) + [p']x dtheta_S,
 ///   dv' = R_S^T (dv - dv_S) + [v']x dtheta_S,  dtheta' = dtheta - R'^T dtheta_S.
-/// `next` becomes the new motion.
-Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, double clock_s, FreeMotion& next) {
+/// `robot` receives the new motion.
+Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, int self_bias, TeamRobot& robot) {
   const Eigen::Matrix3d R_S_F = self.motion.R().transpose();
-  next.p_F = R_S_F * (end.motion.p_F - self.motion.p_F + clock_s * self.motion.v_F);
+  FreeMotion& next = robot.motion;
+  next.p_F = R_S_F * (end.motion.p_F - self.motion.p_F + robot.clock_s * self.motion.v_F);
   next.v_F = R_S_F * (end.motion.v_F - self.motion.v_F);
   next.q_F_B = (self.motion.q_F_B.conjugate() * end.motion.q_F_B).normalized();
-  Moved moved;
-  Eigen::Matrix<double, kMotion, kMotion> turn =
-      Eigen::Matrix<double, kMotion, kMotion>::Identity();
-  turn.block<3, 3>(0, 0) = R_S_F;
-  turn.block<3, 3>(3, 3) = R_S_F;
+  Moved moved{.index = robot.motion_index};
   moved.by_self.setZero();
-  moved.p_by_clock = R_S_F * self.motion.v_F;
   moved.by_self.block<3, 3>(0, 0) = -R_S_F;
-  moved.by_self.block<3, 3>(0, 3) = clock_s * R_S_F;
+  moved.by_self.block<3, 3>(0, 3) = robot.clock_s * R_S_F;
   moved.by_self.block<3, 3>(3, 3) = -R_S_F;
   moved.by_self.block<3, 3>(0, 6) = hat(next.p_F);
   moved.by_self.block<3, 3>(3, 6) = hat(next.v_F);
   moved.by_self.block<3, 3>(6, 6) = -next.R().transpose();
-  moved.by_motion = turn.lazyProduct(end.by_start.leftCols<kMotion>());
-  moved.by_bias = turn.lazyProduct(end.by_start.rightCols<kBias>());
-  moved.by_self_bias = moved.by_self.lazyProduct(self.by_start.rightCols<kBias>());
+  Eigen::Matrix<double, kMotion, kMotion> turn =
+      Eigen::Matrix<double, kMotion, kMotion>::Identity();
+  turn.block<3, 3>(0, 0) = R_S_F;
+  turn.block<3, 3>(3, 3) = R_S_F;
+  Eigen::Matrix<double, kMotion, 1> by_clock = Eigen::Matrix<double, kMotion, 1>::Zero();
+  by_clock.head<3>() = R_S_F * self.motion.v_F;
+  moved.image.parts = {{robot.motion_index, turn.lazyProduct(end.by_start.leftCols<kMotion>())},
+                       {robot.bias_index, turn.lazyProduct(end.by_start.rightCols<kBias>())},
+                       {self_bias, moved.by_self.lazyProduct(self.by_start.rightCols<kBias>())},
+                       {robot.clock_index(), by_clock}};
   const Eigen::Matrix<double, kMotion, kMotion> turned = turn.lazyProduct(end.noise);
   moved.noise = turned.lazyProduct(turn.transpose());
   return moved;
 }
 
 /// The covariance at the next keyframe. `self_noise` is what this robot's IMU has added.
-void carry(const std::vector<Moved>& all, int self_bias,
-           const Eigen::Matrix<double, kMotion, kMotion>& self_noise, Eigen::MatrixXd& P) {
-  for (const Moved& m : all) {
-    P.middleRows<kMotion>(m.index) = (m.by_motion * P.middleRows<kMotion>(m.index) +
-                                      m.by_bias * P.middleRows<kBias>(m.bias_index) +
-                                      m.by_self_bias * P.middleRows<kBias>(self_bias))
-                                         .eval();
-    P.middleRows<3>(m.index) += m.p_by_clock * P.row(m.clock_index);
+void carry(const std::vector<Moved>& all, const Eigen::Matrix<double, kMotion, kMotion>& self_noise,
+           Eigen::MatrixXd& P) {
+  std::vector<MotionImage> images;
+  images.reserve(all.size());
+  for (const Moved& m : all) images.push_back(m.image);
+  const Eigen::MatrixXd with_all = covariance_with(images, P);
+  const Eigen::MatrixXd own = covariance_with(images, with_all.transpose());
+  const auto first = [](std::size_t i) { return kMotion * static_cast<Eigen::Index>(i); };
+  for (std::size_t a = 0; a < all.size(); ++a) {
+    P.middleCols<kMotion>(all[a].index) = with_all.middleCols<kMotion>(first(a));
+    P.middleRows<kMotion>(all[a].index) = with_all.middleCols<kMotion>(first(a)).transpose();
   }
-  for (const Moved& m : all) {
-    P.middleCols<kMotion>(m.index) = (P.middleCols<kMotion>(m.index) * m.by_motion.transpose() +
-                                      P.middleCols<kBias>(m.bias_index) * m.by_bias.transpose() +
-                                      P.middleCols<kBias>(self_bias) * m.by_self_bias.transpose())
-                                         .eval();
-    P.middleCols<3>(m.index) += P.col(m.clock_index) * m.p_by_clock.transpose();
-  }
-  for (const Moved& a : all) {
-    P.block<kMotion, kMotion>(a.index, a.index) += a.noise;
-    const Eigen::Matrix<double, kMotion, kMotion> of_self = a.by_self.lazyProduct(self_noise);
-    for (const Moved& b : all)
-      P.block<kMotion, kMotion>(a.index, b.index) += of_self.lazyProduct(b.by_self.transpose());
+  for (std::size_t a = 0; a < all.size(); ++a) {
+    const Eigen::Matrix<double, kMotion, kMotion> of_self = all[a].by_self.lazyProduct(self_noise);
+    for (std::size_t b = 0; b <= a; ++b) {
+      Eigen::Matrix<double, kMotion, kMotion> block =
+          own.block<kMotion, kMotion>(first(a), first(b));
+      block += of_self.lazyProduct(all[b].by_self.transpose());
+      if (a == b) {
+        block += all[a].noise;
+        block = (0.5 * (block + block.transpose())).eval();
+      }
+      P.block<kMotion, kMotion>(all[b].index, all[a].index) = block.transpose();
+      P.block<kMotion, kMotion>(all[a].index, all[b].index) = block;
+    }
   }
 }
 
@@ -219,26 +222,73 @@ TeamPose TeamBelief::team_pose(RobotId id, const TeamMember& member) const {
   const Eigen::Vector3d a = robot.motion.q_F_B * (last.accel_mps2 - robot.bias.accel_mps2);
   const Eigen::Vector3d v = robot.motion.v_F + tau * a;
 
+  // Of [motion, biases of this robot and of the other], by the states and the clock.
+  constexpr int kBiases = TeamPose::kBiases;
   using Matrix9d = Eigen::Matrix<double, kMotion, kMotion>;
   Matrix9d by_motion = Matrix9d::Identity();
   by_motion.block<3, 3>(0, 3).diagonal().setConstant(tau);
   by_motion.block<3, 3>(6, 6) = so3_exp(-tau * w).toRotationMatrix();
   Eigen::Matrix<double, kMotion, 1> by_clock;
   by_clock << v, a, w;
-  const Matrix9d of_motion = P.block<kMotion, kMotion>(robot.motion_index, robot.motion_index);
+  const int motion = robot.motion_index;
+  const int clock = robot.clock_index();
+  const std::array<int, 2> biases{robots.at(self).bias_index, robot.bias_index};
+  const auto of_biases = [&](Eigen::Index row) {
+    Eigen::Matrix<double, 1, kBiases> covariance;
+    covariance << P.block<1, 6>(row, biases[0]), P.block<1, 6>(row, biases[1]);
+    return covariance;
+  };
   const Eigen::Matrix<double, kMotion, 1> with_clock =
-      by_motion * P.block<kMotion, 1>(robot.motion_index, robot.clock_index());
-  const Matrix9d carried = by_motion.lazyProduct(of_motion);
-  Matrix9d covariance = carried.lazyProduct(by_motion.transpose());
-  covariance += with_clock * by_clock.transpose() + by_clock * with_clock.transpose() +
-                P(robot.clock_index(), robot.clock_index()) * by_clock * by_clock.transpose();
-  return {.neighbor = id,
-          .T_B_N = {robot.motion.p_F + tau * robot.motion.v_F + 0.5 * tau * tau * a,
-                    (robot.motion.q_F_B * so3_exp(tau * w)).normalized()},
-          .v_B_N = v,
-          .covariance = 0.5 * (covariance + covariance.transpose()),
-          .last_sighting = robot.last_sighting,
-          .clock_ahead = from_seconds(tau)};
+      by_motion * P.block<kMotion, 1>(motion, clock);
+  const Matrix9d carried = by_motion.lazyProduct(P.block<kMotion, kMotion>(motion, motion));
+  Matrix9d of_motion = carried.lazyProduct(by_motion.transpose());
+  of_motion += with_clock * by_clock.transpose() + by_clock * with_clock.transpose() +
+               P(clock, clock) * by_clock * by_clock.transpose();
+  Eigen::Matrix<double, kMotion, kBiases> with_biases;
+  for (int i = 0; i < kMotion; ++i) with_biases.row(i) = of_biases(motion + i);
+  with_biases = (by_motion * with_biases + by_clock * of_biases(clock)).eval();
+
+  TeamPose pose{.neighbor = id,
+                .T_B_N = {robot.motion.p_F + tau * robot.motion.v_F + 0.5 * tau * tau * a,
+                          (robot.motion.q_F_B * so3_exp(tau * w)).normalized()},
+                .v_B_N = v,
+                .last_sighting = std::max(robot.last_sighting, robot.last_fix),
+                .clock_ahead = from_seconds(tau)};
+  pose.covariance.topLeftCorner<kMotion, kMotion>() = 0.5 * (of_motion + of_motion.transpose());
+  pose.covariance.topRightCorner<kMotion, kBiases>() = with_biases;
+  pose.covariance.bottomLeftCorner<kBiases, kMotion>() = with_biases.transpose();
+  for (int i = 0; i < kBiases; ++i)
+    pose.covariance.bottomRightCorner<kBiases, kBiases>().row(i) =
+        of_biases(biases.at(static_cast<std::size_t>(i / 6)) + i % 6);
+  return pose;
+}
+
+RobotCalibration TeamBelief::calibration(RobotId id) const {
+  const TeamRobot& robot = robots.at(id);
+  const auto sigma = [this](int index) { return std::sqrt(P(index, index)); };
+  const auto sigmas = [this](int index) -> Eigen::Vector3d {
+    return P.diagonal().segment<3>(index).cwiseSqrt();
+  };
+  RobotCalibration calibration{.robot = id,
+                               .is_trusted = robot.is_trusted,
+                               .imu = {.gyro_radps = robot.bias.gyro_radps,
+                                       .accel_mps2 = robot.bias.accel_mps2,
+                                       .gyro_scale = robot.bias.gyro_scale,
+                                       .gyro_sigma_radps = sigmas(robot.bias_index),
+                                       .accel_sigma_mps2 = sigmas(robot.bias_index + 3)},
+                               .antenna_delay_m = robot.antenna_delay_m,
+                               .antenna_delay_sigma_m = sigma(robot.delay_index()),
+                               .clock_s = robot.clock_s,
+                               .clock_sigma_s = sigma(robot.clock_index()),
+                               .cameras = {}};
+  for (int i = 0; i < 3; ++i)
+    calibration.imu.gyro_scale_sigma.col(i) = sigmas(robot.bias_index + 6 + 3 * i);
+  for (const TeamCamera& camera : robot.cameras) {
+    calibration.cameras.push_back({.p_B_C = camera.p_B_C,
+                                   .rotation = camera.misalignment,
+                                   .covariance = P.block<3, 3>(camera.index, camera.index)});
+  }
+  return calibration;
 }
 
 Eigen::Matrix3d TeamBelief::position_covariance(RobotId from, RobotId to) const {
@@ -269,20 +319,26 @@ void TeamBelief::inject(const Eigen::VectorXd& dx) {
   for (auto& [pair, range] : ranges) range.bias_m += dx(range.index);
 }
 
+void TeamBelief::reset_attitude(int index, const Eigen::VectorXd& dx) {
+  const Eigen::Matrix3d J = so3_right_jacobian(dx.segment<3>(index));
+  const Eigen::Matrix<double, 3, Eigen::Dynamic> rows = J * P.middleRows<3>(index);
+  const Eigen::Matrix3d own = rows.middleCols<3>(index) * J.transpose();
+  P.middleRows<3>(index) = rows;
+  P.middleCols<3>(index) = rows.transpose();
+  P.block<3, 3>(index, index) = 0.5 * (own + own.transpose());
+}
+
 void TeamBelief::advance(const TeamInterval& interval) {
   const TeamTrajectories paths = trajectories(interval);
   const FreeMotionAt& end_of_self = paths.at(self).end();
+  const int self_bias = robots.at(self).bias_index;
   std::vector<Moved> all;
   for (auto& [id, robot] : robots) {
-    if (robot.motion_index < 0) continue;
-    all.push_back(moved(paths.at(id).end(), end_of_self, robot.clock_s, robot.motion));
-    all.back().index = robot.motion_index;
-    all.back().bias_index = robot.bias_index;
-    all.back().clock_index = robot.clock_index();
+    if (robot.motion_index >= 0)
+      all.push_back(moved(paths.at(id).end(), end_of_self, self_bias, robot));
   }
-  carry(all, robots.at(self).bias_index, end_of_self.noise, P);
+  carry(all, end_of_self.noise, P);
   add_drift(interval);
-  P = (0.5 * (P + P.transpose())).eval();
   stamp = interval.to;
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "estimator/core/pose.hpp"
+#include "estimator/core/team_solution.hpp"
 #include "estimator/team/team_interval.hpp"
 #include "estimator/team/team_state.hpp"
 
@@ -16,7 +17,7 @@ using TeamTrajectories = std::map<RobotId, RobotTrajectory>;
 /// The frame falls freely with this robot at `stamp`, the keyframe. So this robot's motion there is
 /// known by definition, and gravity and the team's common motion are no states.
 struct TeamBelief {
-  static constexpr double kLeastVariance = 1e-12;  ///< of a prior; one known exactly stays regular
+  static constexpr double kLeastVariance = 1e-12;  ///< of a prior, so that P stays regular
 
   RobotId self{};
   Timestamp stamp{};
@@ -33,19 +34,26 @@ struct TeamBelief {
   int append_calibration(const Priors& priors);
   /// For pairs that measure ranges for the first time.
   void append_range_biases(const TeamInterval& interval);
+  /// Removes a robot and its states.
   void remove(RobotId id);
 
+  /// The motions of all robots over the interval.
   [[nodiscard]] TeamTrajectories trajectories(const TeamInterval& interval) const;
   /// T_S_N with S this robot.
   [[nodiscard]] GaussianPose pose(RobotId id) const;
   /// The same at the keyframe by this robot's clock. `member` carries it there from its own
   /// clock's.
   [[nodiscard]] TeamPose team_pose(RobotId id, const TeamMember& member) const;
+  /// What is known of a robot's sensors.
+  [[nodiscard]] RobotCalibration calibration(RobotId id) const;
   /// Of the position of `to` relative to `from`.
   [[nodiscard]] Eigen::Matrix3d position_covariance(RobotId from, RobotId to) const;
 
   /// Adds an error to the states.
   void inject(const Eigen::VectorXd& dx);
+  /// After the attitude's error at this index was injected, what is left of it is about the new
+  /// attitude.
+  void reset_attitude(int index, const Eigen::VectorXd& dx);
   /// Moves the keyframe to the end of the interval.
   void advance(const TeamInterval& interval);
 

@@ -15,7 +15,6 @@ namespace {
 // An estimate that starts a robot shares its errors with what follows, so it counts little.
 constexpr double kStartPosition = 0.05;          // m
 constexpr double kStartAttitude = radians(1.0);  // rad
-constexpr double kStartSpeed = 0.3;              // m/s
 constexpr double kUnknownDistance = 0.10;        // m; the least by which a step is judged
 constexpr double kLinear = 0.01;                 // rad, and relative to the distance
 constexpr int kMaxIterations = 4;
@@ -57,43 +56,30 @@ double largest_step(const std::map<RobotId, TeamRobot>& robots, const Eigen::Vec
   return largest;
 }
 
-TeamPose distant_pose(RobotId id, const GaussianPose& T_S_N, const Eigen::Vector3d& v_S_N,
-                      Timestamp stamp) {
-  TeamPose pose{.neighbor = id, .T_B_N = T_S_N.pose, .v_B_N = v_S_N};
-  pose.last_sighting = stamp;
-  const Matrix6d& covariance = T_S_N.covariance;
-  pose.covariance.topLeftCorner<3, 3>() = covariance.topLeftCorner<3, 3>();
-  pose.covariance.topRightCorner<3, 3>() = covariance.topRightCorner<3, 3>();
-  pose.covariance.bottomLeftCorner<3, 3>() = covariance.bottomLeftCorner<3, 3>();
-  pose.covariance.bottomRightCorner<3, 3>() = covariance.bottomRightCorner<3, 3>();
-  pose.covariance.diagonal().segment<3>(3).setConstant(kStartSpeed * kStartSpeed);
-  return pose;
-}
-
-ImuBiasEstimate unknown_bias(RobotId id, const Priors& priors) {
-  ImuBiasEstimate bias{.robot = id};
-  bias.gyro_sigma_radps = priors.gyro_bias_radps;
-  bias.accel_sigma_mps2 = std::sqrt(accel_bias_variance(priors));
-  return bias;
-}
-
 }  // namespace
 
 TeamSolution TeamFilter::step(const TeamInterval& interval) {
   if (interval.member(interval.self) == nullptr || interval.to <= interval.from) {
     belief_.robots.clear();
-    return {.stamp = interval.to, .poses = {}, .biases = {}, .faults = {}};
+    return {.stamp = interval.to, .poses = {}, .calibrations = {}, .residuals = {}, .faults = {}};
   }
+  residuals_.clear();
   if (belief_.robots.empty() || interval.self != belief_.self || interval.from != belief_.stamp)
     belief_ = TeamBelief::beginning(interval);
+  append_cameras(interval);  // before their first interval corrects anything, it is checked
   remove_members(interval);
   trust_.end_probations(belief_);
   append_cameras(interval);
   belief_.append_range_biases(interval);
   if (!correct(interval)) belief_ = TeamBelief::beginning(interval);
   belief_.advance(interval);
-  TeamSolution solution{.stamp = belief_.stamp, .poses = {}, .biases = {}, .faults = {}};
-  add_members(interval, solution);
+  estimates_.add(interval, belief_);
+  TeamSolution solution{.stamp = belief_.stamp,
+                        .poses = {},
+                        .calibrations = {},
+                        .residuals = residuals_,
+                        .faults = {}};
+  add_members(interval, exchange_member(interval), solution);
   report(interval, solution);
   return solution;
 }
@@ -102,8 +88,11 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
 /// So have robots with false ranges, and this robot's own gyroscope, if it was false.
 void TeamFilter::remove_members(const TeamInterval& interval) {
   bool has_strained = false;
-  for (const RobotId id : trust_.lost(interval, belief_)) belief_.remove(id);
-  for (const RobotId id : trust_.false_gyros(interval, belief_)) {
+  for (const RobotId id : trust_.lost(interval, belief_)) {
+    has_strained = has_strained || id == belief_.self;
+    if (id != belief_.self) belief_.remove(id);
+  }
+  for (const RobotId id : false_gyros(interval)) {
     has_strained = has_strained || id == belief_.self;
     if (id != belief_.self) belief_.remove(id);
   }
@@ -112,6 +101,31 @@ void TeamFilter::remove_members(const TeamInterval& interval) {
     if (id != belief_.self) belief_.remove(id);
   }
   if (has_strained || trust_.is_misled(belief_)) belief_ = TeamBelief::beginning(interval);
+}
+
+RobotId TeamFilter::exchange_member(const TeamInterval& interval) {
+  links_.add(interval, belief_);
+  if (belief_.robots.size() < interval.settings.max_robots) return {};
+  const auto exchange = links_.exchange(belief_.stamp, belief_);
+  if (!exchange) return {};
+  belief_.remove(exchange->leaves);
+  return exchange->joins;
+}
+
+/// All robots in the belief have an IMU over the interval.
+std::vector<RobotId> TeamFilter::false_gyros(const TeamInterval& interval) {
+  const auto checks = gyro_checks(interval, belief_.trajectories(interval), belief_);
+  for (const auto& [id, check] : checks) {
+    const bool is_refused = check.contradiction.has_value();
+    residuals_.push_back({.observer = id,
+                          .neighbor = id,
+                          .kind = TeamResidual::Kind::kGyro,
+                          .fused = is_refused ? 0 : 1,
+                          .refused = is_refused ? 1 : 0,
+                          .nis = check.chi2,
+                          .dimension = check.dimension});
+  }
+  return trust_.false_gyros(interval, belief_, checks);
 }
 
 /// For cameras that measure for the first time.
@@ -126,9 +140,10 @@ void TeamFilter::append_cameras(const TeamInterval& interval) {
     if (cameras.size() >= kMaxCameras ||
         std::ranges::find(cameras, p_B_C, &TeamCamera::p_B_C) != cameras.end())
       continue;
-    const auto turn = trust_.turn_covariance(reading.observer, belief_.stamp);
+    const auto turn = trust_.turn_covariance(reading.observer);
     cameras.push_back({.p_B_C = p_B_C,
                        .index = belief_.append(3, known),
+                       .is_free = turn.has_value(),
                        .is_refused = turn && trust_.is_refused(reading.observer)});
     if (turn) belief_.P.bottomRightCorner<3, 3>() = *turn;
   }
@@ -156,42 +171,39 @@ bool TeamFilter::correct(const TeamInterval& interval) {
 
 bool TeamFilter::correct(const TeamInterval& interval, Stage stage, TeamReadings readings) {
   if (readings.empty()) return true;
-  TeamTrajectories paths = belief_.trajectories(interval);
-  gate(interval, paths, belief_, readings);
-  std::vector<TeamRow> rows = linearized(interval, paths, belief_, readings);
+  const double time_s = readings.time_s(interval);
   const std::vector<bool> corrected = corrected_states(stage);
-  const std::map<RobotId, TeamRobot> robots = belief_.robots;
-  const std::map<RobotPair, TeamRangeBias> ranges = belief_.ranges;
+  std::map<RobotId, TeamRobot> robots;
+  std::map<RobotPair, TeamRangeBias> ranges;
   Eigen::VectorXd dx = Eigen::VectorXd::Zero(belief_.P.rows());
   for (int iteration = 1;; ++iteration) {
-    if (rows.empty()) {  // the last step may have made all ranges unlikely
-      belief_.robots = robots;
-      belief_.ranges = ranges;
-      return true;
+    const TeamTrajectories paths = belief_.trajectories(interval);
+    const TeamInstant instant(belief_, paths, time_s);
+    if (iteration == 1) {
+      gate(interval, paths, instant, belief_, readings, residuals_);
+      robots = belief_.robots;
+      ranges = belief_.ranges;
     }
-    const TeamUpdate update(rows, belief_.P);
+    const std::vector<TeamRow> rows = linearized(interval, paths, instant, belief_, readings);
+    belief_.robots = robots;
+    belief_.ranges = ranges;
+    if (rows.empty()) return true;  // the last step may have made all ranges unlikely
+    const TeamUpdate update(rows, instant.image_of(dx), instant.covariance(),
+                            instant.with_belief());
     if (!update.is_valid()) return false;
-    Eigen::VectorXd next = update.correction(rows, dx);
+    Eigen::VectorXd next = update.correction();
     for (Eigen::Index i = 0; i < next.size(); ++i)
       if (!corrected[static_cast<std::size_t>(i)]) next(i) = 0.0;
     const bool is_linear = largest_step(robots, next - dx) < kLinear;
     dx = next;
-    belief_.robots = robots;
-    belief_.ranges = ranges;
     belief_.inject(dx);
     if (is_linear || iteration == kMaxIterations) {
       update.correct(corrected, belief_.P);
       break;
     }
-    paths = belief_.trajectories(interval);
-    rows = linearized(interval, paths, belief_, readings);
   }
-  for (auto& [id, robot] : belief_.robots) {
-    if (robot.motion_index < 0) continue;
-    const int theta = robot.motion_index + 6;
-    const Eigen::Matrix3d J = so3_right_jacobian(dx.segment<3>(theta));
-    belief_.P.middleRows<3>(theta) = (J * belief_.P.middleRows<3>(theta)).eval();
-    belief_.P.middleCols<3>(theta) = (belief_.P.middleCols<3>(theta) * J.transpose()).eval();
+  for (const auto& [id, robot] : belief_.robots) {
+    if (robot.motion_index >= 0) belief_.reset_attitude(robot.motion_index + 6, dx);
   }
   return true;
 }
@@ -219,17 +231,14 @@ std::vector<bool> TeamFilter::corrected_states(Stage stage) const {
   return corrected;
 }
 
-/// Robots that estimates connect to a known one, the most certain first. When the filter is full,
-/// the others are located by their chain of estimates alone.
-void TeamFilter::add_members(const TeamInterval& interval, TeamSolution& solution) {
-  struct Place {
-    GaussianPose T_S_N;
-    Eigen::Vector3d v_S_N = Eigen::Vector3d::Zero();
-  };
-  std::map<RobotId, Place> places;
-  std::map<RobotId, Place> candidates;
+/// Robots that estimates connect to a known one, the most certain first; a place is kept for
+/// `first`, if it is one. When the filter is full, the others are located by their chain of
+/// estimates alone.
+void TeamFilter::add_members(const TeamInterval& interval, RobotId first, TeamSolution& solution) {
+  std::map<RobotId, TeamPlace> places;
+  std::map<RobotId, TeamPlace> candidates;
   const auto add_candidates_from = [&](RobotId known) {
-    const Place& via = places.at(known);
+    const TeamPlace& via = places.at(known);
     for (const RelativePoseEdge& edge : interval.edges) {
       const bool forward = edge.from == known;
       const RobotId id = forward ? edge.to : edge.from;
@@ -242,68 +251,59 @@ void TeamFilter::add_members(const TeamInterval& interval, TeamSolution& solutio
       const Eigen::Vector3d v =
           forward ? edge.v_from_to
                   : Eigen::Vector3d(-(edge.T_from_to.pose.R().transpose() * edge.v_from_to));
-      const Place place{via.T_S_N * step, via.v_S_N + via.T_S_N.pose.R() * v};
+      const TeamPlace place = via.beyond(step, v, edge.estimated);
       const auto [best, is_first] = candidates.try_emplace(id, place);
-      if (!is_first && place.T_S_N.covariance.trace() < best->second.T_S_N.covariance.trace())
-        best->second = place;
+      if (!is_first && place.doubt() < best->second.doubt()) best->second = place;
     }
   };
-  for (const auto& [id, robot] : belief_.robots) places[id] = {belief_.pose(id), robot.motion.v_F};
+  for (const auto& [id, robot] : belief_.robots) places[id] = TeamPlace::of(belief_, id);
   for (const auto& [id, robot] : belief_.robots) add_candidates_from(id);
   while (!candidates.empty()) {
-    const auto best = std::ranges::min_element(candidates, {}, [](const auto& candidate) {
-      return candidate.second.T_S_N.covariance.trace();
-    });
+    const auto best = std::ranges::min_element(
+        candidates, {}, [](const auto& candidate) { return candidate.second.doubt(); });
     const auto [id, place] = *best;
     candidates.erase(best);
     places[id] = place;
-    if (belief_.robots.size() < interval.settings.max_robots) {
-      add_member(interval, id, place.T_S_N, place.v_S_N);
+    const std::size_t reserved = first != RobotId{} && first != id ? 1 : 0;
+    if (belief_.robots.size() + reserved < interval.settings.max_robots) {
+      if (first == id) first = {};
+      add_member(interval, id, place);
     } else if (!has_own_edge(interval, id)) {
       // A pair's filter would know it better than a chain of estimates.
-      solution.poses.push_back(distant_pose(id, place.T_S_N, place.v_S_N, belief_.stamp));
-      solution.biases.push_back(unknown_bias(id, interval.settings.priors));
+      solution.poses.push_back(place.pose(id, belief_, interval.settings.priors));
     }
     add_candidates_from(id);
   }
 }
 
-void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const GaussianPose& T_S_N,
-                            const Eigen::Vector3d& v_S_N) {
+void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const TeamPlace& place) {
   TeamRobot& robot = belief_.robots[id];
-  robot.motion = {T_S_N.pose.p, v_S_N, T_S_N.pose.q};
+  robot.motion = {place.T_S_N.p, place.v_S_N, place.T_S_N.q};
   const double doubt = trust_.doubt(id, belief_.stamp);
-  robot.motion_index = belief_.append(FreeMotionAt::kMotion, doubt * kStartSpeed);
+  robot.motion_index = belief_.append(FreeMotionAt::kMotion, 0.0);
   auto block = belief_.P.bottomRightCorner<FreeMotionAt::kMotion, FreeMotionAt::kMotion>();
-  const Matrix6d& covariance = T_S_N.covariance;
-  block.topLeftCorner<3, 3>() = covariance.topLeftCorner<3, 3>();
-  block.topLeftCorner<3, 3>().diagonal().array() += std::pow(doubt * kStartPosition, 2);
-  block.topRightCorner<3, 3>() = covariance.topRightCorner<3, 3>();
-  block.bottomLeftCorner<3, 3>() = covariance.bottomLeftCorner<3, 3>();
-  block.bottomRightCorner<3, 3>() = covariance.bottomRightCorner<3, 3>();
-  block.bottomRightCorner<3, 3>().diagonal().array() += std::pow(doubt * kStartAttitude, 2);
-  if (const auto turn = trust_.turn_covariance(id, belief_.stamp))
-    block.bottomRightCorner<3, 3>() += *turn;
+  block = place.covariance;
+  block.diagonal().head<3>().array() += std::pow(doubt * kStartPosition, 2);
+  block.diagonal().segment<3>(3).array() +=
+      (doubt * doubt - 1.0) * std::pow(TeamPlace::kSpeedSigma, 2);
+  block.diagonal().tail<3>().array() += std::pow(doubt * kStartAttitude, 2);
+  if (const auto turn = trust_.turn_covariance(id)) block.bottomRightCorner<3, 3>() += *turn;
   robot.bias_index = belief_.append_calibration(interval.settings.priors);
-  robot.last_sighting = belief_.stamp;
+  robot.last_sighting = place.last_sighting;
   robot.since = belief_.stamp;
 }
 
 void TeamFilter::report(const TeamInterval& interval, TeamSolution& solution) const {
   for (const auto& [id, robot] : belief_.robots) {
-    const auto sigma = [&](int index) {
-      return std::sqrt(belief_.P.diagonal().segment<3>(index).mean());
-    };
-    solution.biases.push_back({id, robot.bias.gyro_radps, robot.bias.accel_mps2,
-                               robot.bias.gyro_scale, sigma(robot.bias_index),
-                               sigma(robot.bias_index + 3)});
     // On probation it is known worse than by its pair's filter, if there is one.
     if (robot.motion_index < 0 || (!robot.is_trusted && has_own_edge(interval, id))) continue;
     solution.poses.push_back(belief_.team_pose(id, *interval.member(id)));
   }
   std::ranges::sort(solution.poses, {}, &TeamPose::neighbor);
-  solution.faults = faults_of(belief_, interval.settings.priors);
+  solution.calibrations = calibrations_of(belief_, interval.settings.priors);
+  solution.faults = faults_of(belief_, solution.calibrations);
   for (const TeamFault& fault : trust_.gyro_faults(interval.from)) solution.faults.push_back(fault);
+  for (const TeamFault& fault : estimates_.faults()) solution.faults.push_back(fault);
 }
 
 }  // namespace crepes

@@ -3,7 +3,10 @@
 
 #include <vector>
 
+#include "estimator/team/estimate_check.hpp"
 #include "estimator/team/team_belief.hpp"
+#include "estimator/team/team_links.hpp"
+#include "estimator/team/team_place.hpp"
 #include "estimator/team/team_readings.hpp"
 #include "estimator/team/team_trust.hpp"
 
@@ -23,7 +26,8 @@ namespace crepes {
 /// A new robot is on probation for a second: until its measurements agree with the others, they
 /// correct nobody but itself. A camera that contradicts the others is realigned by them; if it
 /// still does, it is left out.
-/// `TeamSettings::max_robots` are estimated jointly. Robots beyond are located through them.
+/// `TeamSettings::max_robots` are estimated jointly, those that are best connected with each other.
+/// Robots beyond are located through them.
 /// Deterministic.
 class TeamFilter {
  public:
@@ -35,18 +39,23 @@ class TeamFilter {
   using Stage = TeamReadings::Stage;
 
   void remove_members(const TeamInterval& interval);
+  [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval);
+  /// Whoever joins in exchange for another one; RobotId{} if nobody does.
+  [[nodiscard]] RobotId exchange_member(const TeamInterval& interval);
   void append_cameras(const TeamInterval& interval);
   /// False if the covariance has become singular.
   [[nodiscard]] bool correct(const TeamInterval& interval);
   [[nodiscard]] bool correct(const TeamInterval& interval, Stage stage, TeamReadings readings);
   [[nodiscard]] std::vector<bool> corrected_states(Stage stage) const;
-  void add_members(const TeamInterval& interval, TeamSolution& solution);
-  void add_member(const TeamInterval& interval, RobotId id, const GaussianPose& T_S_N,
-                  const Eigen::Vector3d& v_S_N);
+  void add_members(const TeamInterval& interval, RobotId first, TeamSolution& solution);
+  void add_member(const TeamInterval& interval, RobotId id, const TeamPlace& place);
   void report(const TeamInterval& interval, TeamSolution& solution) const;
 
   TeamBelief belief_;
   TeamTrust trust_;
+  TeamLinks links_;
+  EstimateCheck estimates_;
+  std::vector<TeamResidual> residuals_;  ///< of the interval
 };
 
 }  // namespace crepes

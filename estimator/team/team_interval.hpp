@@ -19,11 +19,13 @@ struct TeamMember {
   std::vector<ImuMean> imu;  ///< of each step of the interval
 };
 
+/// A bearing and the robot that measured it.
 struct TeamBearing {
   RobotId observer{};
   Bearing bearing;
 };
 
+/// A range and the robot that measured it.
 struct TeamRange {
   RobotId observer{};
   RobotId neighbor{};

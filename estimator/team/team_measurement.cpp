@@ -17,17 +17,23 @@ void add_columns(int index, const Eigen::MatrixBase<Derived>& by_state, TeamRow&
   }
 }
 
-/// Adds the derivatives by a robot's motion, carried back to the interval's beginning, and what its
-/// IMU's noise has added since, in the mean of the axes.
+/// Adds the derivatives by a robot's motion at the instant, from which its IMU carries it on:
+///   p = p0 + t v0 - [p - p0 - t v0]x R0 theta0,  theta = R^T R0 theta0,
+/// and what its IMU's noise has added since the beginning, in the mean of the axes. What its biases
+/// add from the instant on is of second order in the time.
 void add_motion(const Eigen::Matrix<double, 2, 3>& by_p,
-                const Eigen::Matrix<double, 2, 3>& by_theta, const FreeMotionAt& at,
-                const TeamRobot& robot, TeamRow& row) {
-  Eigen::Matrix<double, 2, FreeMotionAt::kStart> by_start =
-      by_p.lazyProduct(at.by_start.topRows<3>());
-  by_start += by_theta.lazyProduct(at.by_start.middleRows<3>(6));
-  if (robot.motion_index >= 0)
-    add_columns(robot.motion_index, by_start.leftCols<FreeMotionAt::kMotion>(), row);
-  add_columns(robot.bias_index, by_start.rightCols<FreeMotionAt::kBias>(), row);
+                const Eigen::Matrix<double, 2, 3>& by_theta, const RobotTrajectory& path,
+                const FreeMotionAt& at, const TeamRobot& robot, const InstantStates& states,
+                TeamRow& row) {
+  const FreeMotionAt& start = path.nearest(states.t_s);
+  const double t_s = at.t_s - start.t_s;
+  const Eigen::Vector3d turned = at.motion.p_F - start.motion.p_F - t_s * start.motion.v_F;
+  const int index = states.motion_of(robot);
+  add_columns(index, by_p, row);
+  add_columns(index + 3, t_s * by_p, row);
+  const Eigen::Matrix<double, 2, 3> by_turn =
+      by_theta * at.motion.R().transpose() - by_p * hat(turned);
+  add_columns(index + 6, by_turn * start.motion.R(), row);
   row.variance += (at.noise.topLeftCorner<3, 3>().trace() * by_p.squaredNorm() +
                    at.noise.bottomRightCorner<3, 3>().trace() * by_theta.squaredNorm()) /
                   (3.0 * row.dimension);
@@ -35,8 +41,8 @@ void add_motion(const Eigen::Matrix<double, 2, 3>& by_p,
 
 /// Adds the derivatives by both clocks, for what moves with the neighbor.
 void add_clocks(const Eigen::Vector2d& by_neighbor, const TeamPair& pair, TeamRow& row) {
-  add_columns(pair.neighbor.clock_index(), by_neighbor, row);
-  add_columns(pair.observer.clock_index(), -by_neighbor, row);
+  add_columns(pair.states.of(pair.neighbor.clock_index()), by_neighbor, row);
+  add_columns(pair.states.of(pair.observer.clock_index()), -by_neighbor, row);
 }
 
 /// From the camera to the neighbor's LEDs, in the observer's body frame.
@@ -88,12 +94,13 @@ std::optional<SightModel> SightModel::at(const TeamPair& pair, const TeamCamera&
   const Eigen::Matrix<double, 2, 3> across = model.across_.transpose() * M;
   const Eigen::Matrix<double, 2, 3> by_d =
       across * (Eigen::Matrix3d::Identity() - direction * direction.transpose()) / distance;
-  add_motion(-by_d * line.R_B_F, by_d * hat(line.p_B_M), i, pair.observer, row);
+  add_motion(-by_d * line.R_B_F, by_d * hat(line.p_B_M), pair.observer_path, i, pair.observer,
+             pair.states, row);
   add_motion(by_d * line.R_B_F,
-             -by_d * line.R_B_F * line.R_F_N * hat(pair.neighbor_arms.p_body_led), j, pair.neighbor,
-             row);
-  add_columns(camera.index, -across * hat(direction) * so3_right_jacobian(camera.misalignment),
-              row);
+             -by_d * line.R_B_F * line.R_F_N * hat(pair.neighbor_arms.p_body_led),
+             pair.neighbor_path, j, pair.neighbor, pair.states, row);
+  add_columns(pair.states.of(camera.index),
+              -across * hat(direction) * so3_right_jacobian(camera.misalignment), row);
   add_clocks(
       by_d * line.R_B_F * pair.neighbor_path.velocity_F(t_j_s, pair.neighbor_arms.p_body_led), pair,
       row);
@@ -138,10 +145,12 @@ std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias
     both.row(0) = v;
     return both;
   };
-  add_motion(in_first_row(-u), in_first_row(u * now_i.R() * hat(q_i)), i, pair.observer, row);
-  add_motion(in_first_row(u), in_first_row(-u * now_j.R() * hat(q_j)), j, pair.neighbor, row);
+  add_motion(in_first_row(-u), in_first_row(u * now_i.R() * hat(q_i)), pair.observer_path, i,
+             pair.observer, pair.states, row);
+  add_motion(in_first_row(u), in_first_row(-u * now_j.R() * hat(q_j)), pair.neighbor_path, j,
+             pair.neighbor, pair.states, row);
   for (const int index : {pair.observer.delay_index(), pair.neighbor.delay_index(), bias.index})
-    add_columns(index, Eigen::Vector2d(1.0, 0.0), row);
+    add_columns(pair.states.of(index), Eigen::Vector2d(1.0, 0.0), row);
   add_clocks(Eigen::Vector2d(u.dot(pair.neighbor_path.velocity_F(t_j_s, q_j)), 0.0), pair, row);
 
   const Eigen::Matrix<double, 3, 2> across = tangent_basis(d / distance);

@@ -1,4 +1,4 @@
-/// Bearings and ranges between two robots of the team, linearized where their interval begins.
+/// Bearings and ranges between two robots of the team, linearized at one instant of their interval.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,23 +6,25 @@
 #include <optional>
 
 #include "estimator/team/robot_trajectory.hpp"
+#include "estimator/team/team_instant.hpp"
 #include "estimator/team/team_interval.hpp"
 #include "estimator/team/team_state.hpp"
 
 namespace crepes {
 
-/// A measurement of one or two dimensions, z = h(x) + residual, and the states that it depends on.
+/// A measurement of one or two dimensions, z = h(x) + residual, and the states of the instant that
+/// it depends on.
 struct TeamRow {
-  static constexpr int kMaxColumns = 2 * FreeMotionAt::kStart + 5;
+  static constexpr int kMaxColumns = 2 * FreeMotionAt::kMotion + 5;  ///< clocks and three constants
 
   int dimension = 0;
   int size = 0;  ///< of the columns that are used
   Eigen::Vector2d residual = Eigen::Vector2d::Zero();
   Eigen::Matrix<double, 2, kMaxColumns> H;  ///< the first `dimension` rows are used
-  std::array<int, kMaxColumns> columns{};   ///< of the covariance
+  std::array<int, kMaxColumns> columns{};   ///< of the instant's covariance
   double variance = 0.0;                    ///< in each dimension
 
-  /// The innovation's covariance H P H^T + R.
+  /// The innovation's covariance H P H^T + R, with the instant's P.
   [[nodiscard]] Eigen::Matrix2d covariance(const Eigen::MatrixXd& P) const;
 };
 
@@ -34,6 +36,7 @@ struct TeamPair {
   const TeamMember& neighbor_arms;
   const RobotTrajectory& observer_path;
   const RobotTrajectory& neighbor_path;
+  const InstantStates& states;
 
   /// The neighbor's clock when the observer's shows `t_s`.
   [[nodiscard]] double neighbor_time_s(double t_s) const {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "estimator/core/imu_history.hpp"
-#include "estimator/core/measurements.hpp"
+#include "estimator/core/team_solution.hpp"
 #include "estimator/relative/propagation.hpp"
 
 namespace crepes {
@@ -15,7 +15,8 @@ struct TeamImus {
   ImuBiasEstimate bias_N;
 };
 
-/// The pose at `to`, with the errors that the IMUs' noise and the remains of their biases add.
+/// The pose at `to`, with the errors that the IMUs' noise and the remains of their biases add. The
+/// biases' errors have become errors of the motion already, so that their correlation counts.
 [[nodiscard]] TeamPose predicted(const TeamPose& pose, const TeamImus& imus, Timestamp from,
                                  Timestamp to, const ProcessNoise& noise);
 

@@ -1,19 +1,30 @@
 #include "estimator/team/team_readings.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <tuple>
 #include <utility>
+
+#include "estimator/relative/range_update.hpp"
 
 namespace crepes {
 namespace {
 
-// Ranges about a robot that nobody sees would make its direction appear known, little by little.
-constexpr Duration kDark = std::chrono::seconds{1};
+constexpr Duration kDark = std::chrono::seconds{1};  // a robot that nobody saw for so long
+// What hides a robot from all cameras may delay its ranges, too, for seconds: an error of 0.15 m
+// that lasts 2 s weighs as much as independent ones of this size in each interval.
+constexpr double kDarkSigma = 1.0;  // m
+// Ranges locate a robot in the dark if those who measure them are in different directions from it:
+// the least eigenvalue of the sum of u u^T.
+constexpr std::size_t kLeastBeacons = 3;
+constexpr double kLeastSpread = 0.05;
+constexpr double kMostDoubt = 0.7;  // m; sigma of its place; beyond, a range is no plane
 
 bool is_inside(const TeamInterval& interval, Timestamp stamp) {
   return stamp > interval.from && stamp <= interval.to;
@@ -53,18 +64,70 @@ std::vector<Sight> sights_of(const TeamInterval& interval, const TeamBelief& bel
   return all;
 }
 
+/// Which robots nobody sees, and which of them ranges locate.
+class Darkness {
+ public:
+  Darkness(const TeamInterval& interval, const TeamBelief& belief)
+      : interval_(interval), belief_(belief) {
+    std::map<RobotId, std::set<RobotId>> beacons;
+    for (const TeamRange& reading : interval.ranges) {
+      if (!is_inside(interval, reading.stamp)) continue;
+      const auto dark = dark_of(reading);
+      if (!dark) continue;
+      const RobotId beacon = *dark == reading.observer ? reading.neighbor : reading.observer;
+      if (belief.robots.at(beacon).is_trusted) beacons[*dark].insert(beacon);
+    }
+    for (const auto& [dark, seen] : beacons)
+      if (is_located(dark, seen)) located_.insert(dark);
+  }
+
+  /// Where everybody is seen, or the one that is not is located by ranges.
+  [[nodiscard]] bool allows(const TeamRange& reading) const {
+    if (!is_dark(reading.observer) && !is_dark(reading.neighbor)) return true;
+    const auto dark = dark_of(reading);
+    return dark && located_.contains(*dark);
+  }
+  /// If one of the two is in the dark, and the other is not.
+  [[nodiscard]] std::optional<RobotId> dark_of(const TeamRange& reading) const {
+    if (!belief_.robots.contains(reading.observer) || !belief_.robots.contains(reading.neighbor) ||
+        is_dark(reading.observer) == is_dark(reading.neighbor))
+      return std::nullopt;
+    return is_dark(reading.observer) ? reading.observer : reading.neighbor;
+  }
+
+ private:
+  [[nodiscard]] bool is_dark(RobotId id) const {
+    return interval_.to - belief_.robots.at(id).last_sighting > kDark;
+  }
+  [[nodiscard]] bool is_located(RobotId dark, const std::set<RobotId>& beacons) const {
+    if (beacons.size() < kLeastBeacons) return false;
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const RobotId beacon : beacons) {
+      const Eigen::Vector3d d =
+          belief_.robots.at(dark).motion.p_F - belief_.robots.at(beacon).motion.p_F;
+      spread += d * d.transpose() / d.squaredNorm();
+      if (!(belief_.position_covariance(dark, beacon).trace() < kMostDoubt * kMostDoubt))
+        return false;
+    }
+    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()(0) >= kLeastSpread;
+  }
+
+  const TeamInterval& interval_;
+  const TeamBelief& belief_;
+  std::set<RobotId> located_;
+};
+
 std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief& belief,
                                  TeamReadings::Stage stage) {
-  const auto is_dark = [&](RobotId id) {
-    return interval.to - belief.robots.at(id).last_sighting > kDark;
-  };
+  const Darkness darkness(interval, belief);
   std::map<std::pair<RobotId, RobotId>, Ranging> rangings;
   for (const TeamRange& reading : interval.ranges) {
     const auto [observer, neighbor] = std::pair(reading.observer, reading.neighbor);
     if (!is_inside(interval, reading.stamp) || !takes_part(belief, observer, neighbor, stage) ||
-        is_dark(observer) || is_dark(neighbor))
+        !darkness.allows(reading))
       continue;
-    rangings.try_emplace({observer, neighbor}, Ranging{observer, neighbor})
+    rangings
+        .try_emplace({observer, neighbor}, Ranging{observer, neighbor, darkness.dark_of(reading)})
         .first->second.ranges.push_back(&reading);
   }
   std::vector<Ranging> all;
@@ -77,46 +140,102 @@ std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief&
 struct Scene {
   const TeamInterval& interval;
   const TeamTrajectories& paths;
+  const TeamInstant& instant;
   const TeamBelief& belief;
 
   [[nodiscard]] TeamPair pair(RobotId observer, RobotId neighbor) const {
-    return {belief.robots.at(observer), belief.robots.at(neighbor), *interval.member(observer),
-            *interval.member(neighbor), paths.at(observer),         paths.at(neighbor)};
+    return {belief.robots.at(observer),
+            belief.robots.at(neighbor),
+            *interval.member(observer),
+            *interval.member(neighbor),
+            paths.at(observer),
+            paths.at(neighbor),
+            instant.states()};
   }
   [[nodiscard]] double time_s(Timestamp stamp) const { return to_seconds(stamp - interval.from); }
 };
 
-void gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
+/// Mean residual of readings, of those that were fused if any was.
+class MeanResidual {
+ public:
+  void add(const Eigen::Vector2d& residual, bool fits) {
+    (fits ? fused_ : refused_) += residual;
+    ++(fits ? residual_.fused : residual_.refused);
+  }
+  [[nodiscard]] int count() const {
+    return residual_.fused > 0 ? residual_.fused : residual_.refused;
+  }
+  /// `S` is the covariance of the mean of `count`.
+  [[nodiscard]] TeamResidual of(TeamResidual what, const Eigen::Matrix2d& S, int dimension) const {
+    what.fused = residual_.fused;
+    what.refused = residual_.refused;
+    if (count() == 0) return what;
+    const Eigen::Vector2d mean = (residual_.fused > 0 ? fused_ : refused_) / count();
+    what.dimension = dimension;
+    what.nis = dimension == 2 ? mean.dot(S.llt().solve(mean)) : mean.x() * mean.x() / S(0, 0);
+    for (int i = 0; i < dimension; ++i) {
+      what.residual.at(static_cast<std::size_t>(i)) = mean(i);
+      what.sigma.at(static_cast<std::size_t>(i)) = std::sqrt(S(i, i));
+    }
+    return what;
+  }
+
+ private:
+  Eigen::Vector2d fused_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d refused_ = Eigen::Vector2d::Zero();
+  TeamResidual residual_;
+};
+
+TeamResidual gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
+  TeamResidual found{.observer = sight.observer,
+                     .neighbor = sight.neighbor,
+                     .kind = TeamResidual::Kind::kBearing,
+                     .camera = static_cast<int>(sight.camera)};
   const TeamPair pair = scene.pair(sight.observer, sight.neighbor);
   const auto model = SightModel::at(pair, camera, sight.time_s(scene.interval), sight.sigma_rad());
   if (!model) {
     sight.bearings.clear();
-    return;
+    return found;
   }
-  const Eigen::LLT<Eigen::Matrix2d> S(model->row().covariance(scene.belief.P));
+  const Eigen::Matrix2d S = model->row().covariance(scene.instant.covariance());
+  const Eigen::LLT<Eigen::Matrix2d> factors(S);
   Agreement& agreement = camera.agreement[sight.neighbor];
+  MeanResidual mean;
   std::erase_if(sight.bearings, [&](const Bearing* z) {
     const auto residual = model->residual(pair, camera, z->u_B, scene.time_s(z->stamp));
     const bool fits =
-        residual && residual->dot(S.solve(*residual)) <= scene.interval.settings.bearing_gate;
+        residual && residual->dot(factors.solve(*residual)) <= scene.interval.settings.bearing_gate;
     agreement.add(fits);
+    if (residual) mean.add(*residual, fits);
     return !fits;
   });
+  return mean.of(found, S, 2);
 }
 
-void gate(const Scene& scene, TeamRangeBias& bias, Ranging& ranging) {
+TeamResidual gate(const Scene& scene, TeamRangeBias& bias, Ranging& ranging) {
   const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
   const Eigen::Matrix3d covariance =
       scene.belief.position_covariance(ranging.observer, ranging.neighbor);
+  MeanResidual mean;
+  double noise = 0.0;
+  double variance = 0.0;
   std::erase_if(ranging.ranges, [&](const TeamRange* z) {
     const auto row = range_row(pair, bias, z->reading, scene.time_s(z->stamp), covariance);
     if (!row) return true;
     const double residual = row->residual.x();
-    const double variance = row->covariance(scene.belief.P)(0, 0);
+    variance = row->covariance(scene.instant.covariance())(0, 0);
+    noise = z->reading.sigma_m * z->reading.sigma_m;
     const bool fits = residual * residual <= scene.interval.settings.range_gate * variance;
-    bias.add(ranging.observer, fits, residual);
+    if (!ranging.dark) bias.add(ranging.observer, fits, residual);
+    mean.add({residual, 0.0}, fits);
     return !fits;
   });
+  // The readings' noise is independent, and the mean has less.
+  const double of_mean = variance - noise + noise / std::max(1, mean.count());
+  return mean.of({.observer = ranging.observer,
+                  .neighbor = ranging.neighbor,
+                  .kind = TeamResidual::Kind::kRange},
+                 of_mean * Eigen::Matrix2d::Identity(), 1);
 }
 
 std::optional<TeamRow> mean_of(const Scene& scene, const Sight& sight) {
@@ -138,15 +257,14 @@ std::optional<TeamRow> mean_of(const Scene& scene, const Sight& sight) {
   return row;
 }
 
-/// The mean of what a pair measured may be false, although its gate accepts it: then nothing in it
-/// is information. Mean and variance become those of the mixture (probabilistic data association,
-/// Bar-Shalom and Tse 1975). `S` is the innovation's variance. False if it is more likely false.
+/// The mean range of a pair may be false although the gate accepts it. Mean and variance become
+/// those of the mixture of both cases (probabilistic data association, Bar-Shalom and Tse 1975).
+/// `S` is the innovation's variance. Returns false if the range is more likely false than true.
 bool associate(double S, TeamRow& row) {
-  constexpr double kFalseRanges = 0.05;  // 1/m, as for the pairs' filters
   const double residual = row.residual.x();
   const double nis = residual * residual / S;
   const double density = std::exp(-0.5 * nis) / std::sqrt(2.0 * std::numbers::pi * S);
-  const double is_true = density / (density + kFalseRanges);
+  const double is_true = density / (density + kFalseRangeDensity);
   const double weight = is_true * (1.0 - (1.0 - is_true) * nis);
   if (is_true < 0.5 || weight <= 0.0) return false;
   row.variance += S / weight - S;
@@ -159,12 +277,11 @@ std::optional<TeamRow> mean_of(const Scene& scene, const Ranging& ranging) {
   const TeamRangeBias& bias = scene.belief.ranges.at(ordered(ranging.observer, ranging.neighbor));
   const Eigen::Matrix3d covariance =
       scene.belief.position_covariance(ranging.observer, ranging.neighbor);
-  const double spread = std::sqrt(static_cast<double>(ranging.ranges.size()));
   std::optional<TeamRow> mean;
   double sum_m = 0.0;
   double count = 0.0;
   for (const TeamRange* z : ranging.ranges) {
-    const RangeReading weighed{z->reading.range_m, z->reading.sigma_m / spread};
+    const RangeReading weighed{z->reading.range_m, ranging.sigma_m()};
     const auto row = range_row(pair, bias, weighed, scene.time_s(z->stamp), covariance);
     if (!row) continue;
     mean = *row;
@@ -173,7 +290,7 @@ std::optional<TeamRow> mean_of(const Scene& scene, const Ranging& ranging) {
   }
   if (!mean) return std::nullopt;
   mean->residual.x() = sum_m / count;
-  if (!associate(mean->covariance(scene.belief.P)(0, 0), *mean)) return std::nullopt;
+  if (!associate(mean->covariance(scene.instant.covariance())(0, 0), *mean)) return std::nullopt;
   return mean;
 }
 
@@ -191,6 +308,27 @@ double Sight::sigma_rad() const {
   return std::sqrt(variance / static_cast<double>(bearings.size()));
 }
 
+double TeamReadings::time_s(const TeamInterval& interval) const {
+  double sum_s = 0.0;
+  std::size_t count = 0;
+  for (const Sight& sight : sights) {
+    for (const Bearing* z : sight.bearings) sum_s += to_seconds(z->stamp - interval.from);
+    count += sight.bearings.size();
+  }
+  for (const Ranging& ranging : rangings) {
+    for (const TeamRange* z : ranging.ranges) sum_s += to_seconds(z->stamp - interval.from);
+    count += ranging.ranges.size();
+  }
+  return sum_s / static_cast<double>(std::max<std::size_t>(1, count));
+}
+
+double Ranging::sigma_m() const {
+  if (dark) return kDarkSigma;
+  double variance = 0.0;
+  for (const TeamRange* z : ranges) variance += z->reading.sigma_m * z->reading.sigma_m;
+  return std::sqrt(variance) / static_cast<double>(ranges.size());
+}
+
 TeamReadings TeamReadings::of(const TeamInterval& interval, const TeamBelief& belief, Stage stage) {
   const auto accepts = [&](RobotId observer, RobotId neighbor, const TeamCamera& camera) {
     return !camera.is_refused && takes_part(belief, observer, neighbor, stage);
@@ -202,11 +340,11 @@ std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& be
   return sights_of(interval, belief, [](RobotId, RobotId, const TeamCamera&) { return true; });
 }
 
-void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelief& belief,
-          TeamReadings& readings) {
-  const Scene scene{interval, paths, belief};
+void gate(const TeamInterval& interval, const TeamTrajectories& paths, const TeamInstant& instant,
+          TeamBelief& belief, TeamReadings& readings, std::vector<TeamResidual>& residuals) {
+  const Scene scene{interval, paths, instant, belief};
   for (Sight& sight : readings.sights) {
-    gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight);
+    residuals.push_back(gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight));
     for (const Bearing* z : sight.bearings) {
       for (const RobotId robot : {sight.observer, sight.neighbor}) {
         Timestamp& last = belief.robots.at(robot).last_sighting;
@@ -214,15 +352,20 @@ void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelie
       }
     }
   }
-  for (Ranging& ranging : readings.rangings)
-    gate(scene, belief.ranges.at(ordered(ranging.observer, ranging.neighbor)), ranging);
+  for (Ranging& ranging : readings.rangings) {
+    residuals.push_back(
+        gate(scene, belief.ranges.at(ordered(ranging.observer, ranging.neighbor)), ranging));
+    if (ranging.dark && !ranging.ranges.empty())
+      belief.robots.at(*ranging.dark).last_fix = interval.to;
+  }
   std::erase_if(readings.sights, [](const Sight& s) { return s.bearings.empty(); });
   std::erase_if(readings.rangings, [](const Ranging& r) { return r.ranges.empty(); });
 }
 
 std::vector<TeamRow> linearized(const TeamInterval& interval, const TeamTrajectories& paths,
-                                const TeamBelief& belief, const TeamReadings& readings) {
-  const Scene scene{interval, paths, belief};
+                                const TeamInstant& instant, const TeamBelief& belief,
+                                const TeamReadings& readings) {
+  const Scene scene{interval, paths, instant, belief};
   std::vector<TeamRow> rows;
   rows.reserve(readings.sights.size() + readings.rangings.size());
   const auto add = [&](const std::optional<TeamRow>& row) {

@@ -1,9 +1,11 @@
 /// The bearings and ranges of an interval, collected by camera and pair.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "estimator/team/team_belief.hpp"
+#include "estimator/team/team_instant.hpp"
 #include "estimator/team/team_measurement.hpp"
 
 namespace crepes {
@@ -24,7 +26,11 @@ struct Sight {
 struct Ranging {
   RobotId observer{};
   RobotId neighbor{};
+  std::optional<RobotId> dark{};  ///< the one of them that nobody sees
   std::vector<const TeamRange*> ranges{};
+
+  /// Of their mean.
+  [[nodiscard]] double sigma_m() const;
 };
 
 /// Refers to an interval, which must outlive it.
@@ -36,23 +42,26 @@ struct TeamReadings {
   std::vector<Sight> sights;
   std::vector<Ranging> rangings;
 
+  /// The readings of an interval that this stage accepts.
   [[nodiscard]] static TeamReadings of(const TeamInterval& interval, const TeamBelief& belief,
                                        Stage stage);
   [[nodiscard]] bool empty() const { return sights.empty() && rangings.empty(); }
+  /// The mean of their times, after the beginning of the interval.
+  [[nodiscard]] double time_s(const TeamInterval& interval) const;
 };
 
 /// Between any two robots of the belief, those of refused cameras too.
 [[nodiscard]] std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& belief);
 
 /// Drops readings that are too unlikely. Counts how each camera and pair agrees, and when a robot
-/// was last seen.
-void gate(const TeamInterval& interval, const TeamTrajectories& paths, TeamBelief& belief,
-          TeamReadings& readings);
+/// was last seen. Appends what was found to `residuals`.
+void gate(const TeamInterval& interval, const TeamTrajectories& paths, const TeamInstant& instant,
+          TeamBelief& belief, TeamReadings& readings, std::vector<TeamResidual>& residuals);
 
 /// One row a sight and one a pair's ranges: the mean of what was not gated.
 [[nodiscard]] std::vector<TeamRow> linearized(const TeamInterval& interval,
                                               const TeamTrajectories& paths,
-                                              const TeamBelief& belief,
+                                              const TeamInstant& instant, const TeamBelief& belief,
                                               const TeamReadings& readings);
 
 }  // namespace crepes

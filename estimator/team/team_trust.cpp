@@ -3,15 +3,17 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimator/core/constants.hpp"
-#include "estimator/team/gyro_check.hpp"
+#include "estimator/core/quantile.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr double kMaxPosition = 3.0;                     // m; a robot known worse is dropped
-constexpr Duration kRefusal = std::chrono::seconds{20};  // of a camera; then it is tried again
+constexpr double kMaxPosition = 3.0;                         // m; a robot known worse is dropped
+constexpr Duration kVerdictLife = std::chrono::seconds{20};  // then a camera is tried again
+constexpr int kRefusedAt = 4;  // convictions: realigned, as calibrated, realigned, refused
 constexpr Duration kProbation = std::chrono::seconds{1};
 constexpr Duration kLateProbation = std::chrono::seconds{3};
 constexpr Duration kLossMemory = std::chrono::seconds{10};
@@ -46,13 +48,24 @@ struct MisalignmentTest {
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< its significant components
 };
 
-/// The estimate is drawn to zero by its prior, so a turn shows long before the estimate is large:
-/// the difference of two estimates, the later of which knows more, has the difference of their
-/// covariances (Hausman 1978). In the axes of that difference, what was measured alone has the mean
-/// m P0 / (P0 - P) and the variance P P0 / (P0 - P).
+/// A camera that may be turned has no prior that draws its estimate to zero.
+MisalignmentTest tested_without_prior(const TeamBelief& belief, const TeamCamera& camera,
+                                      const Priors& priors) {
+  const Eigen::Matrix3d covariance =
+      belief.P.block<3, 3>(camera.index, camera.index) +
+      std::pow(believed_misalignment(priors), 2) * Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d& m = camera.misalignment;
+  return {.chi2 = m.dot(covariance.llt().solve(m)), .turn = m};
+}
+
+/// The prior draws the estimate to zero, so a turn is significant long before the estimate is
+/// large. The difference of two estimates, the second of which uses more data, has the difference
+/// of their covariances (Hausman 1978). In the axes of that difference, the data alone give the
+/// mean m P0 / (P0 - P) and the variance P P0 / (P0 - P).
 MisalignmentTest tested(const TeamBelief& belief, const TeamCamera& camera, const Priors& priors) {
-  constexpr double kObserved =
-      1e-4;  // of the prior's variance; an axis that taught less is unknown
+  // A share of the prior's variance. An axis that taught less is unknown.
+  constexpr double kObserved = 1e-4;
+  if (camera.is_free) return tested_without_prior(belief, camera, priors);
   const double prior = std::max(std::pow(priors.misalignment_rad, 2), TeamBelief::kLeastVariance);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> learned(
       prior * Eigen::Matrix3d::Identity() - belief.P.block<3, 3>(camera.index, camera.index));
@@ -123,17 +136,20 @@ bool is_contradicted(const Robots& robots, const Witnesses& all, RobotId id) {
   return of_robot.gated > of_robot.fused || (of_robot.gated == of_robot.fused && came_last);
 }
 
-void add_camera_faults(const TeamBelief& belief, RobotId id, const Priors& priors,
-                       std::vector<TeamFault>& faults) {
-  for (const TeamCamera& camera : belief.robots.at(id).cameras) {
-    const double angle = camera.misalignment.norm();
-    const double sigma = std::sqrt(belief.P.diagonal().segment<3>(camera.index).maxCoeff());
-    if (camera.is_refused) {
-      faults.push_back({id, TeamFault::Kind::kCameraRefused, angle});
-    } else if (angle > kWrongPriors * believed_misalignment(priors) &&
-               angle > kWrongSigmas * sigma) {
-      faults.push_back({id, TeamFault::Kind::kCameraTurned, angle});
-    }
+/// Significantly, and beyond what a calibration leaves.
+bool is_turned(const CameraMisalignment& camera, const Priors& priors) {
+  const double angle = camera.rotation.norm();
+  const double sigma = std::sqrt(camera.covariance.diagonal().maxCoeff());
+  return angle > kWrongPriors * believed_misalignment(priors) && angle > kWrongSigmas * sigma;
+}
+
+void add_camera_faults(const RobotCalibration& robot, std::vector<TeamFault>& faults) {
+  using State = CameraMisalignment::State;
+  for (const CameraMisalignment& camera : robot.cameras) {
+    if (camera.state == State::kCalibrated) continue;
+    const auto kind = camera.state == State::kRefused ? TeamFault::Kind::kCameraRefused
+                                                      : TeamFault::Kind::kCameraTurned;
+    faults.push_back({robot.robot, kind, camera.rotation.norm(), camera.angle_sigma_rad()});
   }
 }
 
@@ -154,7 +170,8 @@ void add_range_fault(const TeamBelief& belief, RobotId id, std::vector<TeamFault
     faults.push_back({id, TeamFault::Kind::kRanges, sum_m / contradicted});
 }
 
-/// Trusted robots measure other distances to it than it does to them, and its place fits its own.
+/// Whether the robot's place agrees with the ranges that it measured, but not with those that
+/// trusted robots measured to it.
 bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {
   return std::ranges::any_of(belief.ranges, [&](const auto& entry) {
     const auto& [pair, range] = entry;
@@ -168,12 +185,6 @@ bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {
   });
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// Clocks that differ from most others, this robot's among them.
 void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) {
   if (belief.robots.size() < 3) return;
@@ -183,39 +194,42 @@ void add_clock_faults(const TeamBelief& belief, std::vector<TeamFault>& faults) 
     ahead_s.push_back(robot.clock_s);
     variances.push_back(belief.P(robot.clock_index(), robot.clock_index()));
   }
-  const double most_s = median(ahead_s);
-  const double variance = median(variances);
+  std::vector<double> sorted_s = ahead_s;
+  const double most_s = quantile(sorted_s, 0.5);
+  std::vector<double> sorted_variances = variances;
+  const double variance = quantile(sorted_variances, 0.5);
   for (std::size_t i = 0; const auto& [id, robot] : belief.robots) {
     const double size_s = robot.clock_s - most_s;
     const double sigma_s = std::sqrt(variances[i++] + variance);
     if (std::abs(size_s) > std::max(kWrongClock, kWrongSigmas * sigma_s))
-      faults.push_back({id, TeamFault::Kind::kClock, size_s});
+      faults.push_back({id, TeamFault::Kind::kClock, size_s, sigma_s});
   }
 }
 
 }  // namespace
 
-std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval,
-                                            const TeamBelief& belief) {
+std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const TeamBelief& belief,
+                                            const std::map<RobotId, GyroCheck>& checks) {
   const double kept = std::exp(-to_seconds(interval.to - interval.from) / kGyroMemory);
   for (auto& [id, doubt] : gyro_doubts_) doubt.chi2 *= kept;
   std::vector<RobotId> robots;
-  for (const auto& [id, found] :
-       gyro_contradictions(interval, belief.trajectories(interval), belief)) {
+  for (const auto& [id, check] : checks) {
+    if (!check.contradiction) continue;
     GyroDoubt& doubt = gyro_doubts_[id];
-    doubt.chi2 += found.chi2;
+    doubt.chi2 += check.contradiction->chi2;
     if (doubt.chi2 <= kFalseGyro) continue;
     doubt.found = belief.stamp;
-    doubt.rate_radps = found.rate_radps;
+    doubt.rate_radps = check.contradiction->rate_radps;
     robots.push_back(id);
-    // What its camera was found guilty of may have been the gyroscope's fault.
+    // The gyroscope may have caused what its camera was blamed for.
     if (const auto verdict = verdicts_.find(id); verdict != verdicts_.end())
       verdict->second.is_withdrawn = true;
   }
   return robots;
 }
 
-/// Of late: what it has strained may still look as if its camera were turned.
+/// Whether its gyroscope was recently false. The states that it has disturbed may still look as if
+/// its camera were turned.
 bool TeamTrust::is_strained(RobotId robot, Timestamp now) const {
   const auto doubt = gyro_doubts_.find(robot);
   return doubt != gyro_doubts_.end() && doubt->second.found &&
@@ -230,9 +244,16 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
   const auto is_away = [&](const auto& entry) { return interval.member(entry.first) == nullptr; };
   std::erase_if(verdicts_, is_away);
   std::erase_if(gyro_doubts_, is_away);
+  std::erase_if(losses_, is_away);
+  std::erase_if(misled_by_, is_away);
+  review_verdicts(interval, belief);
   std::vector<RobotId> lost;
   for (const auto& [id, robot] : belief.robots) {
-    if (id == belief.self) continue;
+    // Its camera was left out for long enough.
+    const bool is_tried_again =
+        !verdicts_.contains(id) && std::ranges::any_of(robot.cameras, &TeamCamera::is_refused);
+    if (is_tried_again) lost.push_back(id);
+    if (is_tried_again || id == belief.self) continue;
     const double variance = belief.P.diagonal().segment<3>(robot.motion_index).sum();
     const bool is_wrong = is_contradicted(belief.robots, all, id);
     if (is_wrong) losses_[id] = {belief.stamp, recent_losses(id, belief.stamp) + 1};
@@ -244,13 +265,16 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
 
 std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamBelief& belief) {
   std::vector<RobotId> turned;
+  // All that is known is relative to this robot.
+  if (is_strained(belief.self, belief.stamp)) return turned;
   for (const auto& [id, robot] : belief.robots) {
     if (is_strained(id, belief.stamp)) continue;
-    const bool was_realigned = is_realigned(id, belief.stamp);
     for (const TeamCamera& camera : robot.cameras) {
       const bool contradicts = is_turned(belief.robots, id, camera);
+      // What a camera that may be turned has learned of late may be what strained the team.
+      const bool is_settling = is_realigned(id) || (camera.is_free && verdicts_.contains(id));
       const MisalignmentTest test =
-          was_realigned ? MisalignmentTest{} : tested(belief, camera, interval.settings.priors);
+          is_settling ? MisalignmentTest{} : tested(belief, camera, interval.settings.priors);
       if (!contradicts && test.chi2 <= kTurnedChi2) continue;
       convict(id, belief.stamp, turned_covariance(test.turn));
       turned.push_back(id);
@@ -260,27 +284,43 @@ std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamB
   return turned;
 }
 
-/// Whoever was found turned before and once, was found so while this one strained the team.
+/// A verdict lasts for some time after the camera was last found turned. A robot that was convicted
+/// wrongly, or was repaired, then starts like any other.
+void TeamTrust::review_verdicts(const TeamInterval& interval, const TeamBelief& belief) {
+  for (auto& [id, verdict] : verdicts_) {
+    if (verdict.is_refused || !belief.robots.contains(id)) continue;
+    for (const CameraMisalignment& camera : belief.calibration(id).cameras)
+      if (is_turned(camera, interval.settings.priors)) verdict.shown = belief.stamp;
+  }
+  std::erase_if(verdicts_, [&](const auto& entry) {
+    return belief.stamp - entry.second.shown >= kVerdictLife;
+  });
+}
+
+/// A realigned camera that contradicts the others again may be as calibrated again: repaired, or
+/// its robot has ceased to lie. So its verdict is withdrawn before it is refused. Also withdraws
+/// the verdict of robots that were convicted once before: this robot had disturbed the states on
+/// which they were judged.
 void TeamTrust::convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance) {
   Verdict& verdict = verdicts_[robot];
-  verdict.is_refused = is_realigned(robot, now);
-  verdict.is_withdrawn = false;
-  verdict.since = now;
-  verdict.covariance = covariance;
+  const bool was_realigned = verdict.count > 0 && !verdict.is_withdrawn;
   ++verdict.count;
+  verdict.is_refused = was_realigned && verdict.count >= kRefusedAt;
+  verdict.is_withdrawn = was_realigned && !verdict.is_refused;
+  verdict.shown = now;
+  verdict.covariance = covariance;
   for (auto& [id, other] : verdicts_)
     if (id != robot && other.count == 1) other.is_withdrawn = true;
 }
 
-std::optional<Eigen::Matrix3d> TeamTrust::turn_covariance(RobotId robot, Timestamp now) const {
-  if (!is_realigned(robot, now)) return std::nullopt;
+std::optional<Eigen::Matrix3d> TeamTrust::turn_covariance(RobotId robot) const {
+  if (!is_realigned(robot)) return std::nullopt;
   return verdicts_.at(robot).covariance;
 }
 
-bool TeamTrust::is_realigned(RobotId robot, Timestamp now) const {
+bool TeamTrust::is_realigned(RobotId robot) const {
   const auto found = verdicts_.find(robot);
-  return found != verdicts_.end() && found->second.count > 0 && !found->second.is_withdrawn &&
-         (!found->second.is_refused || now - found->second.since < kRefusal);
+  return found != verdicts_.end() && !found->second.is_withdrawn;
 }
 
 double TeamTrust::doubt(RobotId robot, Timestamp now) const {
@@ -355,11 +395,27 @@ std::vector<TeamFault> TeamTrust::gyro_faults(Timestamp now) const {
   return faults;
 }
 
-std::vector<TeamFault> faults_of(const TeamBelief& belief, const Priors& priors) {
-  std::vector<TeamFault> faults;
+std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief, const Priors& priors) {
+  std::vector<RobotCalibration> calibrations;
   for (const auto& [id, robot] : belief.robots) {
-    add_camera_faults(belief, id, priors, faults);
-    add_range_fault(belief, id, faults);
+    RobotCalibration one = belief.calibration(id);
+    for (std::size_t i = 0; i < one.cameras.size(); ++i) {
+      using State = CameraMisalignment::State;
+      CameraMisalignment& camera = one.cameras[i];
+      if (is_turned(camera, priors)) camera.state = State::kTurned;
+      if (robot.cameras[i].is_refused) camera.state = State::kRefused;
+    }
+    calibrations.push_back(std::move(one));
+  }
+  return calibrations;
+}
+
+std::vector<TeamFault> faults_of(const TeamBelief& belief,
+                                 const std::vector<RobotCalibration>& calibrations) {
+  std::vector<TeamFault> faults;
+  for (const RobotCalibration& robot : calibrations) {
+    add_camera_faults(robot, faults);
+    add_range_fault(belief, robot.robot, faults);
   }
   add_clock_faults(belief, faults);
   return faults;

@@ -1,4 +1,4 @@
-/// Whose measurements contradict the others'.
+/// Finds robots whose measurements contradict the others'.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/team/gyro_check.hpp"
 #include "estimator/team/team_belief.hpp"
 
 namespace crepes {
@@ -13,35 +14,37 @@ namespace crepes {
 /// Remembers which robots were contradicted, and whose cameras are turned.
 class TeamTrust {
  public:
-  /// Robots that must leave the belief: without IMU, known too badly, or contradicted by most
-  /// cameras that see them. Where as many agree, the robot that came last is in the wrong.
+  /// Robots that must be removed from the belief: they have no IMU, are too uncertain, or are
+  /// contradicted by most cameras that see them. In a tie, the robot that came last is removed.
+  /// Also robots whose camera was refused for so long that it is tried again.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
-  /// Robots whose gyroscope contradicts what their cameras see over the interval. All in `belief`
-  /// have an IMU over it.
+  /// Robots whose gyroscope has contradicted for some intervals what their cameras see.
   [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval,
-                                                 const TeamBelief& belief);
+                                                 const TeamBelief& belief,
+                                                 const std::map<RobotId, GyroCheck>& checks);
 
-  /// Robots with a camera that is turned, newly. Such a robot has a wrong attitude too. It must
-  /// start anew with a camera that may be turned, so that the others' measurements determine it. If
-  /// that camera contradicts them again, it is refused.
+  /// Robots of which a camera was newly found turned. Their attitude is wrong too. They must be
+  /// restarted with an uncertain misalignment, so that the others' measurements determine it. If
+  /// the camera contradicts the others again, it is refused.
   [[nodiscard]] std::vector<RobotId> turned(const TeamInterval& interval, const TeamBelief& belief);
 
-  /// At least half of the pairs' ranges are refused, and one robot has a part in all others, newly:
-  /// trusted too early, it has set a wrong scale. All must start anew, and it is trusted last.
+  /// Whether a robot that was trusted too early was newly found to have set a wrong scale: the
+  /// ranges of at least half of the pairs are refused, and the robot is part of every other pair.
+  /// All robots must be restarted, and this one is trusted last.
   [[nodiscard]] bool is_misled(const TeamBelief& belief);
   /// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.
   void end_probations(TeamBelief& belief) const;
 
-  /// Robots whose gyroscope was false within the last second.
+  /// Robots whose gyroscope was found false within the last second.
   [[nodiscard]] std::vector<TeamFault> gyro_faults(Timestamp now) const;
 
-  /// How uncertain the misalignment of its cameras is, and likewise its attitude, in its body's
-  /// axes [rad^2]. None if its cameras are as they were calibrated.
-  [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot, Timestamp now) const;
-  /// A realigned robot's cameras contradicted the others after that, too.
+  /// Covariance of the misalignment of its cameras, which is also that of its attitude, in body
+  /// axes [rad^2]. Empty if its cameras are as calibrated.
+  [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot) const;
+  /// Whether a robot's cameras contradicted the others again after they were realigned.
   [[nodiscard]] bool is_refused(RobotId robot) const { return verdicts_.at(robot).is_refused; }
-  /// How many times less certain a robot starts that was contradicted of late.
+  /// The factor on the start's sigmas of a robot that was recently contradicted.
   [[nodiscard]] double doubt(RobotId robot, Timestamp now) const;
 
  private:
@@ -55,15 +58,16 @@ class TeamTrust {
     double rate_radps = 0.0;         ///< how wrong the gyroscope was then
   };
   struct Verdict {
-    Timestamp since{};
+    Timestamp shown{};  ///< when its camera was last found turned; after a while it may be repaired
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
     int count = 0;  ///< how often its cameras were found turned
     bool is_refused = false;
     bool is_withdrawn = false;
   };
+  void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
   void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
   [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
-  [[nodiscard]] bool is_realigned(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool is_realigned(RobotId robot) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] int recent_losses(RobotId robot, Timestamp now) const;
 
@@ -73,8 +77,14 @@ class TeamTrust {
   std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
 };
 
-/// Cameras that are turned or refused, robots most of whose ranges are refused, and clocks that are
-/// off.
-[[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief, const Priors& priors);
+/// The calibration of each robot. A camera is turned if its misalignment is significant and beyond
+/// what a calibration leaves.
+[[nodiscard]] std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief,
+                                                            const Priors& priors);
+
+/// Faults to report: cameras that are turned or refused, robots of which most ranges are refused,
+/// and wrong clocks. `calibrations` are those of `belief`.
+[[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief,
+                                               const std::vector<RobotCalibration>& calibrations);
 
 }  // namespace crepes

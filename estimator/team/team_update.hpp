@@ -8,25 +8,30 @@
 
 namespace crepes {
 
-/// The gain of all rows together: with S = H P H^T + R = L L^T, it holds G = P H^T L^-T.
-/// It costs n m^2 + n^2 m / 2 for n states and m measured dimensions, because rows are sparse.
+/// Measurements that depend on a few of many states. What `m` measured dimensions say of `k` states
+/// y is summed up first, as information L = H^T R^-1 H with a root C of its rank r, L = C C^T. That
+/// equals r measurements C^T y with unit noise, so that all states are corrected by r, and not by m
+/// dimensions.
 class TeamUpdate {
  public:
-  TeamUpdate(const std::vector<TeamRow>& rows, const Eigen::MatrixXd& P);
+  /// `of_y` is the covariance of y, `of_all` that of all states with y. The rows are linearized
+  /// `dy` away from the mean (iterated Kalman filter; Bell and Cathey 1993).
+  TeamUpdate(const std::vector<TeamRow>& rows, const Eigen::VectorXd& dy,
+             const Eigen::MatrixXd& of_y, const Eigen::MatrixXd& of_all);
 
-  /// False if S is singular. Then nothing else may be called.
+  /// False if the innovation's covariance is singular. Then nothing else may be called.
   [[nodiscard]] bool is_valid() const { return is_valid_; }
-  /// The correction of the state about which P is, if the rows are linearized `dx` away from it
-  /// (iterated Kalman filter; Bell and Cathey 1993).
-  [[nodiscard]] Eigen::VectorXd correction(const std::vector<TeamRow>& rows,
-                                           const Eigen::VectorXd& dx) const;
-  /// P - G G^T, symmetric to the bit. States that are not `corrected` keep their covariance, and
-  /// their correction is to be ignored (Schmidt's filter); their errors count all the same.
+  /// Of all states, from their mean.
+  [[nodiscard]] const Eigen::VectorXd& correction() const { return correction_; }
+  /// P - G G^T, symmetric to the bit. States that are not `corrected` keep their
+  /// covariance, and their correction is to be ignored (Schmidt's filter); their errors count all
+  /// the same.
   void correct(const std::vector<bool>& corrected, Eigen::MatrixXd& P) const;
 
  private:
-  Eigen::MatrixXd G_;
-  Eigen::MatrixXd L_;
+  Eigen::MatrixXd of_all_;  ///< with those of y that are measured
+  Eigen::MatrixXd gain_;    ///< G = of_all gain^T
+  Eigen::VectorXd correction_;
   bool is_valid_ = false;
 };
 

@@ -15,11 +15,14 @@ constexpr int kMaxRingSide = 64;       // px; on a larger board no LEDs touch
 constexpr std::int32_t kLeastLed = 8;  // px^2
 constexpr std::size_t kMostPixels = 2000;
 constexpr std::size_t kUsualArcs = 1024;
-constexpr double kArcArea = 1.5;      // of an LED's: two that touch
-constexpr double kLongArcArea = 4.0;  // the same where there is nothing but an arc and an LED
+constexpr double kArcArea = 1.5;        // of an LED's: two that touch
+constexpr double kLongArcArea = 4.0;    // the same where there is nothing but an arc and an LED
+constexpr double kArcElongation = 1.4;  // of an arc, where there is nothing but arcs
+constexpr double kArcMiddle = 0.9;  // of the radius: an arc's; that of a streak is on the ellipse
 constexpr double kMinArcRoundness = 0.28;
 constexpr double kOffEllipse = 1.0;    // px beside half an LED
 constexpr double kLeastCovered = 0.6;  // of the ellipse's length
+constexpr double kArcsCovered = 0.75;  // the same where there is nothing but arcs
 constexpr double kLeastHole = 2.0;     // px
 constexpr double kHole = 0.4;          // of the radius: the lens
 constexpr int kParts = 48;             // of the ellipse
@@ -36,8 +39,13 @@ int gap_between(const PixelBox& a, const PixelBox& b) {
   return std::max({a.u_min - b.u_max, b.u_min - a.u_max, a.v_min - b.v_max, b.v_min - a.v_max}) - 1;
 }
 
-/// The part of the ellipse's length that is lit.
-double lit_share(const RingView& view, const Eigen::Matrix2d& to_place,
+/// An ellipse's length [px].
+struct Length {
+  double lit = 0.0;
+  double whole = 0.0;
+};
+
+Length length_of(const RingView& view, const Eigen::Matrix2d& to_place,
                  std::span<const Eigen::Vector2d> pixels) {
   std::array<bool, kParts> is_part_lit{};
   for (const Eigen::Vector2d& uv : pixels) {
@@ -45,16 +53,16 @@ double lit_share(const RingView& view, const Eigen::Matrix2d& to_place,
     const double turn = std::atan2(q.y(), q.x()) / (2.0 * std::numbers::pi) + 0.5;
     is_part_lit.at(static_cast<std::size_t>(turn * kParts) % kParts) = true;
   }
-  double lit = 0.0;
-  double whole = 0.0;
+  Length sum;
   for (std::size_t part = 0; part < kParts; ++part) {
     const double angle =
         2.0 * std::numbers::pi * ((static_cast<double>(part) + 0.5) / kParts - 0.5);
-    const double length = (view.axes * Eigen::Vector2d(-std::sin(angle), std::cos(angle))).norm();
-    whole += length;
-    if (is_part_lit.at(part)) lit += length;
+    const double length = 2.0 * std::numbers::pi / kParts *
+                          (view.axes * Eigen::Vector2d(-std::sin(angle), std::cos(angle))).norm();
+    sum.whole += length;
+    if (is_part_lit.at(part)) sum.lit += length;
   }
-  return lit / whole;
+  return sum;
 }
 
 }  // namespace
@@ -110,9 +118,12 @@ bool ArcJoiner::gather(std::uint32_t arc, std::span<const Blob> blobs,
       sum += blob.area;
     }
   }
-  const std::int32_t most = blobs[arc].area;
-  return static_cast<std::size_t>(sum) <= kMostPixels && ring_.count > 1 &&
-         most >= (ring_.count == 2 ? kLongArcArea : kArcArea) * least;
+  if (static_cast<std::size_t>(sum) > kMostPixels || ring_.count < 2) return false;
+  has_led_ = blobs[arc].area >= (ring_.count == 2 ? kLongArcArea : kArcArea) * least;
+  const auto members = ring_.members();
+  return has_led_ || std::all_of(members.begin(), members.end(), [&](std::uint32_t i) {
+           return blobs[i].elongation() >= kArcElongation;
+         });
 }
 
 bool ArcJoiner::is_ring(std::span<const Blob> blobs, const BlobFinder& finder) {
@@ -136,15 +147,23 @@ bool ArcJoiner::is_ring(std::span<const Blob> blobs, const BlobFinder& finder) {
   std::int32_t led = blobs[ring_.blobs[0]].area;
   for (const std::uint32_t i : ring_.members()) led = std::min(led, blobs[i].area);
   ring_.view = *view;
-  const double width = std::sqrt(4.0 * led / std::numbers::pi);
+  const Eigen::Matrix2d to_place = view->axes.inverse();
+  const Length length = length_of(*view, to_place, pixels_);
+  const double width = has_led_ ? std::sqrt(4.0 * led / std::numbers::pi)
+                                : static_cast<double>(pixels_.size()) / length.lit;
   const double radius = view->radius();
   if (2.0 * radius * view->roundness() < width + kLeastHole || 2.0 * radius > kMaxRingSide)
     return false;
-  const Eigen::Matrix2d to_place = view->axes.inverse();
+  const auto members = ring_.members();
+  const bool are_curved =
+      has_led_ || std::all_of(members.begin(), members.end(), [&](auto i) {
+        return view->place_near({blobs[i].mean_u(), blobs[i].mean_v()}).norm() <= kArcMiddle;
+      });
+  if (!are_curved) return false;
   const bool are_near = std::all_of(pixels_.begin(), pixels_.end(), [&](const Eigen::Vector2d& uv) {
     return distance_from(*view, to_place, uv) <= 0.5 * width + kOffEllipse;
   });
-  return are_near && lit_share(*view, to_place, pixels_) >= kLeastCovered;
+  return are_near && length.lit >= (has_led_ ? kLeastCovered : kArcsCovered) * length.whole;
 }
 
 /// Least squares of  x^2 + y^2 + a (x^2 - y^2) + b 2 x y + d x + e y + f,  which has the same

@@ -25,11 +25,12 @@ struct JoinedArcs {
   }
 };
 
-/// Joins the blobs of a ring that is seen aslant, or has many LEDs: where its LEDs touch they are
-/// arcs, which have no center of an LED to offer, but all of their pixels are near one ellipse.
+/// Joins the blobs of a ring that is seen at a slant or has many LEDs. Where LEDs touch, they
+/// appear as arcs. An arc shows no centers of LEDs, but all of its pixels are near one ellipse.
 ///
-/// It takes a single LED, which tells how wide an arc is, an arc, light on most of the ellipse and
-/// darkness within.
+/// A ring needs a single LED, which shows how wide an arc is, and at least one arc; or arcs only,
+/// whose width is their area divided by the length that they cover. Most of the ellipse must be
+/// lit, and its inside dark.
 class ArcJoiner {
  public:
   ArcJoiner();
@@ -45,6 +46,7 @@ class ArcJoiner {
   [[nodiscard]] bool is_ring(std::span<const Blob> blobs, const BlobFinder& finder);
 
   JoinedArcs ring_;
+  bool has_led_ = false;  ///< a member that may be a single LED
   std::vector<Eigen::Vector2d> pixels_;
   std::vector<std::uint8_t> is_taken_;  ///< by blob
   std::vector<JoinedArcs> rings_;

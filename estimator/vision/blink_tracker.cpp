@@ -15,7 +15,7 @@ constexpr double kAccelDensity = 3.0;  // of a neighbor's direction [rad/s^2/sqr
 constexpr double kGyroSigma = 0.02;    // what the gyro leaves of own rotation [rad/s]
 constexpr double kGateSigmas = 4.0;
 constexpr double kMergePx = 3.0;            // beside the blobs' own radii
-constexpr double kMinLitProbability = 0.3;  // below it, an absence was to be expected
+constexpr double kMinLitProbability = 0.3;  // below it, the board is dark
 constexpr double kLitProbability = 0.8;     // of a track whose code is unknown
 constexpr double kNewSources = 0.1;         // a frame and steradian
 constexpr double kNewness = 2.0;            // a track of a few frames may have been a flicker
@@ -24,6 +24,14 @@ constexpr double kSteadyGain = 0.1;
 constexpr double kExpectedPx = 5.0;  // so near its prediction a light is after a short absence
 constexpr Duration kShortAbsence = std::chrono::milliseconds{100};
 constexpr double kLeastBenefit = 1e-3;  // what lies within the gate is not left alone
+
+// Of the direction of a board whose robot has a pose.
+constexpr double kMountingSigma = 0.01;      // m
+constexpr double kCameraSigma = 0.004;       // rad
+constexpr double kSpeedSigma = 0.5;          // m/s
+constexpr double kMostExpectedSigma = 0.04;  // rad; less certain, it says little
+constexpr double kExpectedReach = 3.0;       // sigmas; other lights so near make it ambiguous
+constexpr Duration kOldestPhase = std::chrono::seconds{30};
 
 /// Squared chord, which is the squared angle for directions that are near.
 double distance2(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -51,14 +59,17 @@ void BlinkTracker::add_imu(const ImuSample& sample) {
   if (!imu_.push(sample)) ++counts_.refused_imu;
 }
 
-std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
+std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame,
+                                        std::span<const ExpectedBoard> expected) {
   const Timestamp stamp = frame.stamp + timeshift_;
+  confirmed_.clear();
   if (now_ && stamp <= *now_) {
     ++counts_.refused_frames;
     return {};
   }
   // A frame that was lost shows nothing, not even darkness.
   const Duration looked = now_ ? std::min(stamp - *now_, 3 * period_ / 2) : Duration{};
+  expect(expected, stamp);
   predict(stamp);
   unproject(frame, stamp);
   const Pairing& sighting_of = assign();
@@ -66,6 +77,9 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
   std::vector<Bearing> bearings;
   unclear_.clear();
   is_taken_.assign(sightings_.size(), false);
+  is_known_.assign(sightings_.size(), false);
+  for (std::size_t t = 0; t < tracks_.size(); ++t)
+    if (sighting_of[t] && tracks_[t].evidence.assigned) is_known_[*sighting_of[t]] = true;
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     if (!sighting_of[t]) continue;
     Track& track = tracks_[t];
@@ -81,13 +95,7 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
       continue;
     }
     observe(track, sighting, stamp);
-    if (const auto id = decoder_.id_of(track.evidence)) {
-      bearings.push_back({.stamp = stamp,
-                          .neighbor = *id,
-                          .u_B = sighting.u_B,
-                          .p_B_C = T_B_C_.p,
-                          .sigma_rad = config_.bearing_sigma_px * sighting.px_rad});
-    }
+    name(track, stamp, bearings);
   }
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     if (sighting_of[t]) continue;
@@ -100,7 +108,7 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame) {
   }
   retire(stamp);
   for (std::size_t s = 0; s < sightings_.size(); ++s)
-    if (!is_taken_[s]) begin(sightings_[s], stamp);
+    if (!is_taken_[s]) begin(sightings_[s], stamp, bearings);
 
   std::stable_sort(bearings.begin(), bearings.end(),
                    [](const Bearing& a, const Bearing& b) { return a.neighbor < b.neighbor; });
@@ -152,15 +160,19 @@ void BlinkTracker::predict(Timestamp stamp) {
       imu_.empty() ? Eigen::Quaterniond::Identity() : imu_.rotation(stamp, *now_);
   const double dt = to_seconds(stamp - *now_);
   const double q = kAccelDensity * kAccelDensity;
-  hidden_.turn(R_now_before);
+  hidden_.rotate_frame(R_now_before);
   for (Track& track : tracks_) {
     track.u_B = (R_now_before * (track.u_B + track.rate_B * dt)).normalized();
     track.rate_B = R_now_before * track.rate_B;
     track.seen_B = R_now_before * track.seen_B;
     track.steady_B = R_now_before * track.steady_B;
     const Duration absence = stamp - track.last_seen;
-    if (absence > decoder_.longest_dark())  // a rate of a few frames would carry it astray
-      track.u_B = (track.seen_B + to_seconds(absence) * track.steady_B).normalized();
+    if (absence > decoder_.longest_dark()) {  // a rate of a few frames would carry it astray
+      const ExpectedLight* expected = expected_of(track);
+      track.u_B = expected != nullptr
+                      ? expected->u_B
+                      : (track.seen_B + to_seconds(absence) * track.steady_B).normalized();
+    }
     track.variance += dt * (2.0 * track.covariance + dt * track.rate_variance) +
                       q * dt * dt * dt / 3.0 + std::pow(kGyroSigma * dt, 2);
     track.covariance += dt * track.rate_variance + q * dt * dt / 2.0;
@@ -168,6 +180,60 @@ void BlinkTracker::predict(Timestamp stamp) {
     track.exposed = exposure_of(track, stamp);
   }
   now_ = stamp;
+}
+
+/// Whether a light with this code was seen within its dark times.
+bool BlinkTracker::is_in_sight(std::size_t code) const {
+  return std::ranges::any_of(tracks_, [&](const Track& track) {
+    return track.evidence.assigned && track.evidence.assigned->code == code &&
+           track.unseen <= decoder_.longest_dark();
+  });
+}
+
+/// The boards out of sight whose phase is known. The pose is some 20 ms old.
+void BlinkTracker::expect(std::span<const ExpectedBoard> boards, Timestamp stamp) {
+  expected_.clear();
+  for (const ExpectedBoard& board : boards) {
+    const auto code = decoder_.code_of(board.robot);
+    const auto phase = code ? phases_.of(*code) : std::nullopt;
+    if (!phase || stamp - phase->learned > kOldestPhase || imu_.empty() || is_in_sight(*code))
+      continue;
+    const double dt = to_seconds(stamp - board.stamp);
+    const Eigen::Vector3d p_C_M = board.p_B_M + dt * board.v_B_M - T_B_C_.p;
+    const double distance_m = p_C_M.norm();
+    const Eigen::Vector3d u_B = p_C_M / distance_m;
+    const double across_m2 = board.covariance_m2.trace() - u_B.dot(board.covariance_m2 * u_B);
+    const double sigma_m =
+        std::sqrt(across_m2 + kMountingSigma * kMountingSigma + std::pow(kSpeedSigma * dt, 2));
+    const double sigma_rad = std::hypot(sigma_m / distance_m, kCameraSigma);
+    if (!(sigma_rad < kMostExpectedSigma)) continue;
+    expected_.push_back({.match = {*code, phase->phase},
+                         .phase_learned = phase->learned,
+                         .u_B = imu_.rotation(stamp, board.stamp) * u_B,
+                         .sigma_rad = sigma_rad});
+  }
+}
+
+/// Where the track's board is expected by pose, if that is about where it was seen: a mirror image
+/// of the board is elsewhere.
+const ExpectedLight* BlinkTracker::expected_of(const Track& track) const {
+  if (!track.evidence.assigned) return nullptr;
+  const auto found = std::ranges::find_if(expected_, [&](const ExpectedLight& light) {
+    const double reach = kExpectedReach * kMostExpectedSigma;
+    return light.match.code == track.evidence.assigned->code &&
+           distance2(light.u_B, track.seen_B) < reach * reach;
+  });
+  return found == expected_.end() ? nullptr : &*found;
+}
+
+/// Whether no other light of unknown ID is within `reach_rad` of `u_B`.
+bool BlinkTracker::is_alone(const Sighting& sighting, const Eigen::Vector3d& u_B,
+                            double reach_rad) const {
+  for (std::size_t s = 0; s < sightings_.size(); ++s) {
+    if (&sightings_[s] == &sighting || is_known_[s]) continue;
+    if (distance2(sightings_[s].u_B, u_B) < reach_rad * reach_rad) return false;
+  }
+  return true;
 }
 
 double BlinkTracker::gate_of(const Track& track) const {
@@ -263,10 +329,41 @@ void BlinkTracker::observe(Track& track, const Sighting& sighting, Timestamp sta
   ++track.hits;
 
   decoder_.observe_lit(track.evidence, sighting.exposed, phases_);
-  decoder_.learn(track.evidence, sighting.exposed, phases_);
+  if (track.evidence.predictable_until && !is_alone(sighting, sighting.u_B, gate_of(track)))
+    track.evidence.predictable_until.reset();
+  decoder_.update_phase(track.evidence, sighting.exposed, phases_);
   if (!was_assigned && track.evidence.assigned)
     ++counts_.decodes[decoder_.code_id(*track.evidence.assigned)];
   if (was_assigned && !track.evidence.assigned) ++counts_.lost_ids;
+}
+
+/// Adds the bearing of a track that was seen in this frame, if it has an ID.
+void BlinkTracker::name(Track& track, Timestamp stamp, std::vector<Bearing>& bearings) {
+  const auto read = decoder_.id_of(track.evidence);
+  const auto id = read ? read : decoder_.predicted_id(track.evidence, stamp);
+  if (read && !track.predicted.empty()) {
+    const bool is_same = track.predicted.front().neighbor == *read;
+    ++(is_same ? counts_.predicted_ids.confirmed : counts_.predicted_ids.unconfirmed);
+    for (Bearing& bearing : track.predicted) bearing.how = Naming::kRead;
+    if (is_same)
+      confirmed_.insert(confirmed_.end(), track.predicted.begin(), track.predicted.end());
+    track.predicted.clear();
+  } else if (!id && !track.evidence.predictable_until && !track.predicted.empty()) {
+    ++counts_.predicted_ids.unconfirmed;
+    track.predicted.clear();
+  }
+  // A light where its board is dark is more likely another board's that passes.
+  const double lit =
+      decoder_.lit_probability(track.evidence, track.seen.exposed).value_or(kLitProbability);
+  if (!id || lit < kMinLitProbability) return;
+  const Bearing bearing{.stamp = stamp,
+                        .neighbor = *id,
+                        .u_B = track.seen.u_B,
+                        .p_B_C = T_B_C_.p,
+                        .sigma_rad = config_.bearing_sigma_px * track.seen.px_rad,
+                        .how = read ? Naming::kRead : Naming::kPredicted};
+  bearings.push_back(bearing);
+  if (!read) track.predicted.push_back(bearing);
 }
 
 void BlinkTracker::observe_absence(Track& track) const {
@@ -282,6 +379,7 @@ void BlinkTracker::retire(Timestamp stamp) {
     const Duration patience = is_carried ? std::max(usual, kLongestAbsence) : usual;
     if (track.unseen <= patience && stamp - track.last_seen <= std::max(usual, kLongestAbsence))
       return false;
+    if (!track.predicted.empty()) ++counts_.predicted_ids.unconfirmed;
     keep_or_forget(track);
     return true;
   });
@@ -300,10 +398,14 @@ void BlinkTracker::keep_or_forget(Track& track) {
   }
 }
 
-/// Continues what was hidden, unless that board is in sight elsewhere.
+/// Continues what was hidden, unless that board is in sight elsewhere. Without a pose its direction
+/// is too uncertain for a name before it is read.
 void BlinkTracker::resume(Track& track, const Sighting& sighting, Timestamp stamp) {
-  auto hidden = hidden_.take(sighting.u_B, stamp);
+  auto hidden = hidden_.extract_match(sighting.u_B, stamp, expected_);
   if (!hidden) return;
+  const ExpectedLight* by_pose = hidden->by_pose;
+  const bool is_predictable =
+      by_pose != nullptr && is_alone(sighting, by_pose->u_B, kExpectedReach * by_pose->sigma_rad);
   track.evidence = std::move(hidden->evidence);
   decoder_.resume(track.evidence, sighting.exposed, hidden->stranger);
   const auto& code = track.evidence.expected;
@@ -312,9 +414,11 @@ void BlinkTracker::resume(Track& track, const Sighting& sighting, Timestamp stam
         return other.evidence.assigned && other.evidence.assigned->code == *code;
       });
   if (is_elsewhere) track.evidence.forget();
+  if (!is_predictable) track.evidence.predictable_until.reset();
 }
 
-void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp) {
+void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp,
+                         std::vector<Bearing>& bearings) {
   if (tracks_.size() >= kMaxTracks) {
     ++counts_.refused_spots;
     return;
@@ -333,6 +437,7 @@ void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp) {
   track.last_seen = stamp;
   track.hits = 1;
   decoder_.observe_lit(track.evidence, sighting.exposed, phases_);
+  name(track, stamp, bearings);
   tracks_.push_back(std::move(track));
 }
 

@@ -1,4 +1,4 @@
-/// What a source showed of late, and how likely that is for one that is no board.
+/// The recent on/off observations of a source, and their likelihood for a source that is no board.
 #pragma once
 
 #include <array>
@@ -9,6 +9,7 @@
 
 namespace crepes {
 
+/// Whether a source was lit in one frame.
 struct BlinkObservation {
   Timestamp stamp{};
   bool lit = false;

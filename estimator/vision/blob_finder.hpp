@@ -72,8 +72,8 @@ class BlobFinder {
                           std::vector<Blob>& blobs) {
     return find(image, {threshold, threshold}, {}, max_area, blobs);
   }
-  /// The same with `mended` pixels, ordered by row and column, taken for what they should show
-  /// where they end a blob.
+  /// The same, but a blob that ends in one of the `mended` pixels uses the pixel's corrected value.
+  /// They are ordered by row and column.
   struct Levels {
     int threshold = 0;
     int faint = 0;  ///< at most the threshold; if lower, faint_peaks() are the peaks from it on
@@ -82,7 +82,8 @@ class BlobFinder {
                           std::span<const MendedPixel> mended, double max_area,
                           std::vector<Blob>& blobs);
 
-  /// What the last find() saw beside its blobs; nothing if it was so much that it is texture.
+  /// Peaks of the last find() that belong to no blob. Empty if there were so many that they are
+  /// texture.
   [[nodiscard]] std::span<const FaintPeak> faint_peaks() const { return faint_; }
 
   /// Which of the blobs that the last find() appended has the pixel, counted from 0.

@@ -1,5 +1,7 @@
 #include "estimator/vision/camera_model.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -46,8 +48,9 @@ Faults double_sphere_faults(const CameraCalibration& config) {
     faults.push_back({"distortion_coeffs", "ds has no distortion: must be empty"});
   const std::vector<double>& v = config.intrinsics;
   if (v.size() != 6) {
-    faults.push_back({"intrinsics", "ds has 6 intrinsics (xi, alpha, fx, fy, cx, cy), not " +
-                                        std::to_string(v.size())});
+    faults.push_back(
+        {"intrinsics",
+         fmt::format("ds has 6 intrinsics (xi, alpha, fx, fy, cx, cy), not {}", v.size())});
   } else if (!are_finite(v)) {
     faults.push_back({"intrinsics", "not finite"});
   } else {
@@ -70,16 +73,16 @@ Faults kannala_brandt_faults(const CameraCalibration& config) {
     faults.push_back({"distortion_model", "must be equidistant for pinhole"});
   const std::vector<double>& k = config.distortion_coeffs;
   if (k.size() != 4) {
-    faults.push_back({"distortion_coeffs",
-                      "equidistant has 4 (k1, k2, k3, k4), not " + std::to_string(k.size())});
+    faults.push_back(
+        {"distortion_coeffs", fmt::format("equidistant has 4 (k1, k2, k3, k4), not {}", k.size())});
   } else if (!are_finite(k)) {
     faults.push_back({"distortion_coeffs", "not finite"});
   } else if (kannala_brandt_of(k).max_angle_rad() < kMinMaxAngle) {
     faults.push_back({"distortion_coeffs", "the image folds less than 10 degrees off the axis"});
   }
   if (config.intrinsics.size() != 4) {
-    faults.push_back({"intrinsics", "pinhole has 4 intrinsics (fu, fv, pu, pv), not " +
-                                        std::to_string(config.intrinsics.size())});
+    faults.push_back({"intrinsics", fmt::format("pinhole has 4 intrinsics (fu, fv, pu, pv), not {}",
+                                                config.intrinsics.size())});
   } else if (!are_finite(config.intrinsics)) {
     faults.push_back({"intrinsics", "not finite"});
   } else {

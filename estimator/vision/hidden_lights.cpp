@@ -20,25 +20,35 @@ double sigma_of(const HiddenLight& light, Timestamp now) {
   return kFirstSigma + kWander * to_seconds(now - light.last_seen);
 }
 
-/// Squared distance from the expected direction, in sigmas.
-double distance2_of(const HiddenLight& light, const Eigen::Vector3d& u_B, Timestamp now) {
-  const Eigen::Vector3d expected =
-      (light.u_B + to_seconds(now - light.last_seen) * light.rate_B).normalized();
-  const double sigma = sigma_of(light, now);
-  return (expected - u_B).squaredNorm() / (sigma * sigma);
-}
-
-/// The density of its direction at `u_B`, per steradian; zero beyond the gate.
-double density_of(const HiddenLight& light, const Eigen::Vector3d& u_B, Timestamp now) {
-  const double sigma = sigma_of(light, now);
-  const double distance2 = distance2_of(light, u_B, now);
+/// The density of a direction at `u_B`, per steradian; zero beyond the gate.
+double density_at(const Eigen::Vector3d& u_B, const Eigen::Vector3d& expected, double sigma) {
+  const double distance2 = (expected - u_B).squaredNorm() / (sigma * sigma);
   if (distance2 > kReachSigmas * kReachSigmas) return 0.0;
   return std::exp(-0.5 * distance2) / (2.0 * std::numbers::pi * sigma * sigma);
 }
 
+double density_of(const HiddenLight& light, const Eigen::Vector3d& u_B, Timestamp now) {
+  const Eigen::Vector3d expected =
+      (light.u_B + to_seconds(now - light.last_seen) * light.rate_B).normalized();
+  return density_at(u_B, expected, sigma_of(light, now));
+}
+
+/// What is known of a board that was read before, but of no light: its code and phase.
+BlinkEvidence evidence_of(const ExpectedLight& light) {
+  BlinkEvidence evidence;
+  evidence.assigned = light.match;
+  evidence.last_lit = light.phase_learned;
+  return evidence;
+}
+
+bool is_of(const HiddenLight& hidden, const ExpectedLight& expected) {
+  const BlinkEvidence& evidence = hidden.evidence;
+  return (evidence.assigned ? evidence.assigned->code : evidence.expected) == expected.match.code;
+}
+
 }  // namespace
 
-void HiddenLights::turn(const Eigen::Quaterniond& R_now_before) {
+void HiddenLights::rotate_frame(const Eigen::Quaterniond& R_now_before) {
   for (HiddenLight& light : lights_) {
     light.u_B = R_now_before * light.u_B;
     light.rate_B = R_now_before * light.rate_B;
@@ -67,20 +77,32 @@ void HiddenLights::add(HiddenLight light, std::vector<BlinkEvidence>& unused) {
 }
 
 /// Bayes:  p(light) = p / (n + sum p),  p the densities of hidden lights, n that of others.
-std::optional<HiddenLights::Return> HiddenLights::take(const Eigen::Vector3d& u_B, Timestamp now) {
+std::optional<HiddenLights::Return> HiddenLights::extract_match(
+    const Eigen::Vector3d& u_B, Timestamp now, std::span<const ExpectedLight> expected) {
   double sum = kStrangers / kField;
   double most = 0.0;
+  const auto is_most = [&](double density) {
+    sum += density;
+    if (density <= most) return false;
+    most = density;
+    return true;
+  };
   auto likeliest = lights_.end();
   for (auto it = lights_.begin(); it != lights_.end(); ++it) {
-    const double density = density_of(*it, u_B, now);
-    sum += density;
-    if (density <= most) continue;
-    most = density;
-    likeliest = it;
+    const bool has_pose = std::ranges::any_of(
+        expected, [&](const ExpectedLight& light) { return is_of(*it, light); });
+    if (!has_pose && is_most(density_of(*it, u_B, now))) likeliest = it;
   }
-  if (likeliest == lights_.end() || most < (1.0 - kMostStranger) * sum) return std::nullopt;
-  Return found{std::move(likeliest->evidence), std::max(kLeastStranger, 1.0 - most / sum)};
-  lights_.erase(likeliest);
+  const ExpectedLight* by_pose = nullptr;
+  for (const ExpectedLight& light : expected)
+    if (is_most(density_at(u_B, light.u_B, light.sigma_rad))) by_pose = &light;
+  if (most == 0.0 || most < (1.0 - kMostStranger) * sum) return std::nullopt;
+  if (by_pose != nullptr)
+    likeliest = std::ranges::find_if(
+        lights_, [&](const HiddenLight& light) { return is_of(light, *by_pose); });
+  Return found{likeliest == lights_.end() ? evidence_of(*by_pose) : std::move(likeliest->evidence),
+               std::max(kLeastStranger, 1.0 - most / sum), by_pose};
+  if (likeliest != lights_.end()) lights_.erase(likeliest);
   return found;
 }
 

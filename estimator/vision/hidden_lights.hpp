@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "estimator/core/time.hpp"
@@ -20,28 +21,43 @@ struct HiddenLight {
   BlinkEvidence evidence;
 };
 
-/// Carries hidden lights by the gyro and their own motion, for a few seconds. A light that appears
-/// where one of them is expected continues its evidence. The more uncertain the direction has
-/// become and the nearer another one is expected, the likelier it is another. Bounded; what has
-/// been hidden longest is dropped first.
+/// Where a board is, by the pose of its robot, with the phase in which it was blinking.
+struct ExpectedLight {
+  CodeMatch match;
+  Timestamp phase_learned{};
+  Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
+  double sigma_rad = 0.0;
+};
+
+/// Predicts the directions of hidden lights for a few seconds, by the gyro and their own motion. A
+/// light that appears in a predicted direction continues the evidence of the hidden one. The
+/// probability that it is another light grows with the uncertainty of the direction and with the
+/// nearness of other hidden lights. The capacity is bounded: the light that has been hidden longest
+/// is dropped first. Where the pose of its robot is known, a board is expected there instead,
+/// however long ago it was seen.
 class HiddenLights {
  public:
   static constexpr std::size_t kCapacity = 32;
   static constexpr Duration kLongest = std::chrono::milliseconds{3000};
 
+  /// The evidence of a light that is visible again.
   struct Return {
     BlinkEvidence evidence;
     double stranger = 0.0;  ///< the probability that it is another light
+    /// The one of `expected` that is here; null if its own past puts the light here.
+    const ExpectedLight* by_pose = nullptr;
   };
 
-  /// The body turned: R_now_before.
-  void turn(const Eigen::Quaterniond& R_now_before);
+  /// Expresses all directions in the axes of the body as it is now.
+  void rotate_frame(const Eigen::Quaterniond& R_now_before);
   /// Drops what has been hidden for too long. The evidence of what is dropped here or by add() goes
   /// to `unused`.
   void drop_old(Timestamp now, std::vector<BlinkEvidence>& unused);
   void add(HiddenLight light, std::vector<BlinkEvidence>& unused);
-  /// The hidden light that `u_B` continues; empty if none is expected there, or several are alike.
-  [[nodiscard]] std::optional<Return> take(const Eigen::Vector3d& u_B, Timestamp now);
+  /// Removes and returns the light that `u_B` continues, of those hidden and those `expected` by
+  /// poses. Empty if none is expected there, or if several are equally likely.
+  [[nodiscard]] std::optional<Return> extract_match(const Eigen::Vector3d& u_B, Timestamp now,
+                                                    std::span<const ExpectedLight> expected = {});
 
  private:
   std::vector<HiddenLight> lights_;

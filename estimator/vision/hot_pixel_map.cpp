@@ -31,7 +31,7 @@ bool HotPixelMap::is_before(const Suspect& a, const Suspect& b) {
   return a.v != b.v ? a.v < b.v : a.u < b.u;
 }
 
-void HotPixelMap::look(const GrayImage& image, int level) {
+void HotPixelMap::add_frame(const GrayImage& image, int level) {
   if (image.width != width_ || image.height != height_) {
     suspects_.clear();
     new_.clear();

@@ -9,22 +9,22 @@
 
 namespace crepes {
 
-/// Learns pixels that shine in every picture. A board is dark in some of a few hundred, wherever it
-/// rests; a lamp that is as steady is no board. A pixel is known after kKnown pictures, and
-/// forgotten within a few that do not show it. Bounded.
+/// Learns the pixels that shine in every picture. Every board is dark in some of a few hundred
+/// pictures, and a lamp that is never dark is no board. A pixel is known after kKnown pictures, and
+/// forgotten after a few pictures in which it is dark. The number of pixels is bounded.
 class HotPixelMap {
  public:
-  static constexpr int kKnown = 400;  ///< pictures: 2 s at 200 Hz
+  static constexpr int kKnown = 250;  ///< pictures: 1.3 s at 200 Hz, 8.3 s at 30 Hz
   static constexpr std::size_t kMaxSuspects = 8192;
 
   /// Nothing is allocated later.
   HotPixelMap();
 
-  /// Looks at all suspects in the next picture; they shine from `level` on.
-  void look(const GrayImage& image, int level);
-  /// A pixel of a speck of light. Takes effect with the next look().
+  /// Updates all suspects with the next picture. A pixel shines if it is at least `level`.
+  void add_frame(const GrayImage& image, int level);
+  /// A pixel of a speck of light. Takes effect with the next add_frame().
   void suspect(int u, int v);
-  /// Whether a suspect that is new would be taken before the next look().
+  /// Whether a suspect that is new would be taken before the next add_frame().
   [[nodiscard]] bool has_room() const;
 
   /// Ordered by row and column, with the median of their neighbors in the last picture.

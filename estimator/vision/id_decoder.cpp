@@ -55,6 +55,10 @@ constexpr Duration kLongestAbsence = 600ms;
 constexpr double kShortDoubt = 0.7;    // of kDoubted, after kShortAbsence
 constexpr double kAbsenceDoubt = 3.3;  // nats beyond kDoubted
 
+// What is expected is named before it is read, for so long and if so probable.
+constexpr Duration kPredictionTime = 300ms;
+constexpr double kForetold = 0.95;
+
 // A source that goes dark so many times as often as a board can, of late, is behind a propeller.
 constexpr double kObstructedRuns = 1.25;
 constexpr double kClearRuns = 1.0;
@@ -151,9 +155,11 @@ void BlinkEvidence::forget() {
   is_obstructed = false;
   earlier_markov = 0.0;
   expected.reset();
+  foretold = 0.0;
+  predictable_until.reset();
 }
 
-void PhaseMemory::learn(const CodeMatch& match, Timestamp now) {
+void PhaseMemory::update(const CodeMatch& match, Timestamp now) {
   if (match.code >= phases_.size()) phases_.resize(match.code + 1);
   if (!phases_[match.code]) ++known_;
   phases_[match.code] = {match.phase, now};
@@ -296,6 +302,7 @@ void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp,
     const Code& code = codes_[evidence.assigned->code];
     evidence.assigned->phase = best_phase(scores_of(evidence, code));  // its clock drifts
   }
+  if (is_identified(evidence)) evidence.predictable_until.reset();
 }
 
 /// Darkness says something where a code is as dark; otherwise the source was hidden. What appears
@@ -315,6 +322,7 @@ void IdDecoder::end_absence(BlinkEvidence& evidence, Timestamp stamp) const {
                            : kShortDoubt * kDoubted * to_seconds(absence) / to_seconds(brief);
   evidence.doubt = std::max(evidence.doubt, doubt);
   evidence.obstructed_doubt = std::max(evidence.obstructed_doubt, doubt - kObstructedCost);
+  if (absence > brief) evidence.predictable_until = stamp + kPredictionTime;
 }
 
 bool IdDecoder::is_worth_keeping(const BlinkEvidence& evidence) {
@@ -341,6 +349,8 @@ void IdDecoder::resume(BlinkEvidence& evidence, Timestamp now, double stranger) 
   evidence.obstructed_doubt = 0.0;
   evidence.dark_runs = 0.0;
   evidence.is_obstructed = false;
+  evidence.foretold = 0.0;
+  evidence.predictable_until = now + kPredictionTime;
 }
 
 /// All of the likelihood is with the assigned code, in the phases that its clock may have by now.
@@ -395,10 +405,11 @@ void IdDecoder::count_dark_run(BlinkEvidence& evidence, Timestamp stamp) const {
   forget_old(evidence, stamp + 2 * window_);  // what it showed was read otherwise
 }
 
-void IdDecoder::learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const {
+void IdDecoder::update_phase(const BlinkEvidence& evidence, Timestamp now,
+                             PhaseMemory& known) const {
   if (!is_identified(evidence)) return;
   const Duration enough = kPeriodsToLearn * codes_[evidence.assigned->code].period;
-  if (now - evidence.assigned_since >= enough) known.learn(*evidence.assigned, now);
+  if (now - evidence.assigned_since >= enough) known.update(*evidence.assigned, now);
 }
 
 /// So many steps a phase may be off that was known `age` ago.
@@ -455,6 +466,7 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
   double clutter = kMarkovOdds * std::exp(log_markov(evidence) - best_log);
   for (std::size_t c = boards_; c < codes_.size(); ++c)
     clutter += std::exp(anywhere(codes_[c]) - best_log);
+  evidence.foretold = evidence.expected == best ? 1.0 / (1.0 + others + clutter) : 0.0;
   if (best == own_ || others > max_wrong_id_ || clutter > max_false_robot_) return;
   evidence.assigned = {best, best_phase(scores_of(evidence, codes_[best]))};
   if (evidence.expected != best) evidence.assigned_since = now;
@@ -493,6 +505,24 @@ bool IdDecoder::is_identified(const BlinkEvidence& evidence) {
 std::optional<RobotId> IdDecoder::id_of(const BlinkEvidence& evidence) const {
   if (!is_identified(evidence)) return std::nullopt;
   return codes_[evidence.assigned->code].id;
+}
+
+std::optional<RobotId> IdDecoder::predicted_id(const BlinkEvidence& evidence, Timestamp now) const {
+  if (is_identified(evidence) || !evidence.predictable_until || now > *evidence.predictable_until)
+    return std::nullopt;
+  if (evidence.assigned) {
+    if (doubt_of(evidence) > kDoubted + kAbsenceDoubt) return std::nullopt;
+    return codes_[evidence.assigned->code].id;
+  }
+  if (!evidence.expected || evidence.foretold < kForetold) return std::nullopt;
+  return codes_[*evidence.expected].id;
+}
+
+std::optional<std::size_t> IdDecoder::code_of(RobotId robot) const {
+  const std::span boards(codes_.data(), boards_);
+  const auto found = std::ranges::find(boards, robot, &Code::id);
+  if (found == boards.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - boards.begin());
 }
 
 std::optional<double> IdDecoder::lit_probability(const BlinkEvidence& evidence,

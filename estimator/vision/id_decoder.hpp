@@ -1,4 +1,4 @@
-/// Decodes which robot's board a track is, from the track's on/off history.
+/// Identifies the robot's board of a track from the track's on/off history.
 #pragma once
 
 #include <array>
@@ -37,10 +37,14 @@ struct BlinkEvidence {
   double obstructed_doubt = 0.0;
   double dark_runs = 0.0;      ///< how often it went dark of late, with fading memory
   bool is_obstructed = false;  ///< more often than any board: a propeller is in front of it
-  /// Earlier sights of the light are in `score`, whose mean over all sources is 1 then, and in this
-  /// log likelihood of a two-state Markov chain, relative to that mean.
+  /// After resume(), `score` contains the earlier sightings, normalized so that the mean likelihood
+  /// of all sources is 1. This is the log likelihood of a two-state Markov chain relative to that
+  /// mean.
   double earlier_markov = 0.0;
   std::optional<std::size_t> expected;  ///< the code that it was last, if `score` has its phase
+  double foretold = 0.0;                ///< posterior probability of `expected` until it is decided
+  /// Until then it may be named before it is read. Set where it appears after an absence.
+  std::optional<Timestamp> predictable_until;
 
   /// Returns to the initial state. Allocated memory is kept.
   void forget();
@@ -50,12 +54,13 @@ struct BlinkEvidence {
 /// keeps blinking, and its phase can be predicted: two crystals differ by at most 200 ppm.
 class PhaseMemory {
  public:
+  /// When a code began last, and when that was known.
   struct Phase {
     std::size_t phase = 0;
     Timestamp learned{};
   };
 
-  void learn(const CodeMatch& match, Timestamp now);
+  void update(const CodeMatch& match, Timestamp now);
   [[nodiscard]] std::optional<Phase> of(std::size_t code) const {
     return code < phases_.size() ? phases_[code] : std::nullopt;
   }
@@ -83,24 +88,30 @@ class IdDecoder {
 
   /// The track was lit in the frame at `stamp`, which is later than all before.
   void observe_lit(BlinkEvidence& evidence, Timestamp stamp, const PhaseMemory& known = {}) const;
-  /// Nothing was seen where the track is predicted. The frame counts as dark if the track is lit
-  /// again within longest_dark(), and no longer in a row than a code is dark: it was hidden then,
-  /// which says nothing. Nor do the first and last frame of a row if the track goes dark more often
-  /// than any code: a blade passes in front of it.
+  /// Nothing was seen where the track is predicted. The frame counts as dark only if the track is
+  /// lit again within longest_dark(). Rows of dark frames longer than any code's are ignored,
+  /// because the light was hidden. If the track goes dark more often than any code, a blade passes
+  /// in front of it, and the first and last frame of each row are ignored as well.
   void observe_dark(BlinkEvidence& evidence, Timestamp stamp) const;
   /// The light of `evidence` was hidden, and one is seen at `now` where it is expected. What it
   /// showed becomes the prior: it is the same light in its phase, or, with probability `stranger`,
-  /// any other. Without a code it has to be decided anew.
+  /// any other. It has to be decided anew.
   void resume(BlinkEvidence& evidence, Timestamp now, double stranger) const;
-  /// Whether resume() has something to go by.
+  /// Whether the evidence is worth keeping for resume().
   [[nodiscard]] static bool is_worth_keeping(const BlinkEvidence& evidence);
   /// Stores the phase in `known` if the board has been identified for two periods.
-  void learn(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const;
+  void update_phase(const BlinkEvidence& evidence, Timestamp now, PhaseMemory& known) const;
 
   /// The robot whose board the track is; empty while undecided or in doubt.
   [[nodiscard]] std::optional<RobotId> id_of(const BlinkEvidence& evidence) const;
+  /// The robot whose board is expected here and blinks as expected so far, while id_of() is still
+  /// empty: for 0.3 s after an absence. It is to be read in this time.
+  [[nodiscard]] std::optional<RobotId> predicted_id(const BlinkEvidence& evidence,
+                                                    Timestamp now) const;
   [[nodiscard]] static bool is_identified(const BlinkEvidence& evidence);
   [[nodiscard]] RobotId code_id(const CodeMatch& match) const { return codes_[match.code].id; }
+  /// The index of the robot's code; empty without one.
+  [[nodiscard]] std::optional<std::size_t> code_of(RobotId robot) const;
   /// The probability that the assigned board is lit at `stamp`; empty while none is assigned.
   [[nodiscard]] std::optional<double> lit_probability(const BlinkEvidence& evidence,
                                                       Timestamp stamp) const;

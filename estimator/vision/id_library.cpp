@@ -1,5 +1,7 @@
 #include "estimator/vision/id_library.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -33,7 +35,7 @@ bool are_alike(const MemberConfig& a, const MemberConfig& b) {
 Result<BlinkCode> BlinkCode::from_pattern(std::string_view pattern, Duration slot) {
   if (pattern.size() < kMinPatternSlots || pattern.size() > kMaxPatternSlots) {
     return fail(ErrorCode::kConfig,
-                "pattern: must have 8 to 32 slots, has " + std::to_string(pattern.size()));
+                fmt::format("pattern: must have 8 to 32 slots, has {}", pattern.size()));
   }
   if (pattern.find_first_not_of("01") != std::string_view::npos)
     return fail(ErrorCode::kConfig, "pattern: may hold 0 and 1 only");
@@ -99,19 +101,18 @@ Result<IdLibrary> IdLibrary::from(const SwarmConfig& swarm) {
   IdLibrary library;
   for (std::size_t i = 0; i < swarm.members.size(); ++i) {
     const MemberConfig& member = swarm.members[i];
-    const std::string where = "swarm.members[" + std::to_string(i) + "]";
+    const std::string where = fmt::format("swarm.members[{}]", i);
     Result<BlinkCode> code = BlinkCode::from(member, swarm);
     if (!code) return tl::unexpected(std::move(code.error()).with_context(where));
     for (std::size_t j = 0; j < i; ++j) {
       const MemberConfig& other = swarm.members[j];
       if (other.id == member.id) {
-        return fail(ErrorCode::kConfig,
-                    where + ": id " + std::to_string(member.id.value) + " is taken");
+        return fail(ErrorCode::kConfig, fmt::format("{}: id {} is taken", where, member.id.value));
       }
       if (are_alike(member, other)) {
-        return fail(ErrorCode::kConfig, where + ": blinks like member " +
-                                            std::to_string(other.id.value) +
-                                            ": they cannot be told apart");
+        return fail(ErrorCode::kConfig,
+                    fmt::format("{}: blinks like member {}: they cannot be told apart", where,
+                                other.id.value));
       }
     }
     library.entries_.push_back({member.id, *std::move(code)});

@@ -43,6 +43,7 @@ class BlinkCode {
 /// The codes of all members. No two are the same signal, however shifted in time.
 class IdLibrary {
  public:
+  /// A robot and its code.
   struct Entry {
     RobotId id{};
     BlinkCode code;

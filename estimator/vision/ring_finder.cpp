@@ -54,7 +54,7 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 double tolerance(double radius) { return kMaxRms + kMaxRmsOfRadius * radius; }
 
-/// In the order in which they surround their middle. False where the outline is bent inwards.
+/// Orders the lights by their angle about the middle. False if the outline is not convex.
 bool order_around(std::span<const Light> lights, std::span<std::uint32_t> members) {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const std::uint32_t i : members) middle += place_of(lights[i]);
@@ -164,7 +164,7 @@ void RingFinder::link_neighbors() {
   });
 }
 
-/// Rings that other lights are too near to, from four LEDs in a row, the second of which is b.
+/// Finds rings that have other lights too near, from four LEDs in a row. The second of them is b.
 void RingFinder::grow_from(std::uint32_t b) {
   const auto is_usable = [&](std::uint32_t i, std::uint32_t other) {
     return i != other && is_taken_[i] == 0;
@@ -348,8 +348,8 @@ std::optional<Ring> RingFinder::arc_after(std::span<const std::uint32_t> members
   return complete(ring, *best, best_shift) ? std::optional(ring) : std::nullopt;
 }
 
-/// Fits the lights, which are the LEDs from `shift` on, and looks for the others. False where they
-/// do not fit, or there is light in the place of an LED and no LED.
+/// Fits the lights as the LEDs from `shift` on, and searches the other LEDs. False if the fit is
+/// poor, or if the place of another LED is lit by something that is not an LED.
 bool RingFinder::complete(Ring& ring, const RingShape& shape, std::size_t shift) const {
   const std::size_t leds = shape.places.size();
   Points seen;
@@ -470,7 +470,7 @@ bool RingFinder::is_lit(const Eigen::Vector2d& uv) const {
          image_->row(v)[u] >= threshold_;
 }
 
-/// Whether no light that is free could belong to a larger ring with these.
+/// Whether no free light could form a larger ring with these.
 bool RingFinder::is_alone(const Ring& ring) const {
   const double reach = kAlone * ring.view.radius();
   const auto members = ring.members();
@@ -486,7 +486,7 @@ bool RingFinder::is_alone(const Ring& ring) const {
   return true;
 }
 
-/// Whether so few lights, or an arc, look the way they do because they are a ring.
+/// Whether a ring of few lights, or an arc, has enough evidence to be accepted.
 bool RingFinder::is_credible(const Ring& ring) const {
   if (ring.is_whole() && ring.count > kFew) return true;
   const double radius = ring.view.radius();

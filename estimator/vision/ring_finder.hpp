@@ -1,4 +1,4 @@
-/// The LEDs of one board to one board.
+/// Groups the separate LEDs of a near board into one detection.
 #pragma once
 
 #include <array>
@@ -38,16 +38,17 @@ struct Ring {
 /// Finds boards so near that their LEDs are lights of their own: rings of 4 to 16 LEDs, round or
 /// square, seen up to 73 degrees aslant, whole or in part.
 ///
-/// Lights are joined, the nearest first, into a tree of groups: the LEDs of a ring are a group of
-/// it, and where another light is too near, some arcs are. Each group is held against every shape
-/// with as many LEDs or, as an arc, with more. An arc tells where the others should be: they are
-/// added where there is light, and must be dark else. Whole rings are taken before arcs, and those
-/// of most lights first. What is left has other lights too near to it: four LEDs in a row tell the
-/// rest of their ring as well.
+/// Single-linkage clustering joins the lights, the nearest first, into a tree of groups. All LEDs
+/// of a ring are one group of this tree. If another light is too near, only arcs of the ring are
+/// groups. Each group is compared with every shape that has as many LEDs. As an arc, it is also
+/// compared with shapes of more LEDs: an arc predicts where the other LEDs are. They are added
+/// where there is light; where there is none, the picture must be dark. Whole rings are accepted
+/// before arcs, and rings of many lights before rings of few. The remaining rings have other lights
+/// too near: they are predicted from four LEDs in a row.
 ///
-/// Many things look like few LEDs. Four lights are a ring, and four of more an arc, where they are
-/// alike, and alone. Three are where they are the half of six, and parts of one blob, or bright and
-/// closer together than robots fly.
+/// Few lights are weak evidence. Four lights are accepted, as a ring or as an arc of more LEDs,
+/// only if they are alike and alone. Three lights are accepted only as half of a ring of six: if
+/// they are parts of one blob, or bright and closer together than robots fly.
 class RingFinder {
  public:
   RingFinder();
@@ -79,7 +80,7 @@ class RingFinder {
   [[nodiscard]] bool complete(Ring& ring, const RingShape& shape, std::size_t shift) const;
   [[nodiscard]] std::optional<Ring> half_ring(std::span<const std::uint32_t> members) const;
   [[nodiscard]] bool are_alike(std::span<const std::uint32_t> members, double factor) const;
-  /// Whether they are as bright as LEDs nearby are.
+  /// Whether they are as bright as LEDs at this distance.
   [[nodiscard]] bool are_leds(std::span<const std::uint32_t> members) const;
   [[nodiscard]] bool is_lit(const Eigen::Vector2d& uv) const;
   [[nodiscard]] bool is_alone(const Ring& ring) const;

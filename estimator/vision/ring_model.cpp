@@ -84,9 +84,9 @@ std::optional<RingView> fit_from_afar(std::span<const Eigen::Vector2d> seen,
   return view;
 }
 
-/// Least squares over  w (1 + g q) = x p,  p = (1, q), in which w is what is seen and x are the
-/// coefficients of either coordinate. It is linear in x and g, and x is eliminated; beforehand
-/// g ~ N(0, (radius / f)^2), without which a few LEDs in a short arc would tell any perspective.
+/// Least squares over  w (1 + g q) = x p,  p = (1, q), where w is the observed position and x are
+/// the coefficients of one coordinate. The problem is linear in x and g, and x is eliminated. The
+/// prior is  g ~ N(0, (radius / f)^2) : without it, a few LEDs in a short arc fit any perspective.
 std::optional<RingView> fit_perspective(const RingView& from_afar,
                                         std::span<const Eigen::Vector2d> seen,
                                         std::span<const Eigen::Vector2d> places) {

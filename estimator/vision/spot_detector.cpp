@@ -125,7 +125,7 @@ Detection SpotDetector::detect(const GrayImage& image) {
       found.failure = failure_;
     }
   } else {
-    hot_pixels_.look(image, found.faint_threshold);
+    hot_pixels_.add_frame(image, found.faint_threshold);
     found.hot_pixels = hot_pixels_.known();
     is_noise = !search_levels(image, sample, found);
     select(found.rejected);

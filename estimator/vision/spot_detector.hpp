@@ -22,6 +22,7 @@
 
 namespace crepes {
 
+/// Whether the exposure of a picture suits the detector.
 enum class Exposure : std::uint8_t {
   kGood,
   kDark,    ///< nothing stands out
@@ -38,6 +39,7 @@ struct Rejected {
   Rejected& operator+=(const Rejected& other);
 };
 
+/// The spots of one picture, and how the picture is exposed.
 struct Detection {
   std::span<const Spot> spots;  ///< brightest first; valid until the next detect()
   int background = 0;           ///< median gray level of the darkest part of the picture

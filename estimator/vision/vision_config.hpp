@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// The algorithm that finds spots.
 enum class SpotDetectorKind : std::uint8_t { kFast, kHough };
 inline constexpr std::array kSpotDetectors{Choice{"fast", SpotDetectorKind::kFast},
                                            Choice{"hough", SpotDetectorKind::kHough}};

@@ -8,6 +8,7 @@
 extern "C" {
 #endif
 
+/// Where a board is in its code.
 struct led_blink {
   uint32_t pattern;
   uint16_t slot_ticks[2];  ///< of a dark slot, of a lit slot

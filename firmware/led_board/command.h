@@ -16,6 +16,7 @@ enum led_effect {
   LED_EFFECT_TEST,   ///< steady light for test_ticks
 };
 
+/// The state that commands change.
 struct led_board {
   struct led_flash flash;
   struct led_settings settings;  ///< as in flash

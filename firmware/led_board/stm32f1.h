@@ -6,24 +6,31 @@
 
 typedef volatile uint32_t reg32;
 
+/// The registers of the clocks.
 struct rcc {
   reg32 CR, CFGR, CIR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR, BDCR, CSR;
 };
+/// The registers of the flash memory.
 struct flash_interface {
   reg32 ACR, KEYR, OPTKEYR, SR, CR, AR;
 };
+/// The registers of a port.
 struct gpio {
   reg32 CRL, CRH, IDR, ODR, BSRR, BRR;
 };
+/// The registers of a serial port.
 struct usart {
   reg32 SR, DR, BRR, CR1, CR2, CR3;
 };
+/// The registers of a timer.
 struct timer {
   reg32 CR1, CR2, SMCR, DIER, SR, EGR, CCMR1, CCMR2, CCER, CNT, PSC, ARR, RCR, CCR[4];
 };
+/// The registers of the watchdog.
 struct watchdog {
   reg32 KR, PR, RLR, SR;
 };
+/// The registers of the processor's timer.
 struct systick {
   reg32 CTRL, LOAD, VAL;
 };

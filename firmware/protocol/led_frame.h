@@ -21,6 +21,7 @@ enum {
   LED_LINE_SILENCE_MS = 20,
 };
 
+/// A message and its type.
 struct led_frame {
   uint8_t type;
   uint8_t size;  ///< of the payload

@@ -17,6 +17,7 @@ enum {
   LED_TEST_MAX_MS = 60000,
 };
 
+/// The types of messages.
 enum led_message {
   LED_GET = 0x01,   ///< no payload -> LED_SETTINGS
   LED_SET = 0x02,   ///< struct led_settings -> LED_SETTINGS as stored, or LED_REFUSED
@@ -28,6 +29,7 @@ enum led_message {
   LED_REFUSED = 0x8F,  ///< u8 type of the request, u8 enum led_fault
 };
 
+/// Why a request was refused.
 enum led_fault {
   LED_FINE,
   LED_BAD_REQUEST,     ///< unknown type, or a payload of another size
@@ -42,7 +44,7 @@ enum led_fault {
 /// How a board blinks: slot i of a period is lit when bit i of `pattern` is set, for lit_ticks,
 /// and dark for dark_ticks otherwise.
 ///
-/// A pattern has 8 to 32 slots of lit_ticks = dark_ticks, 2 to 50 ms. A duty code has two, the
+/// A pattern has 8 to 32 slots of lit_ticks = dark_ticks, 2 to 70 ms. A duty code has two, the
 /// first of them lit, each at least 0.5 ms and together 10 to 200 ms.
 struct led_settings {
   uint16_t robot_id;  ///< 1 to 65534; 0: never set, the board stays dark
@@ -53,6 +55,7 @@ struct led_settings {
   uint8_t brightness[LED_COUNT];  ///< percent
 };
 
+/// The answer to LED_ASK.
 struct led_status {
   uint8_t protocol;
   uint8_t version[3];    ///< of the firmware
@@ -61,6 +64,7 @@ struct led_status {
   uint16_t skipped;      ///< received bytes outside frames
 };
 
+/// What drives the clock of the board.
 enum led_clock {
   LED_CLOCK_CRYSTAL,    ///< 24 MHz from the crystal
   LED_CLOCK_RC,         ///< 24 MHz from the internal oscillator, with an error of 1 % at most

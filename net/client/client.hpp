@@ -27,6 +27,7 @@
 
 namespace crepes::client {
 
+/// Three coordinates.
 struct Vector {
   double x = 0.0;
   double y = 0.0;
@@ -83,6 +84,7 @@ struct Pose {
 struct Status {
   using Totals = std::map<std::string, std::uint64_t>;  ///< by name
 
+  /// A neighbor's datagrams.
   struct Reports {
     std::uint64_t received = 0;
     std::uint64_t lost = 0;
@@ -90,6 +92,7 @@ struct Status {
     double age_s = 0.0;
     double loss = 0.0;  ///< of the last seconds
   };
+  /// One neighbor of the robot.
   struct Neighbor {
     std::uint16_t peer = 0;
     std::string name;
@@ -100,6 +103,7 @@ struct Status {
     std::optional<Reports> reports;
     std::vector<std::string> faults;  ///< what the team finds wrong with it
   };
+  /// One sensor of the robot.
   struct Sensor {
     std::string name;
     double rate_hz = 0.0;
@@ -107,6 +111,7 @@ struct Status {
     std::string message;  ///< what is wrong, and what to do
     Totals faults;
     Totals counts;
+    bool calibrated = true;  ///< false: a camera whose lens is a guess
   };
   /// The neighbor's clock minus ours.
   struct Clock {
@@ -115,12 +120,54 @@ struct Status {
     double skew_ppm = 0.0;
     double sigma_s = 0.0;
   };
+  /// How datagrams between robots are protected, and their airtime.
   struct Mesh {
     bool sealed = false;
     bool signs = false;
     std::string warning;  ///< who could speak for whom
     double airtime = 0.0;
     double airtime_of_all = 0.0;
+  };
+
+  /// A value with its one sigma; a scalar has one component.
+  struct Estimate {
+    std::vector<double> value;
+    std::vector<double> sigma;
+  };
+  /// How well measurements of a kind agree with what was expected of them.
+  struct Residual {
+    std::optional<double> nis;  ///< mean normalized innovation squared for each dimension
+    std::uint64_t fused = 0;
+    std::uint64_t refused = 0;
+  };
+  /// How far a camera points from where its calibration says.
+  struct Camera {
+    std::vector<double> p_body_camera;  ///< [m]
+    std::string state;                  ///< "calibrated", "turned" or "left_out"
+    std::map<std::string, Estimate> estimates;
+  };
+  /// A robot as the team's filter knows it.
+  struct TeamRobot {
+    std::uint16_t robot = 0;
+    std::string name;
+    bool trusted = false;
+    std::map<std::string, double> nis;          ///< by kind
+    std::map<std::string, Residual> residuals;  ///< by kind; only if asked for this robot
+    std::map<std::string, Estimate> calibration;
+    std::vector<Camera> cameras;
+    std::vector<std::string> faults;
+  };
+  /// The robots that the team's filter estimates.
+  struct Team {
+    std::optional<double> age_s;  ///< of the newest solution; empty without one
+    std::vector<TeamRobot> robots;
+  };
+  /// What a neighbor's own filter knows of the sensors.
+  struct Pair {
+    std::uint16_t peer = 0;
+    std::string name;
+    std::map<std::string, Residual> residuals;
+    std::map<std::string, Estimate> calibration;
   };
 
   std::uint16_t self = 0;
@@ -135,6 +182,8 @@ struct Status {
   Totals queues;
   Totals network;
   std::optional<Mesh> mesh;
+  std::optional<Team> team;   ///< only if asked for
+  std::optional<Pair> pair;   ///< only if asked for
   bool is_truncated = false;  ///< parts are missing, because a datagram is short
 };
 
@@ -155,7 +204,8 @@ struct Answer {
 };
 
 /// A request for STATUS that is repeated every `period_s`: of everything as far as it fits, of one
-/// neighbor, or of one part ("sensors" or "network").
+/// neighbor, or of one part: "sensors", "network", "team" (of `peer` in full, if there is one) or
+/// "pair" of `peer`.
 struct Poll {
   std::optional<std::uint16_t> peer{};
   std::string about{};

@@ -100,7 +100,10 @@ std::optional<Answer> Conversation::take(std::string datagram, Time now) {
       version_ = *version;
       renew_within(version->lease_s);
     }
-    return Answer{std::move(*message), std::move(datagram)};
+    std::optional<Answer> answer(std::in_place);
+    answer->message = std::move(*message);
+    answer->text = std::move(datagram);
+    return answer;
   }
   const std::optional<std::string> cookie = cookie_in(datagram);
   if (!cookie) {

@@ -106,7 +106,8 @@ Status::Sensor sensor_from(const json& object) {
           object.value("ok", false),
           object.value("message", ""),
           totals_from(object, "faults"),
-          totals_from(object, "counts")};
+          totals_from(object, "counts"),
+          object.value("calibrated", true)};
 }
 
 Status::Clock clock_from(const json& object) {
@@ -125,6 +126,71 @@ void for_each_of(const json& object, const char* list, const Read& read) {
   const auto found = object.find(list);
   if (found == object.end()) return;
   for (const json& entry : *found) read(entry);
+}
+
+Status::Estimate estimate_from(const json& object) {
+  const auto numbers = [](const json& value) {
+    return value.is_array() ? value.get<std::vector<double>>()
+                            : std::vector<double>{value.get<double>()};
+  };
+  return {numbers(object.at("value")), numbers(object.at("sigma"))};
+}
+
+/// Those entries of an object that are estimates.
+std::map<std::string, Status::Estimate> estimates_in(const json& object) {
+  std::map<std::string, Status::Estimate> estimates;
+  for (const auto& [key, value] : object.items())
+    if (value.is_object() && value.contains("sigma")) estimates[key] = estimate_from(value);
+  return estimates;
+}
+
+std::map<std::string, Status::Residual> residuals_from(const json& object) {
+  std::map<std::string, Status::Residual> residuals;
+  const auto found = object.find("residuals");
+  if (found == object.end()) return residuals;
+  for (const auto& [kind, value] : found->items()) {
+    Status::Residual& residual = residuals[kind];
+    if (value.contains("nis")) residual.nis = value["nis"].get<double>();
+    residual.fused = value.value("fused", residual.fused);
+    residual.refused = value.value("refused", residual.refused);
+  }
+  return residuals;
+}
+
+Status::TeamRobot team_robot_from(const json& object) {
+  Status::TeamRobot robot;
+  robot.robot = id_from(object.at("robot"));
+  robot.name = object.value("name", "");
+  robot.trusted = object.value("trusted", false);
+  robot.nis = object.value("nis", robot.nis);
+  robot.residuals = residuals_from(object);
+  robot.faults = object.value("faults", robot.faults);
+  const auto calibration = object.find("calibration");
+  if (calibration == object.end()) return robot;
+  robot.calibration = estimates_in(*calibration);
+  for_each_of(*calibration, "cameras", [&](const json& camera) {
+    robot.cameras.push_back({camera.value("p_body_camera", std::vector<double>()),
+                             camera.value("state", ""), estimates_in(camera)});
+  });
+  return robot;
+}
+
+Status::Team team_from(const json& object) {
+  Status::Team team;
+  if (object.contains("age_s")) team.age_s = object["age_s"].get<double>();
+  for_each_of(object, "robots",
+              [&](const json& robot) { team.robots.push_back(team_robot_from(robot)); });
+  return team;
+}
+
+Status::Pair pair_from(const json& object) {
+  Status::Pair pair;
+  pair.peer = id_from(object.at("peer"));
+  pair.name = object.value("name", "");
+  pair.residuals = residuals_from(object);
+  if (const auto found = object.find("calibration"); found != object.end())
+    pair.calibration = estimates_in(*found);
+  return pair;
 }
 
 Status status_from(const json& object) {
@@ -148,6 +214,8 @@ Status status_from(const json& object) {
   status.queues = totals_from(object, "queues");
   status.network = totals_from(object, "network");
   if (const auto mesh = object.find("mesh"); mesh != object.end()) status.mesh = mesh_from(*mesh);
+  if (const auto team = object.find("team"); team != object.end()) status.team = team_from(*team);
+  if (const auto pair = object.find("pair"); pair != object.end()) status.pair = pair_from(*pair);
   status.is_truncated = object.value("truncated", false);
   return status;
 }

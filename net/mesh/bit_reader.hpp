@@ -16,6 +16,7 @@ class BitReader {
 
   explicit BitReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
+  /// The next `count` bits; at most 32.
   [[nodiscard]] std::uint64_t bits(unsigned count) {
     if (count > remaining()) return fail();
     std::uint64_t value = 0;
@@ -30,6 +31,7 @@ class BitReader {
     return value;
   }
 
+  /// A number as `BitWriter::number` wrote it.
   [[nodiscard]] std::uint64_t number(unsigned k) {
     unsigned width = k;
     while (ok_ && bits(1) == 0)
@@ -37,6 +39,7 @@ class BitReader {
     return ok_ ? ((std::uint64_t{1} << width) | bits(width)) - (std::uint64_t{1} << k) : 0;
   }
 
+  /// A number as `BitWriter::signed_number` wrote it.
   [[nodiscard]] std::int64_t signed_number(unsigned k) {
     const std::uint64_t code = number(k);
     const auto half = static_cast<std::int64_t>(code >> 1U);

@@ -22,6 +22,7 @@ constexpr double kMaxSlew = 1e-3;      // s/s
 constexpr double kSlewTime = 1.0;      // s
 constexpr double kMaxCorrection = 20e-3;  // s: more is stepped, because slewing would be too slow
 constexpr Duration kRecent = std::chrono::milliseconds{500};
+constexpr std::size_t kMaxRecent = 256;  // packets of that time; a peer sends 50
 
 using Bounds = std::vector<OffsetBound>;
 
@@ -73,6 +74,7 @@ ClockOffset::Verdict ClockOffset::add_packet(const PacketTimes& packet) {
   early_packets_ = 0;
   now_ = std::max(now_, bound.t);
   std::erase_if(recent_, [&](const auto& p) { return p.arrival < packet.arrival - kRecent; });
+  if (recent_.size() == kMaxRecent) recent_.erase(recent_.begin());
   recent_.push_back(packet);
   if (lower_.offer(bound, fit_ ? fit_->skew : 0.0)) refit();
   advance();

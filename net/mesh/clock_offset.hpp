@@ -30,6 +30,7 @@ struct PacketTimes {
 
 class ClockOffset {
  public:
+  /// What became of a packet.
   enum class Verdict : std::uint8_t {
     kUsed,
     kImplausible,  ///< contradicts the estimate; its stamps must not be used

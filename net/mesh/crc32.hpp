@@ -6,6 +6,7 @@
 
 namespace crepes {
 
+/// The checksum of the bytes.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::uint8_t> bytes);
 
 }  // namespace crepes

@@ -8,10 +8,10 @@ namespace crepes {
 
 class LossMeter {
  public:
-  /// A datagram arrived, and `missing` of the session's are missing now.
+  /// A datagram arrived; until now `missing` datagrams of the session have not.
   void update(std::uint64_t missing);
-  /// The same of a peer that is not heard directly: of its datagrams, one in `spacing` is
-  /// forwarded, and this is number `sequence`.
+  /// The same for a peer that is not heard directly. One in `spacing` of its datagrams is
+  /// forwarded; this one has the number `sequence`.
   void update_forwarded(std::uint64_t missing, std::uint32_t sequence, std::uint32_t spacing);
 
   /// Of the recent datagrams that should have arrived.

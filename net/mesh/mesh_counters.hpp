@@ -62,12 +62,19 @@ inline constexpr std::size_t kMeshCounterCount = 42;
 
 /// As STATUS and report.json call it.
 [[nodiscard]] std::string_view name_of(MeshCounter counter);
+/// Whether it counts what was refused.
+[[nodiscard]] constexpr bool is_refusal(MeshCounter counter) {
+  return counter >= MeshCounter::kRefusedBadCovariance &&
+         counter <= MeshCounter::kRefusedUnknownSender;
+}
 /// The counter of datagrams that are refused for this reason.
 [[nodiscard]] MeshCounter counter_of(PeerMessageError error);
+/// The counter of datagrams that cannot be opened for this reason.
 [[nodiscard]] MeshCounter counter_of(UnsealError error);
 
 class MeshCounters {
  public:
+  /// Adds to a total.
   void add(MeshCounter counter, std::uint64_t count = 1) { totals_[index_of(counter)] += count; }
 
   [[nodiscard]] std::uint64_t operator[](MeshCounter counter) const {

@@ -48,6 +48,11 @@ bool MeshRelay::is_heard(RobotId sender, Timestamp now) const {
   return known != neighbors_.end() && is_in_reach(known->second, now);
 }
 
+bool MeshRelay::is_neighbor(const Endpoint& address) const {
+  return std::ranges::any_of(
+      neighbors_, [&](const auto& neighbor) { return neighbor.second.address == address; });
+}
+
 bool MeshRelay::is_needed(Timestamp now) const {
   return std::ranges::any_of(neighbors_, [&](const auto& neighbor) {
     return is_in_reach(neighbor.second, now) &&
@@ -73,9 +78,10 @@ std::size_t MeshRelay::missed_by(const std::vector<RobotId>& sent_by, Timestamp 
   return static_cast<std::size_t>(count);
 }
 
-void MeshRelay::note_sent(Offer& offer, const Endpoint& from) const {
+void MeshRelay::record_sent(Offer& offer, const Endpoint& from) const {
   for (const auto& [id, neighbor] : neighbors_)
-    if (neighbor.address == from && id != offer.id.sender) offer.sent_by.push_back(id);
+    if (neighbor.address == from && std::ranges::find(offer.sent_by, id) == offer.sent_by.end())
+      offer.sent_by.push_back(id);
 }
 
 void MeshRelay::offer(const DatagramId& id, std::span<const std::uint8_t> bytes,
@@ -83,17 +89,17 @@ void MeshRelay::offer(const DatagramId& id, std::span<const std::uint8_t> bytes,
   offers_.push_front(
       {.id = id, .at = now, .sent_by = {id.sender}, .bytes = {bytes.begin(), bytes.end()}});
   Offer& offer = offers_.front();
-  note_sent(offer, from);
+  record_sent(offer, from);
   const auto missed = static_cast<double>(missed_by(offer.sent_by, now));
   offer.due = now + from_seconds(drawn(self_, id) * std::min(kLongestWait, kWait / missed));
   while (offers_.size() > kMaxOffers || !is_recent(offers_.back().at, now, kOfferMemory))
     offers_.pop_back();
 }
 
-bool MeshRelay::note_copy(const DatagramId& id, const Endpoint& from) {
+bool MeshRelay::record_copy(const DatagramId& id, const Endpoint& from) {
   const auto offer = std::ranges::find(offers_, id, &Offer::id);
   if (offer == offers_.end()) return false;
-  note_sent(*offer, from);
+  record_sent(*offer, from);
   return true;
 }
 

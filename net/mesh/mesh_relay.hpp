@@ -1,13 +1,14 @@
 /// Which datagrams are forwarded to robots that do not hear their sender. Pure.
 ///
-/// A robot depends on others when a robot that it hears hears one that it does not hear. Then it
-/// marks one datagram in a few, which carries more than the rest. Only these are forwarded: once,
-/// by robots that hear one that hears neither the sender nor anybody who has forwarded it until
-/// then (Peng, Lu 2000). They wait for a random time, the shorter the more robots they would reach.
-/// A datagram without the mark is never forwarded, so who sends one is heard directly.
+/// A robot needs forwarding if one of its neighbors hears a robot that it does not hear itself. It
+/// then marks one datagram in a few; a marked one repeats the contents since the last mark. Only
+/// marked datagrams are forwarded. A robot forwards one once, if one of its neighbors hears neither
+/// the sender nor any robot that has already forwarded it (Peng, Lu 2000). It first waits for a
+/// random time, which is shorter the more robots it would reach. Datagrams without the mark are
+/// never forwarded, so their sender is heard directly.
 ///
-/// Who forwarded a datagram is known by its address. To forge it keeps others from forwarding, as
-/// noise on the air would.
+/// The source address identifies the forwarder. A forged address can suppress forwarding, which
+/// jamming could do as well.
 #pragma once
 
 #include <chrono>
@@ -26,7 +27,7 @@
 
 namespace crepes {
 
-/// What tells a datagram from all others.
+/// Identifies a datagram.
 struct DatagramId {
   RobotId sender{};
   std::uint64_t session = 0;
@@ -34,37 +35,41 @@ struct DatagramId {
   [[nodiscard]] bool operator==(const DatagramId&) const = default;
 };
 
-/// Datagrams of the session for each that is marked, where one is sent for each `reports` reports:
-/// about four marked ones a second, and at most every second one.
+/// One datagram in this many is marked, if one is sent for every `reports` reports: about four
+/// marked ones a second, and at most every second one.
 [[nodiscard]] std::uint32_t mark_spacing(std::size_t reports);
 
 class MeshRelay {
  public:
   explicit MeshRelay(RobotId self) : self_(self) {}
 
-  /// Between datagrams, of this robot and, more or less, of the others. The longer it is, the later
-  /// a silent robot is out of reach.
+  /// The time between datagrams of this robot, and roughly of the others. A silent robot counts as
+  /// out of reach after a multiple of it.
   void set_period(Duration period) { period_ = period; }
 
   /// A datagram without the mark arrived: its sender is heard directly.
-  void note_heard(RobotId sender, const Endpoint& from, Timestamp at) {
+  void record_heard(RobotId sender, const Endpoint& from, Timestamp at) {
     neighbors_[sender].heard = at;
     neighbors_[sender].address = from;
   }
   /// The neighbor says that it hears `other` directly.
-  void note_hears(RobotId neighbor, RobotId other, Timestamp at) {
+  void record_hears(RobotId neighbor, RobotId other, Timestamp at) {
     neighbors_[neighbor].hears[other] = at;
   }
 
+  /// Whether datagrams of this robot arrive directly.
   [[nodiscard]] bool is_heard(RobotId sender, Timestamp now) const;
+  /// Whether a robot that was heard directly has this address.
+  [[nodiscard]] bool is_neighbor(const Endpoint& address) const;
   /// Whether this robot should mark datagrams.
   [[nodiscard]] bool is_needed(Timestamp now) const;
 
-  /// A marked datagram, new and authentic. `from` is its source, the sender or who forwarded it.
+  /// Considers a new and authentic marked datagram for forwarding. `from` is its source address:
+  /// the sender's or the forwarder's.
   void offer(const DatagramId& id, std::span<const std::uint8_t> bytes, const Endpoint& from,
              Timestamp now);
   /// A datagram arrived again. True if it is one that was offered.
-  bool note_copy(const DatagramId& id, const Endpoint& from);
+  bool record_copy(const DatagramId& id, const Endpoint& from);
   /// When `take_due` should be called next; empty if nothing waits.
   [[nodiscard]] std::optional<Timestamp> next_due() const;
   /// What to broadcast now, the newest first.
@@ -87,7 +92,7 @@ class MeshRelay {
 
   /// Robots that are heard and hear none of these.
   [[nodiscard]] std::size_t missed_by(const std::vector<RobotId>& sent_by, Timestamp now) const;
-  void note_sent(Offer& offer, const Endpoint& from) const;
+  void record_sent(Offer& offer, const Endpoint& from) const;
 
   [[nodiscard]] bool is_in_reach(const Neighbor& neighbor, Timestamp now) const;
   [[nodiscard]] bool is_believed(Timestamp said, Timestamp now) const;

@@ -1,4 +1,4 @@
-/// Whom a robot believes on the mesh.
+/// Which robots must sign their datagrams, and which are not heard.
 #pragma once
 
 #include <map>

@@ -3,6 +3,7 @@
 #include <sodium.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "estimator/core/contract.hpp"
 #include "net/mesh/locked_key.hpp"
@@ -39,7 +40,11 @@ std::uint64_t random_salt() {
   return salt;
 }
 
-PacketSeal::PacketSeal(const MeshKey& key) : key_(locked(key)) {}
+PacketSeal::PacketSeal(const MeshKey& key) {
+  LockedKey<MeshKey> own = locked(key);
+  key_ = std::move(own.key);
+  is_locked_ = own.is_locked;
+}
 
 std::vector<std::uint8_t> PacketSeal::seal(std::span<const std::uint8_t> plain) const {
   CREPES_EXPECT(plain.size() >= kClearHeader, "a datagram has a header");

@@ -47,9 +47,13 @@ class PacketSeal {
 
   explicit PacketSeal(const MeshKey& key);
 
+  /// False if the system refuses to lock the memory of the key: then it may be swapped.
+  [[nodiscard]] bool is_locked() const { return is_locked_; }
+
   /// Seals a datagram of `encode_peer_message`. Of those with equal first 18 bytes, only one may
   /// ever be sealed: two would reveal each other.
   [[nodiscard]] std::vector<std::uint8_t> seal(std::span<const std::uint8_t> plain) const;
+  /// The datagram before it was sealed, or why it cannot be opened.
   [[nodiscard]] tl::expected<std::vector<std::uint8_t>, UnsealError> open(
       std::span<const std::uint8_t> sealed) const;
 
@@ -57,7 +61,8 @@ class PacketSeal {
   [[nodiscard]] static bool is_sealed(std::span<const std::uint8_t> datagram);
 
  private:
-  std::shared_ptr<const MeshKey> key_;  ///< in memory that is not swapped and not dumped
+  std::shared_ptr<const MeshKey> key_;  ///< in memory of its own (`locked_key.hpp`)
+  bool is_locked_ = false;
 };
 
 }  // namespace crepes

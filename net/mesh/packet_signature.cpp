@@ -3,6 +3,7 @@
 #include <sodium.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "estimator/core/contract.hpp"
 #include "net/mesh/locked_key.hpp"
@@ -58,7 +59,11 @@ std::optional<PublicKey> parse_public_key(std::string_view text) {
   return key;
 }
 
-PacketSigner::PacketSigner(const RobotKey& key) : key_(locked(key)) {}
+PacketSigner::PacketSigner(const RobotKey& key) {
+  LockedKey<RobotKey> own = locked(key);
+  key_ = std::move(own.key);
+  is_locked_ = own.is_locked;
+}
 
 std::vector<std::uint8_t> PacketSigner::sign(std::span<const std::uint8_t> plain) const {
   CREPES_EXPECT(plain.size() >= kClearHeader, "a datagram has a header");

@@ -2,7 +2,7 @@
 ///
 /// A signed datagram has the bit `kSignedMark` in its version. It ends with the 64 bytes of the
 /// signature of all bytes before: version, sender, session, sequence number and contents. A seal
-/// is put around it. Whoever has the swarm's key and no robot's own cannot make one.
+/// is put around it. The swarm's key alone is not sufficient to make one.
 #pragma once
 
 #include <array>
@@ -41,6 +41,7 @@ struct RobotKey {
 [[nodiscard]] RobotKey robot_key_of(std::span<const std::uint8_t, 32> seed);
 /// Whether the public part belongs to the seed.
 [[nodiscard]] bool is_whole(const RobotKey& key);
+/// The public part of a key.
 [[nodiscard]] PublicKey public_key_of(const RobotKey& key);
 
 /// Base64, 44 characters.
@@ -48,17 +49,22 @@ struct RobotKey {
 /// Empty for a text that is not a key, and for points that make every signature valid.
 [[nodiscard]] std::optional<PublicKey> parse_public_key(std::string_view text);
 
+/// Signs the datagrams of this robot.
 class PacketSigner {
  public:
   static constexpr std::size_t kOverhead = 64;  ///< bytes that signing adds
 
   explicit PacketSigner(const RobotKey& key);
 
+  /// False if the system refuses to lock the memory of the key: then it may be swapped.
+  [[nodiscard]] bool is_locked() const { return is_locked_; }
+
   /// Signs a datagram of `encode_peer_message`. Equal datagrams have equal signatures.
   [[nodiscard]] std::vector<std::uint8_t> sign(std::span<const std::uint8_t> plain) const;
 
  private:
-  std::shared_ptr<const RobotKey> key_;  ///< in memory that is not swapped and not dumped
+  std::shared_ptr<const RobotKey> key_;  ///< in memory of its own (`locked_key.hpp`)
+  bool is_locked_ = false;
 };
 
 /// Whether a datagram that is not sealed has the mark of a signed one, and room for a signature.

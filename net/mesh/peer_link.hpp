@@ -1,11 +1,5 @@
 /// The protocol of the mesh without its socket: datagrams in, reports on our timeline out.
 ///
-/// A peer that restarts opens a new session. The new session replaces the old one when it has
-/// echoed a recent datagram of ours and the old one is silent. Recorded datagrams that are replayed
-/// cannot do the former, and a second robot with the peer's id does not displace the first. A
-/// session that was replaced returns if it echoes what we sent after that, and the other one is
-/// silent.
-///
 /// Some datagrams are marked: they are forwarded to robots that do not hear their sender
 /// (`mesh_relay.hpp`), as they came, and are the only ones that these robots have of it.
 ///
@@ -15,7 +9,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -23,18 +16,14 @@
 
 #include "estimator/core/outputs.hpp"
 #include "net/endpoint.hpp"
-#include "net/mesh/clock_offset.hpp"
-#include "net/mesh/loss_meter.hpp"
 #include "net/mesh/mesh_counters.hpp"
-#include "net/mesh/mesh_relay.hpp"
 #include "net/mesh/mesh_trust.hpp"
 #include "net/mesh/packet_seal.hpp"
 #include "net/mesh/packet_signature.hpp"
 #include "net/mesh/peer_message.hpp"
+#include "net/mesh/peer_sessions.hpp"
 #include "net/mesh/peer_status.hpp"
-#include "net/mesh/redundancy_filter.hpp"
 #include "net/mesh/send_pacing.hpp"
-#include "net/mesh/sequence_window.hpp"
 #include "net/mesh/signature_limiter.hpp"
 
 namespace crepes {
@@ -45,7 +34,7 @@ class PeerLink {
   PeerLink(RobotId self, const std::vector<RobotId>& members, const SendSettings& settings = {});
 
   /// Removes peers that are no longer members; adds the new ones.
-  void set_members(const std::vector<RobotId>& members);
+  void set_members(const std::vector<RobotId>& members) { sessions_.set_members(members); }
   /// From now on. Sessions remain.
   void set_trust(const MeshTrust& trust) { trust_ = trust; }
   /// The session remains.
@@ -58,8 +47,8 @@ class PeerLink {
       std::span<const std::uint8_t> datagram, Timestamp arrival,
       const std::optional<PacketSeal>& seal = std::nullopt, const Endpoint& from = {});
 
-  /// Whether it is time for a datagram. Where the air is short, what a report has waits for the
-  /// next one that is sent.
+  /// Whether a datagram is due. Where airtime is short, the contents of a report wait for the next
+  /// datagram.
   [[nodiscard]] bool is_due(Timestamp now) const;
   /// The datagram to broadcast immediately; `now` is the time of sending.
   [[nodiscard]] std::vector<std::uint8_t> compose(
@@ -68,41 +57,27 @@ class PeerLink {
   /// Datagrams of others to broadcast immediately, as they came.
   [[nodiscard]] std::vector<std::vector<std::uint8_t>> forwards(Timestamp now);
   /// When to call `forwards`; empty if nothing waits.
-  [[nodiscard]] std::optional<Timestamp> next_forward() const { return relay_.next_due(); }
+  [[nodiscard]] std::optional<Timestamp> next_forward() const {
+    return sessions_.relay().next_due();
+  }
 
   /// Peers whose clock is known, ordered by id.
-  [[nodiscard]] std::vector<ClockStatus> clocks() const;
+  [[nodiscard]] std::vector<ClockStatus> clocks() const { return sessions_.clocks(); }
   /// All peers that a datagram was received from, ordered by id.
-  [[nodiscard]] std::vector<PeerTraffic> traffic(Timestamp now) const;
+  [[nodiscard]] std::vector<PeerTraffic> traffic(Timestamp now) const {
+    return sessions_.traffic(now);
+  }
+  /// What was on the air since the start.
+  [[nodiscard]] AirTotals air_totals(Timestamp now) const;
   /// The latest datagram of a second robot that uses our id or a peer's.
-  [[nodiscard]] const std::optional<DoubledId>& doubled_id() const { return doubled_; }
+  [[nodiscard]] const std::optional<DoubledId>& doubled_id() const {
+    return sessions_.doubled_id();
+  }
   /// Since the start: datagrams and bytes in and out, refusals by reason.
-  [[nodiscard]] const MeshCounters& counters() const { return counters_; }
+  [[nodiscard]] const MeshCounters& counters() const { return sessions_.counters(); }
 
  private:
-  struct Session {
-    std::uint64_t id = 0;
-    LossMeter loss;                        ///< of the peer's datagrams, at us
-    std::optional<double> loss_of_ours{};  ///< at the peer
-    ClockOffset clock;
-    SequenceWindow sequence;
-    RedundancyFilter redundancy;
-    PeerTraffic traffic;  ///< includes the earlier sessions
-    Timestamp first_arrival{};
-    Timestamp last_arrival{};
-    bool has_echoed_us = false;  ///< a recent datagram of ours
-  };
-  struct EndedSession {
-    std::uint64_t id = 0;
-    Timestamp at{};
-  };
-  struct Peer {
-    std::optional<Session> live;
-    std::optional<Session> candidate;  ///< has not echoed us yet
-    std::deque<EndedSession> ended;    ///< the latest that were live
-    [[nodiscard]] const std::optional<Session>& heard() const { return live ? live : candidate; }
-  };
-
+  void count(MeshCounter counter, std::uint64_t n = 1) { sessions_.counters().add(counter, n); }
   [[nodiscard]] std::optional<PeerMessage> open(std::span<const std::uint8_t> datagram,
                                                 Timestamp arrival,
                                                 const std::optional<PacketSeal>& seal,
@@ -110,42 +85,25 @@ class PeerLink {
   [[nodiscard]] tl::expected<PeerMessage, MeshCounter> read(std::span<const std::uint8_t> plain,
                                                             Timestamp arrival,
                                                             const Endpoint& from);
+  void count_received(std::size_t bytes, std::optional<MeshCounter> refusal = std::nullopt);
   [[nodiscard]] std::optional<MeshCounter> refusal_of(RobotId sender) const;
   [[nodiscard]] std::optional<MeshCounter> refusal_of(std::span<const std::uint8_t> plain,
                                                       const PeerHeader& header, Timestamp arrival,
                                                       const Endpoint& from);
   [[nodiscard]] bool is_our_own(const PeerHeader& header) const;
-  [[nodiscard]] Session* accept(Peer& peer, const PeerMessage& message, Timestamp arrival,
-                                const Endpoint& from);
-  [[nodiscard]] Session* admit(Peer& peer, const PeerMessage& message, Timestamp arrival,
-                               const Endpoint& from);
-  [[nodiscard]] bool readmit(Peer& peer, const PeerMessage& message, Timestamp arrival);
-  [[nodiscard]] bool update_clock(Session& session, const PeerMessage& message, Timestamp arrival);
-  void count_doubled(MeshCounter counter, RobotId robot, Timestamp now);
-  static void replace_session(Peer& peer, Timestamp now);
-  void update_loss(Session& session, const PeerMessage& message, Timestamp arrival) const;
-  void note_who_hears_whom(const PeerMessage& message, Timestamp arrival, const Endpoint& from);
-  [[nodiscard]] MeshCounter counted_copy(MeshCounter refusal, const DatagramId& id,
-                                         const Endpoint& from);
-  [[nodiscard]] std::optional<Timestamp> sent_by_us(std::uint32_t code, Timestamp now) const;
+  [[nodiscard]] bool is_back(const PeerHeader& header, const Endpoint& from) const;
   [[nodiscard]] std::uint64_t own_session() const;
-  [[nodiscard]] std::size_t heard_directly(Timestamp now) const;
   [[nodiscard]] Pace pace(Timestamp now) const;
-  [[nodiscard]] double worst_loss_of_ours(Timestamp now, bool everywhere) const;
   [[nodiscard]] double forwarded_air(Timestamp now) const;
   [[nodiscard]] WireLimits limits(Timestamp now, std::size_t overhead, std::uint32_t mark) const;
 
   RobotId self_;
   SendSettings settings_;
-  std::map<RobotId, Peer> peers_;  ///< all members except us
+  PeerSessions sessions_;
   MeshTrust trust_;
   SignatureLimiter limiter_;
-  MeshRelay relay_;
   std::deque<std::pair<Timestamp, std::size_t>> forwarded_;  ///< bytes, in the last second
-  MeshCounters counters_;
-  std::optional<DoubledId> doubled_;
   std::optional<Timestamp> first_sent_;
-  std::deque<Timestamp> sent_;  ///< in the last seconds: what a peer may echo
   std::uint32_t next_sequence_ = 0;
 };
 

@@ -36,8 +36,8 @@ struct ClockEcho {
   bool operator==(const ClockEcho&) const = default;
 };
 
-/// Stands for the time of sending in an echo. Differs between datagrams of the last seconds, and
-/// cannot be known to somebody who received none of them.
+/// Represents the time of sending in an echo. It differs between the datagrams of the last seconds,
+/// and only a receiver of the datagram can know it.
 [[nodiscard]] constexpr std::uint32_t echo_code(std::int64_t sent_ns) {
   return static_cast<std::uint32_t>(sent_ns);
 }
@@ -49,7 +49,7 @@ struct BasicPeerMessage {
   Time sent{};                 ///< when the datagram left
   std::uint64_t session = 0;   ///< changes when the sender restarts
   std::uint32_t sequence = 0;  ///< counts the session's datagrams
-  std::uint32_t mark = 0;      ///< to be forwarded, as each so manieth of the session; 0: it is not
+  std::uint32_t mark = 0;      ///< to be forwarded, as one in `mark` of the session; 0: it is not
   std::vector<ClockEcho> echoes;
 };
 
@@ -66,6 +66,7 @@ struct WireLimits {
   double accel_step_mps2 = 1e-2;        ///< coarsest rounding of specific forces
 };
 
+/// A datagram, and the number of measurements that had no room.
 struct EncodedPeerMessage {
   std::vector<std::uint8_t> bytes;
   std::size_t left_out = 0;          ///< neighbors whose newest measurements had no room
@@ -74,10 +75,10 @@ struct EncodedPeerMessage {
   std::size_t refused = 0;           ///< measurements that are not finite or cannot be encoded
 };
 
-/// Encodes what fits. What must give, in this order: of the bearings and ranges of a datagram that
-/// stands for several reports, all but one a neighbor, evenly; their older copies; those of
-/// inertial samples; then as many neighbors as necessary, by turns, and most estimates. Each
-/// datagram has the next one of the estimates and the next three of the echoes, up to eight where
+/// Encodes what fits. If space is short, it omits in this order: bearings and ranges beyond one for
+/// each neighbor, evenly, in a datagram that stands for several reports; older copies of bearings
+/// and ranges; older copies of inertial samples; whole neighbors, by turns, and most estimates.
+/// Each datagram contains the next estimate and the next three echoes, or up to eight echoes where
 /// datagrams are fewer.
 [[nodiscard]] EncodedPeerMessage encode_peer_message(const OutgoingPeerMessage& message,
                                                      const WireLimits& limits = {});

@@ -26,6 +26,7 @@ struct CodedTilt {
   unsigned sigma = 0;
 };
 
+/// A `ClockEcho` in integers.
 struct CodedEcho {
   std::uint16_t peer = 0;
   std::uint32_t sent_code = 0;
@@ -40,11 +41,13 @@ struct Prediction {
   unsigned order = 0;
 };
 
+/// An inertial sample in steps of the rounding.
 struct CodedImuSample {
   std::int64_t age = 0;
   std::array<std::int64_t, 6> values{};  ///< gyro, acceleration
 };
 
+/// All inertial samples of a datagram, in integers.
 struct CodedImu {
   int gyro_exponent = 0;
   int accel_exponent = 0;
@@ -52,6 +55,7 @@ struct CodedImu {
   std::vector<CodedImuSample> samples;
 };
 
+/// A bearing in integers.
 struct CodedBearing {
   std::int64_t age = 0;
   std::uint64_t camera = 0;
@@ -59,6 +63,7 @@ struct CodedBearing {
   std::int64_t sigma = 0;
 };
 
+/// A range in integers.
 struct CodedRange {
   std::int64_t age = 0;
   std::int64_t range_mm = 0;
@@ -73,6 +78,7 @@ struct CodedSource {
   std::vector<CodedRange> ranges;
 };
 
+/// An estimate of a neighbor, in integers.
 struct CodedEstimate {
   std::uint64_t neighbor = 0;
   std::int64_t age = 0;
@@ -84,6 +90,7 @@ struct CodedEstimate {
   std::array<std::int64_t, 15> factor{};
 };
 
+/// Everything after the clear header, in integers.
 struct CodedBody {
   std::uint64_t sent_ns = 0;  ///< two's complement
   unsigned mark = 0;
@@ -101,15 +108,18 @@ struct Bounds {
   std::int64_t min;
   std::int64_t max;
 };
+/// From `-limit` to `limit`.
 [[nodiscard]] constexpr Bounds up_to(std::int64_t limit) { return {-limit, limit}; }
 
 /// Writes the fields that it visits.
 class BodyWriter {
  public:
+  /// A number of `count` bits.
   template <class Value>
   void bits(const Value& value, unsigned count) {
     out_.wide_bits(static_cast<std::uint64_t>(value), count);
   }
+  /// A number of variable length, shortest below 2^k.
   template <class Value>
   void number(const Value& value, unsigned k) {
     out_.number(static_cast<std::uint64_t>(value), k);
@@ -119,14 +129,17 @@ class BodyWriter {
              PeerMessageError /*outside*/) {
     out_.signed_number(value - predicted, k);
   }
+  /// The length of a list.
   template <class Item>
   void size(const std::vector<Item>& items, unsigned k) {
     out_.number(items.size(), k);
   }
+  /// Whether there is a value.
   template <class Item>
   void presence(const std::optional<Item>& item) {
     out_.bits(item ? 1 : 0, 1);
   }
+  /// The writer writes nothing that the reader refuses.
   void expect(bool /*holds*/, PeerMessageError /*fault*/) {}
   [[nodiscard]] std::vector<std::uint8_t> finished() && { return std::move(out_).finished(); }
 
@@ -141,6 +154,7 @@ class BodyReader {
 
   explicit BodyReader(std::span<const std::uint8_t> bytes) : in_(bytes) {}
 
+  /// A number of `count` bits.
   template <class Value>
   void bits(Value& value, unsigned count) {
     constexpr unsigned kHalf = 32;
@@ -148,6 +162,7 @@ class BodyReader {
     if (count > kHalf) code |= in_.bits(count - kHalf) << kHalf;
     value = fault() ? Value{} : static_cast<Value>(code);
   }
+  /// A number of variable length.
   template <class Value>
   void number(Value& value, unsigned k) {
     const std::uint64_t code = in_.number(k);
@@ -160,16 +175,19 @@ class BodyReader {
     expect(value >= bounds.min && value <= bounds.max, outside);
     if (fault()) value = 0;
   }
+  /// The length of a list, at most kMaxItems and what the remaining bits can hold.
   template <class Item>
   void size(std::vector<Item>& items, unsigned k) {
     const std::uint64_t count = in_.number(k);
     expect(count <= kMaxItems && count <= in_.remaining(), PeerMessageError::kTruncated);
     items.resize(fault() ? 0 : static_cast<std::size_t>(count));
   }
+  /// Whether there is a value.
   template <class Item>
   void presence(std::optional<Item>& item) {
     if (in_.bits(1) != 0) item.emplace();
   }
+  /// Keeps the first fault.
   void expect(bool holds, PeerMessageError fault) {
     if (!holds && in_.ok() && !fault_) fault_ = fault;
   }
@@ -195,6 +213,7 @@ void code_age(Stream& stream, std::vector<Item>& items, std::size_t i, unsigned 
   stream.delta(age, predicted, i < 2 ? kFirst : k, up_to(kMaxAge), PeerMessageError::kBadStamp);
 }
 
+/// A direction.
 template <class Stream>
 void code_direction(Stream& stream, std::array<std::int64_t, 2>& direction) {
   for (std::int64_t& component : direction) {
@@ -205,6 +224,7 @@ void code_direction(Stream& stream, std::array<std::int64_t, 2>& direction) {
   }
 }
 
+/// An echo.
 template <class Stream>
 void code_echo(Stream& stream, CodedEcho& echo) {
   constexpr unsigned kAge = 14;
@@ -225,6 +245,7 @@ void code_echo(Stream& stream, CodedEcho& echo) {
   return is_linear && i > 1 ? 2 * last - samples[i - 2].values.at(axis) : last;
 }
 
+/// All inertial samples.
 template <class Stream>
 void code_imu(Stream& stream, CodedImu& imu) {
   constexpr unsigned kExponentBits = 6;
@@ -267,6 +288,7 @@ void code_imu(Stream& stream, CodedImu& imu) {
   return last + (last - bearings[i - 2].u.at(component)) * dt / before;
 }
 
+/// The bearings of one neighbor.
 template <class Stream>
 void code_bearings(Stream& stream, std::vector<CodedBearing>& bearings, std::size_t cameras) {
   constexpr unsigned kStep = 6;
@@ -291,6 +313,7 @@ void code_bearings(Stream& stream, std::vector<CodedBearing>& bearings, std::siz
   }
 }
 
+/// The ranges to one neighbor.
 template <class Stream>
 void code_ranges(Stream& stream, std::vector<CodedRange>& ranges) {
   constexpr unsigned kFirstRange = 12;
@@ -312,6 +335,7 @@ void code_ranges(Stream& stream, std::vector<CodedRange>& ranges) {
   }
 }
 
+/// Bearings and ranges by neighbor.
 template <class Stream>
 void code_sources(Stream& stream, CodedBody& body) {
   constexpr unsigned kPlace = 11;
@@ -333,6 +357,7 @@ void code_sources(Stream& stream, CodedBody& body) {
   }
 }
 
+/// An estimate of a neighbor.
 template <class Stream>
 void code_estimate(Stream& stream, CodedEstimate& estimate) {
   constexpr unsigned kIdBits = 16;
@@ -362,6 +387,7 @@ void code_estimate(Stream& stream, CodedEstimate& estimate) {
   }
 }
 
+/// The whole body, in this order.
 template <class Stream>
 void code_body(Stream& stream, CodedBody& body) {
   constexpr unsigned kStamp = 8;

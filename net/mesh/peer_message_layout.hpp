@@ -52,10 +52,12 @@ inline constexpr unsigned kLossBits = 4;
 inline constexpr double kLossSteps = 30.0;  // of a loss of 1
 inline constexpr std::uint64_t kMaxId = 65534;
 
+/// Rounds down to a whole tick.
 [[nodiscard]] inline std::int64_t floor_to_ticks(std::int64_t ns) {
   return ns / kTick - (ns % kTick < 0 ? 1 : 0);
 }
 
+/// Whether it is the id of a robot.
 [[nodiscard]] inline bool is_robot(RobotId id) { return id.value >= 1 && id.value <= kMaxId; }
 
 }  // namespace crepes::wire

@@ -18,6 +18,7 @@ struct Broadcasts {
   [[nodiscard]] bool operator==(const Broadcasts&) const = default;
 };
 
+/// What and how often a robot sends.
 struct SendSettings {
   double rate_hz = 25.0;           ///< reports per second, and datagrams at most
   double airtime_of_all = 0.5;     ///< share of the channel for all robots that hear each other
@@ -40,11 +41,12 @@ struct Pace {
   std::size_t bytes = kMaxPeerMessage;  ///< of a datagram, sealed if it is
 };
 
-/// A robot takes an equal part of the air, and no more than 9.5 kB/s and 0.1 kB/s a neighbor. Where
-/// a datagram a report would be too short, it sends fewer and fuller ones, because most of a short
-/// one is headers and waiting; but at least four a second, because others predict its motion from
-/// one to the next. Below kMinPeerMessage no datagram is shortened.
-/// What it forwards, `forwarded_air`, comes out of its part.
+/// A robot may use an equal part of the air, and at most 9.5 kB/s plus 0.1 kB/s a neighbor. If one
+/// datagram for each report would be too short, it sends fewer and longer ones, because most of a
+/// short one's airtime is headers and waiting. It sends at least four a second, because others
+/// extrapolate its motion between them. No datagram is made shorter than kMinPeerMessage.
+/// Forwarding
+/// (`forwarded_air`) is subtracted from its part.
 [[nodiscard]] Pace pace_of(const SendSettings& settings, std::size_t neighbors,
                            double forwarded_air = 0.0);
 
@@ -68,8 +70,8 @@ struct AirTotals {
   std::map<RobotId, std::uint64_t> of_peers;  ///< datagrams of each, with those that were lost
 };
 
-/// The shares of the channel between two instants. All datagrams of peers, also the lost ones, are
-/// taken for as long as the mean of those received.
+/// The shares of the channel between two instants. Every datagram of a peer, received or lost,
+/// counts with the mean length of those received.
 [[nodiscard]] AirShare air_share(const AirTotals& before, const AirTotals& after,
                                  const Broadcasts& broadcasts);
 

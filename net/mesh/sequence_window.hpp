@@ -8,6 +8,7 @@ namespace crepes {
 
 class SequenceWindow {
  public:
+  /// The result for a sequence number.
   enum class Verdict : std::uint8_t { kNew, kDuplicate, kTooOld, kTooFarAhead };
 
   /// How far behind the newest a datagram can be and still be checked for duplicates.
@@ -19,7 +20,8 @@ class SequenceWindow {
   [[nodiscard]] Verdict judge(std::uint32_t sequence, std::uint32_t max_ahead) const;
 
   [[nodiscard]] std::uint64_t received() const { return received_; }
-  /// Missing between the first and the newest. A datagram that arrives late no longer counts.
+  /// The number of datagrams missing between the first and the newest. Late arrivals are
+  /// subtracted.
   [[nodiscard]] std::uint64_t lost() const;
 
  private:

@@ -12,23 +12,25 @@
 
 namespace crepes {
 
-/// To verify a signature takes twenty times as long as to open a seal, so who has the swarm's key
-/// could keep a robot busy with false ones. Only verifications in vain consume tokens.
+/// Verifying a signature takes twenty times as long as opening a seal. Somebody with the swarm's
+/// key could therefore overload a robot with false signatures. Only failed verifications consume
+/// tokens.
 ///
-/// Address and sender of a datagram can be forged, so no limit may be so low that a few false ones
-/// exhaust it. A source is a sender and an address from which a datagram of it was accepted. All
-/// sources share a reserve that is larger than what a channel of 6 Mbit/s carries. When it is
-/// exhausted, each has a bucket of its own: false datagrams in the name of one then cost the others
-/// nothing. What comes from elsewhere shares a third bucket.
+/// Address and sender of a datagram can be forged, so a few false datagrams must not exhaust a
+/// limit. A source is a sender together with an address from which a datagram of that sender was
+/// accepted. All sources share a reserve that is larger than what a channel of 6 Mbit/s carries.
+/// When the reserve is exhausted, each source has a bucket of its own, so that false datagrams in
+/// one robot's name do not affect the others. All unknown sources share a third bucket.
 class SignatureLimiter {
  public:
   static constexpr TokenBucket::Rate kReserveRate{.per_s = 1500, .burst = 300};
   static constexpr TokenBucket::Rate kSourceRate{.per_s = 50, .burst = 100};
   static constexpr TokenBucket::Rate kElsewhereRate{.per_s = 500, .burst = 200};
-  /// Addresses of a sender; then the longest silent is forgotten. A member can only displace its
-  /// own.
+  /// Addresses of one sender. Beyond that the longest silent one is forgotten, so a member can
+  /// displace only its own.
   static constexpr std::size_t kMaxAddresses = 4;
 
+  /// Whether a signature of this source may be verified now.
   [[nodiscard]] bool allows(const Endpoint& from, RobotId sender, Timestamp now);
   /// A signature was false, or its datagram of no use.
   void count_in_vain(const Endpoint& from, RobotId sender, Timestamp now);

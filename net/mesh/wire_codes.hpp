@@ -26,7 +26,9 @@ struct LogScale {
   double max;
   unsigned steps;
 
+  /// The nearest code.
   [[nodiscard]] unsigned encode(double value) const;
+  /// The value of a code.
   [[nodiscard]] double decode(unsigned code) const;
 };
 

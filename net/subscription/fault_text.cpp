@@ -12,8 +12,9 @@ std::string text_of(const TeamFault& fault) {
   switch (fault.kind) {
     case TeamFault::Kind::kCameraTurned:
       return fmt::format(
-          "its camera points {:.1f} deg away from what the others see; calibrate it again",
-          kDegPerRad * fault.size);
+          "its camera is turned by {:.2f} +- {:.2f} deg against its calibration; calibrate it "
+          "again",
+          kDegPerRad * fault.size, kDegPerRad * fault.sigma);
     case TeamFault::Kind::kCameraRefused:
       return "its camera contradicts what the others see and is left out; check its calibration "
              "and its clock";
@@ -21,13 +22,18 @@ std::string text_of(const TeamFault& fault) {
       return fmt::format("its ranges are {:.2f} m too {} and are left out; check its antenna delay",
                          std::abs(fault.size), fault.size > 0.0 ? "long" : "short");
     case TeamFault::Kind::kClock:
-      return fmt::format("its clock is {:.0f} ms {} of the others'; check what stamps its sensors",
-                         1e3 * std::abs(fault.size), fault.size > 0.0 ? "ahead" : "behind");
+      return fmt::format(
+          "its clock is {:.0f} +- {:.0f} ms {} of the others'; check what stamps its sensors",
+          1e3 * std::abs(fault.size), 1e3 * fault.sigma, fault.size > 0.0 ? "ahead" : "behind");
     case TeamFault::Kind::kGyro:
       return fmt::format(
           "its gyroscope reads rates {:.1f} deg/s off what its camera shows; check the IMU's "
           "range and unit",
           kDegPerRad * fault.size);
+    case TeamFault::Kind::kEstimates:
+      return fmt::format(
+          "the poses that it broadcasts are {:.2f} m off and are not used; look at its status",
+          fault.size);
   }
   return {};
 }

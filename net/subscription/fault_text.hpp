@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "estimator/core/measurements.hpp"
+#include "estimator/core/team_solution.hpp"
 
 namespace crepes {
 

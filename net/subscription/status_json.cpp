@@ -2,11 +2,13 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <utility>
 
 #include "net/subscription/fault_text.hpp"
 #include "net/subscription/json_parts.hpp"
 #include "net/subscription/subscription_json.hpp"
+#include "net/subscription/team_json.hpp"
 
 namespace crepes {
 namespace {
@@ -29,6 +31,7 @@ Json sensor_json(const SensorStatus& sensor) {
   Json json{{"name", truncated_utf8(sensor.name, kMaxName)}};
   put(json, "rate_hz", sensor.rate_hz, 4);
   json["ok"] = sensor.ok;
+  if (!sensor.is_calibrated) json["calibrated"] = false;
   if (!sensor.message.empty()) json["message"] = truncated_utf8(sensor.message, kMaxText);
   if (Json faults = totals_json(sensor.totals.faults); !faults.empty())
     json["faults"] = std::move(faults);
@@ -48,6 +51,14 @@ void put_refused_imu(Json& json, const ImuFaultCounts& counts) {
 /// Adds `faults` if there are any, as sentences about a robot that has a name.
 void put_faults(Json& json, const std::vector<TeamFault>& faults) {
   for (const TeamFault& fault : faults) json["faults"].push_back(text_of(fault));
+}
+
+Json head_json(const SystemStatus& status) {
+  Json json{{"class", "STATUS"},
+            {"self", status.self.value},
+            {"name", truncated_utf8(status.name, kMaxName)}};
+  put(json, "uptime_s", status.uptime_s, 6);
+  return json;
 }
 
 Json neighbor_json(const NeighborStatus& neighbor) {
@@ -78,10 +89,53 @@ Json ages_json(const NeighborStatus& neighbor, Timestamp now) {
   for (std::size_t kind = 0; kind < kMeasurementKindCount; ++kind) {
     if (const auto& newest = neighbor.newest.at(kind)) {
       put(json, std::string(name_of(static_cast<MeasurementKind>(kind))).c_str(),
-          to_seconds(now - *newest), 3);
+          to_seconds(now - newest->stamp), 3);
     }
   }
   if (neighbor.newest_imu) put(json, "imu", to_seconds(now - *neighbor.newest_imu), 3);
+  return json;
+}
+
+/// Lengths and components of directions, to a tenth of a millimeter or of a milliradian.
+Json numbers_json(std::span<const double> numbers) {
+  Json json = Json::array();
+  for (const double number : numbers) json.push_back(std::round(1e4 * number) / 1e4);
+  return json;
+}
+
+Json vector_json(const Eigen::Vector3d& v) { return numbers_json({v.data(), 3}); }
+
+bool is_finite(const NewestReading& newest) {
+  return std::ranges::all_of(newest.reading, [](double number) { return std::isfinite(number); });
+}
+
+/// What was measured, without any estimate. A bearing leads from the seeing robot's camera to the
+/// other one's ring, a range from our antenna to the neighbor's; each end in its own robot's body.
+Json measured_json(const NeighborStatus& neighbor) {
+  Json json = Json::object();
+  const auto put_reading = [&](MeasurementKind kind, const auto& about) {
+    const auto& newest = neighbor.newest.at(static_cast<std::size_t>(kind));
+    if (!newest || newest->reading == SensorReading{} || !is_finite(*newest)) return;
+    Json& one = json[std::string(name_of(kind))] = about(newest->reading);
+    if (newest->verdict == Verdict::kGated) one["gated"] = true;
+  };
+  const auto bearing_to = [](const Eigen::Vector3d& ring) {
+    return [&ring](const SensorReading& z) {
+      return Json{{"u", numbers_json(std::span(z).first(3))},
+                  {"from", numbers_json(std::span(z).last(3))},
+                  {"to", vector_json(ring)}};
+    };
+  };
+  const PairMounting& mounting = neighbor.mounting;
+  const auto range = [&mounting](const SensorReading& z) {
+    return Json{{"m", numbers_json(std::span(z).first(1))[0]},
+                {"from", vector_json(mounting.p_B_U)},
+                {"to", vector_json(mounting.p_N_Q)}};
+  };
+  put_reading(MeasurementKind::kBearing, bearing_to(mounting.p_N_M));
+  put_reading(MeasurementKind::kPeerBearing, bearing_to(mounting.p_B_M));
+  put_reading(MeasurementKind::kRange, range);
+  put_reading(MeasurementKind::kPeerRange, range);
   return json;
 }
 
@@ -97,14 +151,6 @@ Json clock_json(const ClockStatus& clock) {
   put(json, "offset_s", clock.offset_s, 12);
   put(json, "skew_ppm", clock.skew_ppm, 4);
   put(json, "sigma_s", clock.sigma_s, 3);
-  return json;
-}
-
-Json head_json(const SystemStatus& status) {
-  Json json{{"class", "STATUS"},
-            {"self", status.self.value},
-            {"name", truncated_utf8(status.name, kMaxName)}};
-  put(json, "uptime_s", status.uptime_s, 6);
   return json;
 }
 
@@ -135,8 +181,11 @@ void put_network(Json& json, const SystemStatus& status) {
   json["queues"] = Json::object();
   for (const QueueStatus& queue : status.queues)
     put_total(json["queues"], queue.name, queue.dropped);
-  json["estimator"] = totals_json({{"unknown_senders", status.estimator.unknown_senders},
-                                   {"refused_samples", status.estimator.refused_samples}});
+  json["estimator"] =
+      totals_json({{"unknown_senders", status.estimator.unknown_senders},
+                   {"refused_samples", status.estimator.refused_samples},
+                   {"ids_confirmed", status.estimator.predicted_ids.confirmed},
+                   {"ids_unconfirmed", status.estimator.predicted_ids.unconfirmed}});
   put_refused_imu(json["estimator"], status.estimator.refused_imu);
   json["mesh"] = mesh_json(status.mesh);
   json["network"] = totals_json(status.network);
@@ -190,8 +239,9 @@ bool drop_last_neighbor(Json& status) {
 /// long.
 std::string fitted(Json status) {
   using Cut = void (*)(Json&);
-  constexpr std::array<Cut, 14> kCuts{
+  constexpr std::array<Cut, 15> kCuts{
       [](Json& s) { erase_in_each(s, "sensors", "counts"); },
+      [](Json& s) { erase_in_each(s, "neighbors", "measured"); },
       [](Json& s) { erase_in_each(s, "neighbors", "measurements"); },
       [](Json& s) { s.erase("network"); },
       [](Json& s) { s.erase("mesh"); },
@@ -224,6 +274,32 @@ std::string fitted(Json status) {
   return text;
 }
 
+/// The robot's name, if it is a member.
+std::optional<std::string> member_name(const SystemStatus& status, RobotId robot) {
+  if (robot == status.self) return status.name;
+  const auto& neighbors = status.estimator.neighbors;
+  const auto neighbor = std::ranges::find(neighbors, robot, &NeighborStatus::neighbor);
+  if (neighbor == neighbors.end()) return std::nullopt;
+  return neighbor->name;
+}
+
+/// STATUS with those robots of the team that `wanted` accepts.
+template <class Wanted>
+Json team_part_json(const SystemStatus& status, TeamDetail detail, const Wanted& wanted) {
+  Json json = head_json(status);
+  Json& team = json["team"] = Json::object();
+  if (!status.estimator.team) return json;
+  put(team, "age_s", to_seconds(status.stamp - status.estimator.team->stamp), 3);
+  team["robots"] = Json::array();
+  for (const TeamRobotStatus& robot : status.estimator.team->robots) {
+    const RobotId id = robot.calibration.robot;
+    if (wanted(id))
+      team["robots"].push_back(team_robot_json(
+          robot, member_name(status, id).value_or(std::string()), status.self, detail));
+  }
+  return json;
+}
+
 }  // namespace
 
 std::string status_json(const SystemStatus& status, StatusPart about) {
@@ -249,8 +325,11 @@ std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId 
   const auto neighbor = std::ranges::find(neighbors, peer, &NeighborStatus::neighbor);
   if (neighbor == neighbors.end()) return std::nullopt;
   Json json = head_json(status);
+  put(json, "timestamp", to_seconds(status.stamp.time_since_epoch()), 13);
   json["neighbors"] = {neighbor_json(*neighbor)};
   json["neighbors"][0]["ages_s"] = ages_json(*neighbor, status.stamp);
+  if (Json measured = measured_json(*neighbor); !measured.empty())
+    json["neighbors"][0]["measured"] = std::move(measured);
   const auto traffic = std::ranges::find(status.traffic, peer, &PeerTraffic::peer);
   if (traffic != status.traffic.end()) json["neighbors"][0]["reports"] = traffic_json(*traffic);
   const auto air = status.mesh.air.of_peers.find(peer);
@@ -261,6 +340,44 @@ std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId 
   const auto clock = std::ranges::find(status.clocks, peer, &ClockStatus::peer);
   if (clock != status.clocks.end()) json["clocks"].push_back(clock_json(*clock));
   return fitted(std::move(json));
+}
+
+std::string team_status_json(const SystemStatus& status) {
+  Json json = team_part_json(status, TeamDetail::kBrief, [](RobotId) { return true; });
+  std::string text = dump(json);
+  Json more = Json::array();
+  while (text.size() > kMaxSubscriptionDatagram && !json["team"]["robots"].empty()) {
+    more.insert(more.begin(), json["team"]["robots"].back()["robot"]);
+    drop_last(json["team"], "robots");
+    json["more"] = more;
+    json["truncated"] = true;
+    text = dump(json);
+  }
+  return text;
+}
+
+std::optional<std::string> team_status_json(const SystemStatus& status, RobotId robot) {
+  if (!member_name(status, robot)) return std::nullopt;
+  Json json =
+      team_part_json(status, TeamDetail::kFull, [robot](RobotId id) { return id == robot; });
+  std::string text = dump(json);
+  while (text.size() > kMaxSubscriptionDatagram) {  // four cameras, or several faults
+    json["truncated"] = true;
+    Json& only = json["team"]["robots"][0];
+    if (only["calibration"].erase("gyro_scale") == 0 && !drop_last(only["calibration"], "cameras"))
+      only.erase("faults");
+    text = dump(json);
+  }
+  return text;
+}
+
+std::optional<std::string> pair_status_json(const SystemStatus& status, RobotId peer) {
+  const auto& neighbors = status.estimator.neighbors;
+  const auto neighbor = std::ranges::find(neighbors, peer, &NeighborStatus::neighbor);
+  if (neighbor == neighbors.end()) return std::nullopt;
+  Json json = head_json(status);
+  json["pair"] = pair_filter_json(*neighbor);
+  return dump(json);
 }
 
 }  // namespace crepes

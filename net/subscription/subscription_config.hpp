@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// How a pose is written for a program that does not ask.
 enum class PushFormat : std::uint8_t { kJson, kPlotJuggler };
 inline constexpr std::array kPushFormats{Choice{"json", PushFormat::kJson},
                                          Choice{"plotjuggler", PushFormat::kPlotJuggler}};

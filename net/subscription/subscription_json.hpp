@@ -25,14 +25,15 @@ struct WatchRequest {
 };
 
 /// The part of the state that a STATUS reports.
-enum class StatusPart : std::uint8_t { kAll, kSensors, kNetwork };
+enum class StatusPart : std::uint8_t { kAll, kSensors, kNetwork, kTeam, kPair };
 
 /// Requests a STATUS, in short or one part of it.
 struct PollRequest {
-  std::optional<RobotId> peer;  ///< report only this neighbor, in full
+  std::optional<RobotId> peer;  ///< report only this neighbor, in full; with kTeam any robot
   StatusPart about = StatusPart::kAll;
 };
 
+/// A request of a client, parsed.
 struct SubscriptionRequest {
   std::variant<WatchRequest, PollRequest> what;
   std::string cookie;  ///< empty: none
@@ -48,12 +49,19 @@ struct SubscriptionRequest {
 /// estimator published the pose, on the clock of `t_ns`.
 [[nodiscard]] std::string pose_json(std::uint64_t sequence, RobotId self, std::string_view name,
                                     const NeighborPose& pose);
-/// Omits the least important parts and sets `"truncated":true` when the whole would not fit.
-/// `"more":[ids]` lists neighbors that are omitted.
+/// `about` is kAll, kSensors or kNetwork. Omits the least important parts and sets
+/// `"truncated":true` when the whole would not fit. `"more":[ids]` lists neighbors that are
+/// omitted.
 [[nodiscard]] std::string status_json(const SystemStatus& status,
                                       StatusPart about = StatusPart::kAll);
 /// Everything about one neighbor; empty if the neighbor is unknown.
 [[nodiscard]] std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId peer);
+/// The robots as the team's filter knows them; or one of them in full, empty if it is no member.
+[[nodiscard]] std::string team_status_json(const SystemStatus& status);
+[[nodiscard]] std::optional<std::string> team_status_json(const SystemStatus& status,
+                                                          RobotId robot);
+/// What a neighbor's filter knows of the sensors; empty if the neighbor is unknown.
+[[nodiscard]] std::optional<std::string> pair_status_json(const SystemStatus& status, RobotId peer);
 [[nodiscard]] std::string error_json(std::string_view message);
 
 }  // namespace crepes

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -13,6 +15,14 @@ constexpr int kMaxDepth = 8;
 constexpr double kMinRate = 0.01;  // Hz
 constexpr double kMaxRate = 1000.0;
 constexpr std::size_t kMaxCookie = 64;
+
+struct Part {
+  const char* name;
+  StatusPart part;
+};
+constexpr std::array kParts{Part{"sensors", StatusPart::kSensors},
+                            Part{"network", StatusPart::kNetwork}, Part{"team", StatusPart::kTeam},
+                            Part{"pair", StatusPart::kPair}};
 
 /// Limits the brackets outside strings before the JSON parser allocates memory for them.
 bool is_nested_deeply(std::string_view text) {
@@ -80,14 +90,13 @@ Result<PollRequest> read_poll(const ParsedJson& json) {
     if (!poll.peer) return fail(ErrorCode::kFormat, "\"peer\" must be a robot id, 1 to 65534");
   }
   if (const auto about = json.find("about"); about != json.end()) {
-    if (*about == "sensors") {
-      poll.about = StatusPart::kSensors;
-    } else if (*about == "network") {
-      poll.about = StatusPart::kNetwork;
-    } else {
-      return fail(ErrorCode::kFormat, R"("about" must be "sensors" or "network")");
-    }
+    const auto part = std::ranges::find(kParts, *about, &Part::name);
+    if (part == kParts.end())
+      return fail(ErrorCode::kFormat, R"("about" must be "sensors", "network", "team" or "pair")");
+    poll.about = part->part;
   }
+  if (poll.about == StatusPart::kPair && !poll.peer)
+    return fail(ErrorCode::kFormat, R"("about":"pair" needs a "peer")");
   return poll;
 }
 

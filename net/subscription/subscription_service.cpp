@@ -56,14 +56,29 @@ std::optional<std::string> SubscriptionService::serve(const Endpoint& client,
                                                       const SubscriptionRequest& request,
                                                       Timestamp now, std::size_t socket) {
   if (const auto* poll = std::get_if<PollRequest>(&request.what)) {
-    if (!poll->peer) return status_json(status_(), poll->about);
-    if (auto status = peer_status_json(status_(), *poll->peer)) return status;
+    if (auto status = status_of(*poll)) return status;
     return refuse(client, {ErrorCode::kNotFound, "\"peer\" is no other robot of this swarm"}, now);
   }
   const auto watched = table_.watch(client, std::get<WatchRequest>(request.what), now, socket,
                                     limiter_.is_light_user(client));
   if (!watched) return refuse(client, watched.error(), now);
   return version_json(release_, lease_s_);
+}
+
+/// Empty if there is no such peer.
+std::optional<std::string> SubscriptionService::status_of(const PollRequest& poll) const {
+  const SystemStatus status = status_();
+  if (!poll.peer)
+    return poll.about == StatusPart::kTeam ? team_status_json(status)
+                                           : status_json(status, poll.about);
+  switch (poll.about) {
+    case StatusPart::kTeam:
+      return team_status_json(status, *poll.peer);
+    case StatusPart::kPair:
+      return pair_status_json(status, *poll.peer);
+    default:
+      return peer_status_json(status, *poll.peer);
+  }
 }
 
 std::optional<std::string> SubscriptionService::refuse(const Endpoint& client, const Error& error,

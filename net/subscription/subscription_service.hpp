@@ -46,6 +46,7 @@ class SubscriptionService {
   [[nodiscard]] std::optional<std::string> serve(const Endpoint& client,
                                                  const SubscriptionRequest& request, Timestamp now,
                                                  std::size_t socket);
+  [[nodiscard]] std::optional<std::string> status_of(const PollRequest& poll) const;
   [[nodiscard]] std::optional<std::string> refuse(const Endpoint& client, const Error& error,
                                                   Timestamp now);
 

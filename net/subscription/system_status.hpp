@@ -19,8 +19,10 @@ struct SensorStatus {
   bool ok = false;
   std::string message;  ///< the fault and its remedy
   SensorTotals totals{};
+  bool is_calibrated = true;  ///< false: a camera whose lens is a guess
 };
 
+/// The drops of one queue.
 struct QueueStatus {
   std::string name;
   std::uint64_t dropped = 0;

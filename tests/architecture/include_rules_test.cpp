@@ -31,7 +31,7 @@ TEST(IncludeRules, CatchArrowsThatAreNotInTheTable) {
            {"estimator/relative/raw_pose.cpp", "  #  include \"estimator/core/clock.hpp\""},
            {"estimator/vision/id_library.cpp", "#include \"estimator/graph/pose_graph.hpp\""},
            {"estimator/graph/pose_graph.cpp", "#include \"estimator/swarm/estimator.hpp\""},
-           {"estimator/calibration/rests.cpp", "#include \"estimator/team/team_filter.hpp\""},
+           {"estimator/calibration/imu/rests.cpp", "#include \"estimator/team/team_filter.hpp\""},
            {"estimator/swarm/estimator.cpp", "#include \"daemon/stages/counters.hpp\""},
            {"drivers/uwb/nlink.cpp", "#include \"net/mesh/bit_reader.hpp\""},
            {"drivers/camera/camera.hpp", "#include \"estimator/vision/camera_model.hpp\""},

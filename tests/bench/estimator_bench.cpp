@@ -152,8 +152,8 @@ void BM_NeighborTick(benchmark::State& state) {
   };
   const auto tick = [&](const Arrivals& arrivals) {
     for (Neighbor& neighbor : neighbors) {
-      for (const Bearing& bearing : arrivals.bearings) neighbor.add_bearing(bearing);
-      if (arrivals.range) neighbor.add_range(*arrivals.range);
+      for (const Bearing& bearing : arrivals.bearings) neighbor.add(bearing);
+      if (arrivals.range) neighbor.add(*arrivals.range);
       neighbor.add_report(arrivals.report, self);
       neighbor.tick(now, self);
     }

@@ -3,6 +3,8 @@
 //   id_study latency [N]     time from first light to ID in clean conditions, by size of library
 //   id_study lamps [N]       IDs given to sources that are no boards
 //   id_study hands [N]       time until a track that changed hands has lost its ID
+//   id_study foreign [N]     IDs given to boards of other libraries, N boards of 20 s each
+//   id_study cameras [N]     time from first light to ID by frame rate and slot
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -217,6 +219,92 @@ void study_hands(std::size_t n) {
   }
 }
 
+/// One board of another library in clear view at 200 Hz, for 20 s.
+struct ForeignBoard {
+  std::size_t ids = 0;           ///< so often it was given one of ours
+  std::size_t named_frames = 0;  ///< so long it kept it
+};
+
+constexpr double kWatched_s = 20.0;
+
+ForeignBoard watch_foreign(const IdDecoder& decoder, const BlinkCode& code, std::mt19937& random) {
+  const Viewing viewing{.flip_rate = uniform(random, 0.0, 0.01), .exposure_ms = 0.5};
+  const Light light =
+      test::board(code, from_seconds(uniform(random, 0.0, 0.5)), uniform(random, -100, 100));
+  Watcher watcher(decoder, viewing, random());
+  ForeignBoard seen;
+  BlinkEvidence evidence;
+  bool was_named = false;
+  for (double t = 0.0; t < kWatched_s; t += 1.0 / viewing.rate_hz) {
+    static_cast<void>(watcher.look(light, from_seconds(t), evidence));
+    const bool is_named = IdDecoder::is_identified(evidence);
+    seen.named_frames += is_named ? 1 : 0;
+    seen.ids += is_named && !was_named ? 1 : 0;
+    was_named = is_named;
+  }
+  return seen;
+}
+
+void study_foreign(std::size_t n) {
+  const IdLibrary ours = library_of({});
+  std::printf("%-36s %9s %9s %8s %8s %12s\n", "boards of", "boards", "board s", "IDs", "named s",
+              "IDs / 1e4 s");
+  for (const double max_false_robot : {1e-5, 1e-8, 1e-10})
+    for (const auto& [slots, distance, slot_ms] : {std::tuple{16U, 4U, 10.0},
+                                                   {18U, 4U, 10.0},
+                                                   {20U, 4U, 10.0},
+                                                   {22U, 4U, 10.0},
+                                                   {24U, 6U, 10.0},
+                                                   {20U, 4U, 8.0}}) {
+      const Codebook book = search_codebook({.slots = slots, .distance = distance}, 64,
+                                            {.seed = 77, .on_progress = {}});
+      const IdLibrary theirs = *IdLibrary::from(test::swarm_of(book.patterns, slot_ms));
+      std::mt19937 random(slots);
+      VisionConfig config;
+      config.max_false_robot = max_false_robot;
+      const IdDecoder decoder(ours, config, 200.0);
+      ForeignBoard sum;
+      for (std::size_t i = 0; i < n / 6; ++i) {
+        const auto& code = theirs.entries()[random() % theirs.entries().size()].code;
+        const ForeignBoard one = watch_foreign(decoder, code, random);
+        sum.ids += one.ids;
+        sum.named_frames += one.named_frames;
+      }
+      const double board_s = kWatched_s * static_cast<double>(n / 6);
+      char name[64];
+      std::snprintf(name, sizeof name, "%u slots of %.0f ms, max_false %.0e", slots, slot_ms,
+                    max_false_robot);
+      std::printf("%-36s %9zu %9.0f %8zu %8.1f %12.2f\n", name, n / 6, board_s, sum.ids,
+                  static_cast<double>(sum.named_frames) / 200.0,
+                  1e4 * static_cast<double>(sum.ids) / board_s);
+      std::fflush(stdout);
+    }
+}
+
+/// Slots of two frames, or a little more, before cameras of any rate.
+void study_cameras(std::size_t n) {
+  std::printf("64 ids of 20 slots, exposures up to 1 ms, 1 %% flipped, any phase, +-100 ppm\n");
+  print_header();
+  const Viewing seen{.flip_rate = 0.01, .exposure_ms = 1.0};
+  for (const auto& [rate_hz, slot_ms] : {std::pair{30.0, 67.0},
+                                         {30.0, 70.0},
+                                         {50.0, 40.0},
+                                         {60.0, 33.0},
+                                         {60.0, 40.0},
+                                         {90.0, 22.0},
+                                         {90.0, 25.0},
+                                         {120.0, 17.0},
+                                         {120.0, 20.0},
+                                         {160.0, 12.5},
+                                         {200.0, 10.0},
+                                         {250.0, 8.0}}) {
+    const IdLibrary library = library_of({.rules = {}, .ids = 64, .slot_ms = slot_ms});
+    char name[64];
+    std::snprintf(name, sizeof name, "%.0f Hz, slots of %.1f ms", rate_hz, slot_ms);
+    decide(library, seen, rate_hz, rate_hz, n, 3).print(name);
+  }
+}
+
 }  // namespace
 }  // namespace crepes
 
@@ -233,7 +321,13 @@ int main(int argc, char** argv) {
     crepes::study_lamps(n(20'000));
   else if (what == "hands")
     crepes::study_hands(n(5'000));
+  else if (what == "foreign")
+    crepes::study_foreign(n(6'000));
+  else if (what == "cameras")
+    crepes::study_cameras(n(4'000));
   else
-    return std::fprintf(stderr, "usage: id_study decisions|latency|lamps|hands [N]\n"), 2;
+    return std::fprintf(stderr,
+                        "usage: id_study decisions|latency|lamps|hands|foreign|cameras [N]\n"),
+           2;
   return 0;
 }

@@ -132,12 +132,12 @@ TEST_F(Clients, InRosGetPosesOdometryTransformsAndDiagnostics) {
        "-p", "port:=" + port_, "-p", "publish_tf:=true", "-p", "diagnostics_period_s:=0.2"},
       100);
 
-  std::map<std::string, int> told;
+  std::map<std::string, int> reported;
   for (const std::string& line : lines) {
     const Json published = Json::parse(line);
     const auto topic = published["topic"].get<std::string>();
     const Json& message = published["message"];
-    ++told[topic];
+    ++reported[topic];
     EXPECT_GT(message["header"]["stamp"]["sec"].get<std::int64_t>(), 1'600'000'000);
     if (topic == "/diagnostics") continue;
     EXPECT_EQ(message["header"]["frame_id"], "robot_1/base_link");
@@ -154,10 +154,10 @@ TEST_F(Clients, InRosGetPosesOdometryTransformsAndDiagnostics) {
                                q["z"].get<double>());
     EXPECT_NEAR(wxyz.norm(), 1.0, 1e-6);
   }
-  EXPECT_EQ(told["crepes/r2/pose"], told["crepes/r2/odometry"]);
-  EXPECT_EQ(told["crepes/r2/pose"], told["/tf"]);
-  EXPECT_GT(told["crepes/r2/pose"], 20);
-  EXPECT_GT(told["/diagnostics"], 0);
+  EXPECT_EQ(reported["crepes/r2/pose"], reported["crepes/r2/odometry"]);
+  EXPECT_EQ(reported["crepes/r2/pose"], reported["/tf"]);
+  EXPECT_GT(reported["crepes/r2/pose"], 20);
+  EXPECT_GT(reported["/diagnostics"], 0);
 }
 
 }  // namespace

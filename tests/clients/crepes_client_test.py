@@ -27,7 +27,7 @@ STATUS = {
     "sensors": [{"name": "uwb", "rate_hz": 49.9, "ok": False, "message": "silent", "faults": {"dropped": 4}}],
     "neighbors": [{"peer": 2, "name": "r2", "state": "none", "reason": "no range"}, {"peer": 3, "state": "direct"}],
     "clocks": [{"peer": 2, "offset_s": -3.5}], "truncated": True, "more": [4, 5]}
-VERSION = {"class": "VERSION", "release": "0.3.0", "proto_major": 1, "proto_minor": 0, "lease_s": 10.0}
+VERSION = {"class": "VERSION", "release": "9.8.7", "proto_major": 1, "proto_minor": 0, "lease_s": 10.0}
 
 
 def bytes_of(content):
@@ -187,7 +187,7 @@ class OverLoopback(unittest.TestCase):
             kinds = {type(connection.receive(10.0)) for _ in range(3)}
 
             self.assertEqual(kinds, {crepes_client.Version, crepes_client.Pose, crepes_client.Status})
-            self.assertEqual(connection.version.release, "0.3.0")
+            self.assertEqual(connection.version.release, "9.8.7")
 
     def test_status_is_asked_of_one_neighbor(self):
         with StandIn() as daemon:

@@ -107,7 +107,7 @@ class Covariance(unittest.TestCase):
 
         for i in range(3):
             for j in range(3):
-                # 20000 samples tell a variance of at most 1.4e-3 to 1.4e-5 (one sigma); four of them.
+                # 20000 samples determine a variance of at most 1.4e-3 to 1.4e-5 (one sigma); four of them.
                 self.assertAlmostEqual(ros[6 * (3 + i) + 3 + j], spread[i][j], delta=6e-5)
 
     def test_is_symmetric_and_row_by_row(self):
@@ -336,12 +336,12 @@ class TheNode(unittest.TestCase):
     def published(self, connection, *parameters):
         """(topic, message) of all that the node publishes, and what it logs."""
         rclpy._left = 1000
-        told, logged = io.StringIO(), io.StringIO()
+        reported, logged = io.StringIO(), io.StringIO()
         with mock.patch.object(crepes_client, "Connection", connection), \
                 mock.patch.object(sys, "argv", ["bridge", "--ros-args", *parameters]), \
-                contextlib.redirect_stdout(told), contextlib.redirect_stderr(logged):
+                contextlib.redirect_stdout(reported), contextlib.redirect_stderr(logged):
             bridge.main()
-        lines = [json.loads(line) for line in told.getvalue().splitlines()]
+        lines = [json.loads(line) for line in reported.getvalue().splitlines()]
         return [(line["topic"], line["message"]) for line in lines], logged.getvalue()
 
     def test_publishes_pose_odometry_transform_and_diagnostics(self):
@@ -404,11 +404,11 @@ class ThePackage(unittest.TestCase):
         self.assertEqual(root.find("export/build_type").text, "ament_python")
 
     def test_installs_where_ros_looks(self):
-        told = subprocess.run([sys.executable, "-B", "-c", "import setuptools, json, runpy\n"
+        reported = subprocess.run([sys.executable, "-B", "-c", "import setuptools, json, runpy\n"
                                "kept = {}\nsetuptools.setup = lambda **words: kept.update(words)\n"
                                "runpy.run_path('setup.py')\nprint(json.dumps(kept))"],
                               cwd=ROS2, capture_output=True, text=True, check=True).stdout
-        words = json.loads(told)
+        words = json.loads(reported)
 
         name = xml.etree.ElementTree.parse(ROS2 / "package.xml").find("name").text
         self.assertEqual(words["name"], name)

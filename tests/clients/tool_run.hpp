@@ -51,7 +51,7 @@ inline std::vector<Json> objects_in(const Ending& ending) {
   return objects;
 }
 
-/// The one object that a command tells; null and a failure if it is not just one, or the command
+/// The one object that a command prints; null and a failure if it is not just one, or the command
 /// fails.
 inline Json object_of(const std::vector<std::string>& arguments) {
   const Ending ending = crepesctl(arguments);

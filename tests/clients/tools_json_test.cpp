@@ -68,14 +68,43 @@ TEST(ToolsInJson, TellWhatAReplayGaveAndWhatItRefused) {
 
   EXPECT_EQ(replayed.how, "exit code 0");
   EXPECT_NE(replayed.errors.find("r1/imu0/data.csv:5"), std::string::npos) << replayed.errors;
-  const std::vector<Json> told = objects_in(replayed);
-  ASSERT_EQ(told.size(), 1U) << replayed.output;
-  EXPECT_EQ(told[0]["out"], out);
-  EXPECT_EQ(told[0]["robots"], 2);
-  EXPECT_NEAR(told[0]["duration_s"], 0.2, 1e-9);
-  EXPECT_EQ(told[0]["poses"], 0);
-  EXPECT_EQ(told[0]["refused"].size(), 1U);
+  const std::vector<Json> reported = objects_in(replayed);
+  ASSERT_EQ(reported.size(), 1U) << replayed.output;
+  EXPECT_EQ(reported[0]["out"], out);
+  EXPECT_EQ(reported[0]["robots"], 2);
+  EXPECT_NEAR(reported[0]["duration_s"], 0.2, 1e-9);
+  EXPECT_EQ(reported[0]["poses"], 0);
+  EXPECT_EQ(reported[0]["refused"].size(), 1U);
   EXPECT_EQ(object_of({"plot", out, "--json"})["page"], out + "/plot.html");
+}
+
+/// The one object of a calibration that could not begin.
+void expect_refused(const std::vector<std::string>& arguments, const std::string& how,
+                    const std::string& reason) {
+  std::vector<std::string> words{"calibrate"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  words.insert(words.end(), {"--out", "/tmp/none.yaml", "--json"});
+  const Ending ending = crepesctl(words);
+  EXPECT_EQ(ending.how, how) << ending.errors;
+  const std::vector<Json> told = objects_in(ending);
+  ASSERT_EQ(told.size(), 1U) << ending.output;
+  EXPECT_EQ(told[0]["ok"], false);
+  ASSERT_EQ(told[0]["reasons"].size(), 1U);
+  EXPECT_NE(told[0]["reasons"][0].get<std::string>().find(reason), std::string::npos)
+      << told[0]["reasons"][0];
+  EXPECT_NE(ending.errors.find(reason), std::string::npos) << ending.errors;
+}
+
+TEST(ToolsInJson, SayWhyACalibrationCouldNotBegin) {
+  const std::string none = "/nonexistent/recording";
+  expect_refused({"camera", none}, "exit code 1", none);
+  expect_refused({"camera", none, "--model", "fisheye"}, "exit code 2", "'fisheye'");
+  expect_refused({"camera", none, "--grid", "5", "--pitch", "0.05"}, "exit code 2", "'5'");
+  expect_refused({"camera", none, "--grid", "5x7", "--pitch", "0.05"}, "exit code 1", none);
+  expect_refused({"imu", none}, "exit code 1", none);
+  expect_refused({"range", none}, "exit code 2", "--distance");
+  expect_refused({"range", none, "--distance", "r1,r2=5.00"}, "exit code 1", none);
+  expect_refused({"swarm", none}, "exit code 1", none);
 }
 
 TEST(ToolsInJson, TellWhereAKeyIs) {
@@ -111,10 +140,11 @@ TEST(ToolsInJson, TellWhatASensorWasSetTo) {
   const Worker sensor("sensor",
                       [&](const std::stop_token& stop) { run_witmotion_at_20_hz(line, stop); });
 
-  const Json told = object_of({"setup-witmotion", "--port", line.path(), "--rate", "20", "--json"});
+  const Json reported =
+      object_of({"setup-witmotion", "--port", line.path(), "--rate", "20", "--json"});
 
-  EXPECT_EQ(told["update_rate"], 20);
-  EXPECT_NEAR(told["measured_hz"], 20.0, 5.0);
+  EXPECT_EQ(reported["update_rate"], 20);
+  EXPECT_NEAR(reported["measured_hz"], 20.0, 5.0);
 }
 
 TEST(ToolsInJson, SayAnErrorInWordsAndNothingOnStandardOutput) {
@@ -150,13 +180,13 @@ TEST(ToolsInJson, SumUpADemo) {
   } while (demo.errors.find("choose another --port") != std::string::npos);
 
   // An overloaded machine may have no pose after five seconds; the summary then reports it.
-  const std::vector<Json> told = objects_in(demo);
-  ASSERT_EQ(told.size(), 1U) << demo.output << demo.errors;
-  EXPECT_EQ(told[0]["scenario"], "two");
-  EXPECT_GE(told[0]["to_s"], 5.0);
-  ASSERT_EQ(told[0]["pairs"].size(), 2U);
+  const std::vector<Json> reported = objects_in(demo);
+  ASSERT_EQ(reported.size(), 1U) << demo.output << demo.errors;
+  EXPECT_EQ(reported[0]["scenario"], "two");
+  EXPECT_GE(reported[0]["to_s"], 5.0);
+  ASSERT_EQ(reported[0]["pairs"].size(), 2U);
   bool has_all = true;
-  for (const Json& pair : told[0]["pairs"]) {
+  for (const Json& pair : reported[0]["pairs"]) {
     has_all = has_all && pair.contains("first_pose_s");
     EXPECT_LT(pair["position_m"].value("median", 0.0), 1.0);
   }
@@ -200,16 +230,16 @@ TEST_F(LiveToolsInJson, SumUpARecording) {
   object_of(to_first({"waitpose", "--peer", "2", "--timeout", "50"}));
   const std::string dir = folder_.path() / "recording";
 
-  const Json told =
+  const Json reported =
       object_of({"record", dir, "--duration", "1", "--socket", first_.recording.socket, "--json"});
 
-  EXPECT_EQ(told["folder"], dir + "/r1");
-  EXPECT_EQ(told["ended"], "--duration is over");
-  EXPECT_GE(told["duration_s"], 1.0);
-  EXPECT_GT(told["rows"], 50);
-  EXPECT_GT(told["bytes"], 1000);
-  EXPECT_EQ(told["pictures"], 0);
-  EXPECT_EQ(told["configurations"], 1);
+  EXPECT_EQ(reported["folder"], dir + "/r1");
+  EXPECT_EQ(reported["ended"], "--duration is over");
+  EXPECT_GE(reported["duration_s"], 1.0);
+  EXPECT_GT(reported["rows"], 50);
+  EXPECT_GT(reported["bytes"], 1000);
+  EXPECT_EQ(reported["pictures"], 0);
+  EXPECT_EQ(reported["configurations"], 1);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "config/keys/robot_key.hpp"
 #include "daemon/runtime.hpp"
 #include "tests/clients/tool_run.hpp"
+#include "tests/daemon/ctl/tiny_swarm.hpp"
 #include "tests/support/places.hpp"
 
 namespace crepes {
@@ -115,14 +116,14 @@ TEST_F(Tools, CheckARobotFromSensorsToCalibration) {
   std::ofstream(file) << write_config(other);
 
   const Ending text = ask("check", {"--for", "1"});
-  const Json told = Json::parse(ask("check", {"--json", "--config", file}).output);
+  const Json reported = Json::parse(ask("check", {"--json", "--config", file}).output);
 
   for (const char* part : {"cam0 spots", "r2: known to", "r2 sees our board", "not sealed",
                            "crepesctl keygen", "gravity measures", "r2 is"})
     EXPECT_NE(text.output.find(part), std::string::npos) << part << "\n" << text.output;
   std::vector<std::string> sections;
   bool is_rate_named = false;
-  for (const Json& finding : told["findings"]) {
+  for (const Json& finding : reported["findings"]) {
     if (sections.empty() || sections.back() != finding["about"])
       sections.push_back(finding["about"]);
     is_rate_named |= finding["about"] == "rates" && finding["verdict"] == "doubt" &&
@@ -130,7 +131,7 @@ TEST_F(Tools, CheckARobotFromSensorsToCalibration) {
   }
   EXPECT_EQ(sections, (std::vector<std::string>{"sensors", "rates", "clocks", "exposure", "board",
                                                 "mesh", "calibration"}));
-  EXPECT_TRUE(is_rate_named) << told.dump(2);
+  EXPECT_TRUE(is_rate_named) << reported.dump(2);
 }
 
 class OneRobot : public LiveDaemon {};
@@ -139,8 +140,9 @@ TEST_F(OneRobot, IsCheckedAndTheMissingOneIsAFault) {
   Config config = pair_config(1, mesh_port_);
   config.cameras[0].calibration.calibrated = false;
   const Runtime runtime(config, machine_);
-  EXPECT_TRUE(Client(config).await_status(
-      [](const Json& status) { return tells(sensor_of(status, "cam0 spots"), "not calibrated"); }));
+  EXPECT_TRUE(Client(config).await_status([](const Json& status) {
+    return mentions(sensor_of(status, "cam0 spots"), "not calibrated");
+  }));
 
   const Ending ending =
       crepesctl({"check", "--port", std::to_string(config.subscription.port), "--for", "1"});
@@ -182,6 +184,44 @@ TEST_F(OneRobot, IsSetToAnotherExposureWhileItRuns) {
   EXPECT_NE(impossible.errors.find("longer than a frame"), std::string::npos) << impossible.errors;
   // What was refused has left nothing behind.
   EXPECT_EQ(load_config(file).value().cameras[0].device.light.exposure_us, 2.0);
+}
+
+TEST_F(OneRobot, IsWatchedOnceInJsonThoughItsNeighborIsMissing) {
+  const Config config = pair_config(1, mesh_port_);
+  const Runtime runtime(config, machine_);
+  EXPECT_TRUE(Client(config).await_status([](const Json&) { return true; }));
+
+  const Ending once =
+      crepesctl({"watch", "--once", "--json", "--port", std::to_string(config.subscription.port)});
+
+  EXPECT_EQ(once.how, "exit code 0");
+  EXPECT_NE(once.output.find("STATUS"), std::string::npos) << once.output;
+}
+
+TEST(ToolsAlone, ReplayNothingWhereNoRowOfASensorIsGood) {
+  const TinySwarm files;
+  files.write("r1/uwb0/data.csv", "#t_ns,peer,range,fp,rx\n10000000000,2,far,-80,-79\n");
+
+  const Ending ending =
+      crepesctl({"replay", files.dir().string(), "--out", (files.dir() / "out").string()});
+
+  EXPECT_EQ(ending.how, "exit code 1");
+  EXPECT_NE(ending.errors.find("uwb0/data.csv: none of 1 rows is good"), std::string::npos)
+      << ending.errors;
+}
+
+TEST(DaemonAlone, RefusesWarningsOnlyIfItIsStrict) {
+  const TinySwarm files;  // without lever arms, on a mesh that is not there
+  const std::string file = (files.dir() / "r1/crepesd.yaml").string();
+
+  const Ending lenient = run(crepesd_path(), {"--check-config", file});
+  const Ending strict = run(crepesd_path(), {"--check-config", file, "--strict"});
+
+  EXPECT_EQ(lenient.how, "exit code 0");
+  EXPECT_EQ(strict.how, "exit code 1");
+  EXPECT_EQ(lenient.errors, strict.errors);
+  for (const char* warning : {"net.interface: there is no such interface", "p_body_led"})
+    EXPECT_NE(lenient.errors.find(warning), std::string::npos) << lenient.errors;
 }
 
 TEST(ToolsAlone, SayThatNobodyAnswersAndEndWithOne) {

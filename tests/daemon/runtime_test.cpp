@@ -16,7 +16,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-TEST(Runtime, TellsWhatIsWrongWithDevicesThatAreNotThere) {
+TEST(Runtime, ReportsWhatIsWrongWithDevicesThatAreNotThere) {
   const LogSession log(LogLevel::kError);
   const MonotonicClock machine;
   Config config = without_devices(free_port());
@@ -25,8 +25,8 @@ TEST(Runtime, TellsWhatIsWrongWithDevicesThatAreNotThere) {
   Client client(config);
 
   EXPECT_TRUE(client.await_status([](const Json& status) {
-    return tells(sensor_of(status, "uwb"), "/dev/nothing-here") &&
-           tells(sensor_of(status, "imu"), "set imu.port");
+    return mentions(sensor_of(status, "uwb"), "/dev/nothing-here") &&
+           mentions(sensor_of(status, "imu"), "set imu.port");
   }));
 }
 

@@ -132,7 +132,7 @@ TEST_F(AravisCameraTest, HandsOnTheNewestWhenItFellBehind) {
   EXPECT_GT(*next[0].data(), *first[0].data() + 2);
 }
 
-TEST_F(AravisCameraTest, CountsAndTellsLostPackets) {
+TEST_F(AravisCameraTest, CountsAndReportsLostPackets) {
   GigeCamera device(changing_picture(), 0.02);
   auto camera = open();
   ASSERT_TRUE(camera) << camera.error().message;
@@ -190,7 +190,7 @@ TEST_F(AravisCameraTest, RefusesARegionOutsideOfTheSensor) {
   EXPECT_NE(camera.error().message.find("2048 x 2048"), std::string::npos);
 }
 
-TEST_F(AravisCameraTest, TellsAnExposureThatIsLongerThanAFrame) {
+TEST_F(AravisCameraTest, ReportsAnExposureThatIsLongerThanAFrame) {
   const GigeCamera device(changing_picture());
   config_.device.light.exposure_us = 30000;
 

@@ -51,9 +51,9 @@ TEST(FrameDecoder, AccountsForEveryByteOfAnyStream) {
 
     std::size_t in_frames = 0;
     for (const auto& frame : frames) in_frames += frame.size();
-    const std::size_t told = in_frames + decoder.counts().skipped_bytes;
-    RC_ASSERT(told <= stream.size());
-    RC_ASSERT(stream.size() - told < NlinkParser::kMaxFrame);
+    const std::size_t reported = in_frames + decoder.counts().skipped_bytes;
+    RC_ASSERT(reported <= stream.size());
+    RC_ASSERT(stream.size() - reported < NlinkParser::kMaxFrame);
 
     // Whatever came before: after enough frames one comes through again.
     Frames after;

@@ -9,7 +9,7 @@ const ImuSample kSample{.stamp = Timestamp{std::chrono::seconds(3)},
                         .gyro_radps = {0.1, -0.2, 0.3},
                         .accel_mps2 = {1.0, 2.0, 9.5}};
 
-TEST(ImuCorrection, LeavesSamplesAloneUnlessToldOtherwise) {
+TEST(ImuCorrection, LeavesSamplesAloneUnlessConfiguredOtherwise) {
   const ImuSample same = ImuCorrection(ImuDeviceConfig{}).apply(kSample);
 
   EXPECT_EQ(same.stamp, kSample.stamp);

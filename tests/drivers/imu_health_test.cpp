@@ -65,7 +65,7 @@ TEST(ImuHealth, RefusesWhatRepeatsForHalfASecondUntilItChanges) {
   EXPECT_EQ(health.diagnosis(), std::nullopt);
 }
 
-TEST(ImuHealth, TellsARateOtherThanTheConfigured) {
+TEST(ImuHealth, ReportsARateOtherThanTheConfigured) {
   ImuHealth slow(10ms);
   accept_steady(slow, Timestamp{1s}, 20ms, 400);
   ImuHealth fast(10ms);

@@ -46,7 +46,7 @@ TEST(Hipnuc, ReadsTheRecordedFrameInSiUnits) {
   const RecordedFrame file = recorded_file("imu/hipnuc_hi91_official");
 
   ASSERT_EQ(Hipnuc::examine(file.bytes).length, file.bytes.size());
-  expect_sample(Hipnuc::read(file.bytes), vector_of(file.decoded["gyro_dps"]) * kRadPerDeg,
+  expect_sample(Hipnuc::read(file.bytes), vector_of(file.decoded["gyro_dps"]) * radians(1.0),
                 vector_of(file.decoded["acc_g"]) * kGravityMps2);
 }
 
@@ -158,7 +158,7 @@ TEST(Xsens, StampsSamplesByTheSensorsClockOnceItIsKnown) {
     EXPECT_LT(std::chrono::abs(stamps[i] - Timestamp{i * 10ms}), 100us) << i;
 }
 
-TEST(Xsens, TellsClippedAndHalfSamples) {
+TEST(Xsens, ReportsClippedAndHalfSamples) {
   const std::string accel = "40 20 0c 3f 80 00 00 40 00 00 00 41 1d 00 00 ";
   const std::string gyro = "80 20 0c bf 80 00 00 3f 00 00 00 00 00 00 00 ";
 

@@ -51,10 +51,10 @@ class MindVisionCameraTest : public testing::Test {
 TEST_F(MindVisionCameraTest, SaysWhatToInstallWhereTheLibraryIsAbsent) {
   config_.device.library = "libnosuch.so";
 
-  const std::string told = open_error();
+  const std::string reported = open_error();
 
-  EXPECT_NE(told.find("install the vendor's SDK"), std::string::npos) << told;
-  EXPECT_NE(told.find("libnosuch.so"), std::string::npos) << told;
+  EXPECT_NE(reported.find("install the vendor's SDK"), std::string::npos) << reported;
+  EXPECT_NE(reported.find("libnosuch.so"), std::string::npos) << reported;
 }
 
 TEST_F(MindVisionCameraTest, RefusesAnotherLibrary) {
@@ -140,10 +140,10 @@ TEST_F(MindVisionCameraTest, TakesATimeOutForNoFrameAndOtherCodesForTheEnd) {
 
   const auto nothing = (*camera)->read_once(10ms);
   stub_->frame_code = -38;
-  const std::string told = read_error(**camera);
+  const std::string reported = read_error(**camera);
 
   EXPECT_TRUE(nothing && !*nothing);
-  EXPECT_EQ(told, "the camera is gone: the library's error -38");
+  EXPECT_EQ(reported, "the camera is gone: the library's error -38");
 }
 
 TEST_F(MindVisionCameraTest, CountsFramesThatComeInPart) {
@@ -172,7 +172,7 @@ TEST_F(MindVisionCameraTest, RefusesFramesThatAreNotGreyOrShorterThanTheyClaim) 
   EXPECT_EQ(stub_->lent_buffers, 0);
 }
 
-TEST_F(MindVisionCameraTest, TellsAnExposureThatIsLongerThanAFrame) {
+TEST_F(MindVisionCameraTest, ReportsAnExposureThatIsLongerThanAFrame) {
   auto camera = open();
   ASSERT_TRUE(camera) << camera.error().message;
   stub_->waiting = 1;

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "drivers/uwb/nlink.hpp"
+#include "drivers/uwb/nlink_encoder.hpp"
 #include "estimator/core/constants.hpp"
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/recorded_files.hpp"
@@ -33,7 +34,7 @@ void expect_node(const NlinkNode& found, const Json& node) {
   EXPECT_EQ(found.system_time_ms.has_value(), node.contains("system_time"));
   EXPECT_EQ(found.system_time_ms.value_or(0), node.value("system_time", 0U));
   EXPECT_EQ(found.angle_rad.has_value(), node.contains("angle"));
-  EXPECT_NEAR(found.angle_rad.value_or(0.0), node.value("angle", 0.0) * kRadPerDeg, 1e-12);
+  EXPECT_NEAR(found.angle_rad.value_or(0.0), radians(node.value("angle", 0.0)), 1e-12);
   EXPECT_EQ(found.position_m.has_value(), node.contains("pos"));
   if (found.position_m) expect_vector(*found.position_m, node, "pos");
   std::string hex = node.value("data", "");
@@ -47,7 +48,7 @@ void expect_motion(const NlinkMotion& found, const Json& decoded) {
   expect_vector(found.velocity_mps, decoded, "vel");
   expect_vector(found.gyro_radps, decoded, "gyro");
   expect_vector(found.accel_mps2, decoded, "acc");
-  expect_vector(found.roll_pitch_yaw_rad, decoded, "angle", kRadPerDeg);
+  expect_vector(found.roll_pitch_yaw_rad, decoded, "angle", radians(1.0));
   EXPECT_NEAR(found.q.w(), decoded.at("quat")[0].get<double>(), 1e-6);
   EXPECT_NEAR(found.q.x(), decoded.at("quat")[1].get<double>(), 1e-6);
   EXPECT_NEAR(found.q.y(), decoded.at("quat")[2].get<double>(), 1e-6);

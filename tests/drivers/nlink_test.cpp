@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include "drivers/uwb/nlink_encoder.hpp"
 #include "tests/support/recorded_files.hpp"
 #include "tests/support/recorded_frames.hpp"
 
@@ -134,7 +135,7 @@ TEST(Nlink, ReadsRangesOfEveryKindThatHasThem) {
   EXPECT_EQ(ranges_of("nlink/nodeframe5_01").size(), 4U);
   EXPECT_EQ(ranges_of("nlink/nodeframe0_01").size(), 0U);
   EXPECT_EQ(ranges_of("nlink/nodeframe1_01").size(), 0U);
-  // A weak first path is told by the difference of the powers; TagFrame0 has none.
+  // A weak first path is recognized by the difference of the powers; TagFrame0 has none.
   EXPECT_EQ(ranges_of("nlink/tagframe0_01")[1].first_path_dbm, 0.0);
   EXPECT_EQ(ranges_of("nlink/tagframe0_01")[1].received_dbm, 0.0);
 }

@@ -33,7 +33,7 @@ std::vector<UwbRange> ranges_in(Parser& parser, const std::vector<std::uint8_t>&
 }
 
 /// Text that is cut short or torn by a lost character must not become a range. (A digit that turned
-/// into another one cannot be told: lines have no checksum.)
+/// into another one cannot be detected: lines have no checksum.)
 template <class Protocol>
 void expect_refuses_cuts(const std::vector<std::uint8_t>& line) {
   for (std::size_t length = 1; length + 1 < line.size(); ++length) {
@@ -126,7 +126,7 @@ TEST(Dwm1001Shell, RefusesLinesThatLostCharacters) {
     const std::size_t end =
         std::min(whole.find(" le_us"), whole.find(",POS"));  // no ranges behind it
     for (std::size_t at = 0; at < end; ++at) {
-      // A lost digit of a number cannot be told; a lost separator or letter must be.
+      // A lost digit of a number cannot be detected; a lost separator or letter must be.
       if (std::string_view("0123456789ABCDEF-.").find(whole[at]) != std::string_view::npos)
         continue;
       std::string torn = whole;
@@ -177,7 +177,7 @@ TEST(Dwm1001Tlv, FindsAnswersInEveryChunkSizeAndRefusesLengthsThatContradict) {
   const auto good = location(kOfTag);
   for (std::size_t chunk = 1; chunk <= good.size(); ++chunk)
     EXPECT_EQ(decode<Dwm1001TlvParser>(good + good, chunk), (Frames{good, good})) << chunk;
-  // The last byte is not used, and without a checksum its loss cannot be told.
+  // The last byte is not used, and without a checksum its loss cannot be detected.
   for (std::size_t length = 0; length + 1 < good.size(); ++length) {
     expect_only_good_frames<Dwm1001TlvParser>(
         {good.begin(), good.begin() + static_cast<std::ptrdiff_t>(length)}, good, length);
@@ -269,7 +269,7 @@ TEST(FiraUci, FindsNotificationsAmongOtherPacketsInEveryChunkSize) {
   const auto status = bytes_of("61 02 00 06 11 00 00 00 02 00");  // SESSION_STATUS_NTF
   for (std::size_t chunk = 1; chunk <= good.size(); ++chunk)
     EXPECT_EQ(decode<FiraUciParser>(good + status + good, chunk), (Frames{good, good})) << chunk;
-  // The last byte is not used, and without a checksum its loss cannot be told.
+  // The last byte is not used, and without a checksum its loss cannot be detected.
   for (std::size_t length = 0; length + 1 < good.size(); ++length) {
     expect_only_good_frames<FiraUciParser>(
         {good.begin(), good.begin() + static_cast<std::ptrdiff_t>(length)}, good, length);

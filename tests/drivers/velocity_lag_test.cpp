@@ -14,7 +14,7 @@ constexpr VelocityLag kSome{.begin_s = 3.0,
                             .jerk = 2.0,
                             .command = -0.7};
 
-TEST(VelocityLag, BeginsWhereItIsToldTo) {
+TEST(VelocityLag, BeginsWhereItIsCommandedTo) {
   EXPECT_NEAR(kSome.derivative(3.0, 0), 1.0, 1e-12);
   EXPECT_NEAR(kSome.derivative(3.0, 1), 0.4, 1e-12);
   EXPECT_NEAR(kSome.derivative(3.0, 2), -0.3, 1e-12);

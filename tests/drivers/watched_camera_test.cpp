@@ -59,10 +59,10 @@ class WatchedCameraTest : public testing::Test {
   /// The result of such images for `duration`, or the first error.
   template <class Picture>
   std::string answer_for(Duration duration, const Picture& picture, Duration period = 10ms) {
-    std::string told;
-    for (int i = 0; i * period < duration && told.empty(); ++i)
-      told = answer_to(picture(i), period);
-    return told;
+    std::string reported;
+    for (int i = 0; i * period < duration && reported.empty(); ++i)
+      reported = answer_to(picture(i), period);
+    return reported;
   }
 
   static std::vector<std::uint8_t> gray(std::uint8_t level) {
@@ -89,9 +89,9 @@ TEST_F(WatchedCameraTest, EndsAStreamOfEqualImages) {
   ASSERT_EQ(answer_for(1s, noisy), "");
   const Timestamp hung = clock_.now();
 
-  const std::string told = answer_for(5s, [](int) { return gray(20); });
+  const std::string reported = answer_for(5s, [](int) { return gray(20); });
 
-  EXPECT_NE(told.find("frozen"), std::string::npos);
+  EXPECT_NE(reported.find("frozen"), std::string::npos);
   EXPECT_LT(clock_.now() - hung, 1500ms);
 }
 

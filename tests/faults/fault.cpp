@@ -31,14 +31,17 @@ std::optional<Fault> parse_fault(const std::string& text) {
 }
 
 std::vector<Fault> draw_faults(std::uint64_t seed, int robots, const FaultTimes& times) {
+  const std::size_t kinds = seed > kLastSeedOfFirstKinds ? kKinds.size() : kFirstKinds;
   Dice dice(seed);
   std::vector<Fault> faults(seed % 2 == 0 ? 1 : 2 + dice.below(2));
   for (Fault& fault : faults) {
-    fault.kind = kKinds.at(dice.below(kKinds.size())).kind;
+    fault.kind = kKinds.at(dice.below(kinds)).kind;
     fault.robot = RobotId{static_cast<std::uint16_t>(1 + dice.below(std::uint64_t(robots)))};
     fault.from_s = dice.between(times.from_s, times.to_s - 0.5);
-    fault.to_s =
-        dice.between(fault.from_s + 0.1, std::min(times.to_s, fault.from_s + times.longest_s));
+    const bool is_without_sight = fault.kind == Kind::kUwbNoSight;
+    const double longest_s = is_without_sight ? times.longest_without_sight_s : times.longest_s;
+    const double end_s = std::max(times.to_s, times.from_s + longest_s);
+    fault.to_s = dice.between(fault.from_s + 0.1, std::min(end_s, fault.from_s + longest_s));
     fault.rate = dice.between(0.2, 1.0);
     fault.seed = dice.below(1000000);
     fault = *parse_fault(to_string(fault));  // as it is printed, it can be repeated

@@ -20,6 +20,7 @@ enum class Kind : std::uint8_t {
   kImuAxesSwapped,
   kImuGap,
   kImuHalfRate,
+  kImuSlow,
   kImuScaled,
   kImuLate,
   kUwbConstant,
@@ -54,10 +55,12 @@ enum class Kind : std::uint8_t {
   // a robot as a whole
   kReboot,
   kRebootLoop,
+  kKilled,
   kFreeze,
   kClockStep,
   kClockSkew,
   kWrongKey,
+  kOldKey,
   kNoKey,
   kWrongSignature,
   kReload,
@@ -70,6 +73,7 @@ enum class Kind : std::uint8_t {
   kLiarBearings,
   kLiarImu,
   kLiarExtremes,
+  kLiarWithinBounds,
   // its clients
   kClientsFlood,
   kClientsComeAndGo,
@@ -146,14 +150,23 @@ inline constexpr std::array kKinds{
     KindOf{Kind::kLiarExtremes, "liar-extremes", Scope::kRobot},
     KindOf{Kind::kClientsFlood, "clients-flood", Scope::kNobody, "4000 requests a second"},
     KindOf{Kind::kClientsComeAndGo, "clients-come-and-go", Scope::kNobody, "100 a second"},
+    KindOf{Kind::kImuSlow, "imu-slow", Scope::kNobody, "means of 6 samples"},
+    KindOf{Kind::kKilled, "killed", Scope::kNobody},
+    KindOf{Kind::kOldKey, "old-key", Scope::kNobody},
+    KindOf{Kind::kLiarWithinBounds, "liar-within-bounds", Scope::kRobot},
 };
+
+/// Seeds up to this one draw the first kinds only, so that a seed stays what it was when kinds are
+/// added.
+inline constexpr std::uint64_t kLastSeedOfFirstKinds = 1000;
+inline constexpr std::size_t kFirstKinds = 56;
 
 struct Fault {
   Kind kind{};
   RobotId robot{};
   double from_s = 0.0;  ///< true time
   double to_s = 0.0;
-  double rate = 1.0;       ///< of what `KindOf::rate` tells
+  double rate = 1.0;       ///< as `KindOf::rate` describes it
   std::uint64_t seed = 0;  ///< of its own details
 
   [[nodiscard]] bool lasts_at(double true_s) const { return true_s >= from_s && true_s < to_s; }
@@ -169,7 +182,8 @@ struct Fault {
 struct FaultTimes {
   double from_s = 0.0;
   double to_s = 0.0;
-  double longest_s = 0.0;  ///< each
+  double longest_s = 0.0;                ///< each
+  double longest_without_sight_s = 0.0;  ///< of ranges without line of sight
 };
 
 /// One to three faults of any kinds among robots 1 to `robots`. Every second seed has one alone.

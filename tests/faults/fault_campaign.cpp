@@ -4,10 +4,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "tests/faults/fault_table.hpp"
+#include "tests/faults/kept.hpp"
 #include "tests/faults/trial.hpp"
 
 namespace crepes::faults {
@@ -19,15 +21,16 @@ struct Options {
   std::uint64_t part = 0;  ///< of the worlds
   std::uint64_t parts = 1;
   bool takes_long = false;
+  bool flies_kept = false;
   std::string log;
   std::string trial;
   std::vector<std::string> tables;
 };
 
 void print(const Verdict& verdict) {
-  fmt::print("open {}\n", to_string(verdict.trial));  // as a line of kept.txt
+  fmt::print("{}\n", is_broken(verdict) ? kept_line(verdict) : to_string(verdict.trial));
   fmt::print("  smallest: {}\n", to_string(Trial{verdict.trial.world, verdict.smallest}));
-  for (const std::string& line : verdict.broken) fmt::print("    {}\n", line);
+  for (const Broken& one : verdict.broken) fmt::print("    {}\n", one.text);
   std::fflush(stdout);
 }
 
@@ -48,10 +51,37 @@ std::uint64_t run_one(const std::string& line) {
   return failed;
 }
 
+/// Those of kept.txt: prints what is worse than allowed, and what is kept here although it is open.
+std::uint64_t run_kept(const Options& options) {
+  std::map<std::string, std::vector<Trial>> by_world;
+  std::map<std::string, std::map<Promise, double>> allowed;
+  for (const KeptTrial& kept : kept_trials()) {
+    by_world[to_string(kept.trial.world)].push_back(kept.trial);
+    allowed[to_string(kept.trial)] = kept.allowed;
+  }
+  std::uint64_t failed = 0;
+  std::uint64_t world = 0;
+  for (const auto& [name, trials] : by_world) {
+    if (world++ % options.parts != options.part) continue;
+    try_all(
+        trials,
+        [&](const Verdict& verdict) {
+          const auto lines = unexpected(verdict, allowed[to_string(verdict.trial)]);
+          failed += lines.empty() ? 0 : 1;
+          if (!lines.empty()) print(verdict);
+          for (const std::string& line : kept_again(verdict, allowed[to_string(verdict.trial)]))
+            fmt::print("{}\n", line);
+        },
+        [](const Verdict&) { return false; });
+  }
+  return failed;
+}
+
 /// Whole worlds, every `parts`-th.
 std::uint64_t run(const Options& options) {
   const FaultTimes& times = options.takes_long ? kLong : kShort;
   if (!options.trial.empty()) return run_one(options.trial);
+  if (options.flies_kept) return run_kept(options);
   std::ofstream log(options.log);
   std::uint64_t failed = 0;
   const std::uint64_t end = options.first + options.count;
@@ -85,6 +115,7 @@ int main(int argc, char** argv) {
   app.add_flag("--long", options.takes_long, "faults of up to half a minute");
   app.add_option("--log", options.log, "a line for every trial goes to this file");
   app.add_option("--trial", options.trial, "only flies this schedule, as kept.txt has it");
+  app.add_flag("--kept", options.flies_kept, "only flies the schedules of kept.txt");
   app.add_option("--table", options.tables, "only prints the table of these logs");
   CLI11_PARSE(app, argc, argv);
   if (!options.tables.empty()) {

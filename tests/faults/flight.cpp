@@ -115,7 +115,7 @@ void Flight::check() {
       continue;
     }
     check_datagrams(robot);
-    if (counts_readings_) check_readings(robot);
+    check_readings(robot);
   }
   if (heap_before_ == 0) return;
   const std::uint64_t heap = heap_in_use();
@@ -139,19 +139,20 @@ void Flight::check_datagrams(const VirtualRobot& robot) {
 /// What was handed to an estimator a while ago has a verdict.
 void Flight::check_readings(const VirtualRobot& robot) {
   std::deque<Readings>& handed = handed_[robot.id()];
-  handed.push_back({robot.handed.ranges, robot.handed.bearings});
+  handed.push_back({robot.handed.ranges, robot.handed.bearings, robot.handed.samples});
   if (handed.size() <= kPatience) return;
   const Readings then = handed.front();
   handed.pop_front();
   const EstimatorStatus status = robot.estimator.status();
-  const auto judge = [&](std::string_view what, std::uint64_t count, MeasurementKind kind) {
-    const std::uint64_t judged = verdicts(status, kind);
+  const auto judge = [&](std::string_view what, std::uint64_t count, std::uint64_t judged) {
     if (judged < count)
       complain(fmt::format("r{}: {} of {} {} have no verdict", robot.id().value, count - judged,
                            count, what));
   };
-  judge("ranges", then.ranges, MeasurementKind::kRange);
-  judge("bearings", then.bearings, MeasurementKind::kBearing);
+  judge("inertial samples", then.samples, robot.estimator.used_samples() + status.refused_samples);
+  if (!counts_readings_) return;
+  judge("ranges", then.ranges, verdicts(status, MeasurementKind::kRange));
+  judge("bearings", then.bearings, verdicts(status, MeasurementKind::kBearing));
 }
 
 void Flight::complain(std::string what) {

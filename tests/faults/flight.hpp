@@ -38,6 +38,10 @@ class Flight {
   void strike(const std::vector<Fault>& faults);
 
   [[nodiscard]] const Traces& traces() const { return traces_; }
+  /// Of a robot's mesh.
+  [[nodiscard]] const MeshCounters& counters(RobotId robot) {
+    return swarm_.robot(robot).link.counters();
+  }
   /// What did not hold, a line each.
   [[nodiscard]] std::vector<std::string> complaints() const;
   /// The most that the heap has grown since the faults began [bytes].
@@ -54,6 +58,7 @@ class Flight {
   struct Readings {
     std::uint64_t ranges = 0;
     std::uint64_t bearings = 0;
+    std::uint64_t samples = 0;
   };
 
   const study::Swarm& study_;

@@ -1,12 +1,14 @@
-/// memory_growth: what a swarm of four keeps in memory after flights of different lengths, under
-/// attack all the time. See README.md.
+/// memory_growth: what a swarm of four keeps in memory over hours under attack. See README.md.
 #include <fmt/core.h>
 #include <malloc.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "daemon/ctl/replay/virtual_swarm.hpp"
@@ -16,67 +18,115 @@
 namespace crepes::faults {
 namespace {
 
-std::uint64_t heap_in_use() {
+constexpr double kPiece_s = 60.0;
+constexpr double kPause_s = 3.0;  // the robots stop, and are elsewhere when they go on
+
+double heap_mb() {
   const struct mallinfo2 heap = ::mallinfo2();
-  return heap.uordblks + heap.hblkhd;
+  return 1e-6 * static_cast<double>(heap.uordblks + heap.hblkhd);
 }
 
 /// Floods, copies, replays, a second r2 and a lying r3, ten seconds each in turn.
-std::vector<Fault> attacks(double duration_s) {
+std::vector<Fault> attacks(double from_s) {
   constexpr double kEach_s = 10.0;
-  constexpr std::array kAttacks{Kind::kGarbageFlood, Kind::kForgedFlood,  Kind::kReplay,
-                                Kind::kDoubledId,    Kind::kLiarExtremes, Kind::kJitter};
+  constexpr std::array kAttacks{Kind::kGarbageFlood, Kind::kForgedFlood,     Kind::kReplay,
+                                Kind::kDoubledId,    Kind::kLiarExtremes,    Kind::kJitter,
+                                Kind::kReplay,       Kind::kLiarWithinBounds};
   std::vector<Fault> faults;
-  for (double t = 0.0; t < duration_s; t += kEach_s) {
-    const std::size_t turn = faults.size();
+  for (std::size_t i = 0; kEach_s * static_cast<double>(i) < kPiece_s; ++i) {
+    const auto turn = i + static_cast<std::size_t>(std::lround(from_s / kEach_s));
+    const double begin_s = from_s + kEach_s * static_cast<double>(i);
     faults.push_back({.kind = kAttacks.at(turn % kAttacks.size()),
                       .robot = RobotId{static_cast<std::uint16_t>(1 + turn % 4)},
-                      .from_s = t,
-                      .to_s = t + kEach_s,
+                      .from_s = begin_s,
+                      .to_s = begin_s + kEach_s,
                       .rate = 0.5,
                       .seed = turn});
   }
   return faults;
 }
 
-/// Bytes of the robots' state after such a flight.
-std::uint64_t state_after(double duration_s) {
+SwarmDataset without_readings(SwarmDataset dataset) {
+  for (RobotRecording& robot : dataset.robots) {
+    robot.imu.clear();
+    robot.ranges.clear();
+    robot.cameras.clear();
+  }
+  return dataset;
+}
+
+/// A line through points.
+struct Slope {
+  double per_x = 0.0;
+  double sigma = 0.0;
+};
+Slope slope_of(const std::vector<std::pair<double, double>>& points) {
+  const auto n = static_cast<double>(points.size());
+  double x = 0.0;
+  double y = 0.0;
+  for (const auto& [px, py] : points) {
+    x += px / n;
+    y += py / n;
+  }
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+  for (const auto& [px, py] : points) {
+    xx += (px - x) * (px - x);
+    xy += (px - x) * (py - y);
+    yy += (py - y) * (py - y);
+  }
+  if (n < 3 || xx == 0.0) return {};
+  return {xy / xx, std::sqrt(std::max(0.0, yy - xy * xy / xx) / (n - 2) / xx)};
+}
+
+/// Flies the same minute again and again, and prints what the robots keep after each: readings and
+/// datagrams that are on their way do not count.
+int fly(double hours) {
   const auto& four = *std::ranges::find(study::kScenarios, "four", &study::Scenario::name);
-  const study::Swarm swarm = study::simulate_swarm(four, 1, duration_s);
-  const std::vector<Fault> faults = attacks(duration_s);
+  const study::Swarm swarm = study::simulate_swarm(four, 1, kPiece_s);
   FaultyNetwork network(true);
-  network.strike(faults);
-  Liars liars(faults);
+  std::optional<Liars> liars;
+  double now_s = 0.0;
   ReplaySinks sinks;
   sinks.on_pose = [](RobotId, const NeighborPose&) {};
   sinks.on_delivery = [&](RobotId from, RobotId to, double sent_s,
                           std::vector<Delivery>& deliveries) {
     network(from, to, sent_s, deliveries);
   };
-  double now_s = 0.0;
-  sinks.on_report = [&](Report& report) { liars(now_s, report); };
+  sinks.on_report = [&](Report& report) { (*liars)(now_s, report); };
   ReplayOptions options;
   options.sealed = true;
   const std::optional<SwarmTruth> no_truth;
-  const std::uint64_t before = heap_in_use();
-  VirtualSwarm flight(swarm.dataset, no_truth, options, sinks);
-  for (; now_s < duration_s; now_s += 1.0)
-    if (!flight.run_until(now_s)) return 0;
-  return heap_in_use() - before;
+  const double before_mb = heap_mb();
+  VirtualSwarm flight(without_readings(swarm.dataset), no_truth, options, sinks);
+  std::vector<std::pair<double, double>> kept;
+  for (double from_s = 0.0; from_s < 3600.0 * hours; from_s += kPiece_s + kPause_s) {
+    const std::vector<Fault> faults = attacks(from_s);
+    network.strike(faults);
+    liars.emplace(faults);
+    flight.append(swarm.dataset, from_s);
+    const double end_s = from_s + kPiece_s + kPause_s;
+    for (; now_s < end_s; now_s += 1.0)
+      if (!flight.run_until(now_s)) return 1;
+    flight.take_clocks().clear();
+    kept.emplace_back(end_s / 3600.0, heap_mb() - before_mb);
+    fmt::print("{:7.3f} h: {:.3f} MB\n", kept.back().first, kept.back().second);
+    std::fflush(stdout);
+  }
+  const std::vector later(kept.begin() + static_cast<std::ptrdiff_t>(kept.size() / 3), kept.end());
+  const Slope slope = slope_of(later);
+  fmt::print("after the first third: {:+.4f} MB an hour, sigma {:.4f}\n", slope.per_x, slope.sigma);
+  return 0;
 }
 
 }  // namespace
 }  // namespace crepes::faults
 
-int main() {
-  constexpr std::array kDurations_s{30.0, 90.0, 300.0};
-  std::vector<double> states;
-  for (const double duration_s : kDurations_s) {
-    states.push_back(static_cast<double>(crepes::faults::state_after(duration_s)));
-    fmt::print("{:4.0f} s: {:.3f} MB\n", duration_s, 1e-6 * states.back());
-    std::fflush(stdout);
-  }
-  const double per_s = (states[2] - states[1]) / (kDurations_s[2] - kDurations_s[1]);
-  fmt::print("from the last two: {:+.3f} MB an hour\n", 1e-6 * per_s * 3600.0);
-  return 0;
+int main(int argc, char** argv) {
+  CLI::App app{"What a swarm under attack keeps in memory", "memory_growth"};
+  double hours = 0.5;
+  app.add_option("--hours", hours, "of simulated time")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  return crepes::faults::fly(hours);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "net/mesh/crc32.hpp"
 
@@ -50,30 +51,82 @@ void change_each(Items& items, const Change& change) {
   for (auto& item : items) change(item);
 }
 
-/// One kind of a report's fields becomes extreme.
-void exaggerate(Report& report, Dice& dice) {
-  const auto stamp = [&](Timestamp& t) { t += from_seconds(dice.between(-2.0, 2.0)); };
-  switch (dice.below(8)) {
+/// What a liar says instead of the truth: anything at all, or what the encoder lets pass.
+struct Lies {
+  Dice& dice;
+  bool are_bounded = false;
+
+  double number(double low, double high) {
+    if (!are_bounded) return extreme(dice);
+    if (dice.happens(0.5)) return dice.between(low, high);
+    return dice.happens(0.5) ? low : high;
+  }
+  Eigen::Vector3d direction() {
+    const Eigen::Vector3d any(number(-1, 1), dice.between(-1, 1), dice.between(0.1, 1));
+    return are_bounded ? any.normalized() : any;
+  }
+  RobotId robot() {
+    return RobotId{static_cast<std::uint16_t>(are_bounded ? 1 + dice.below(5) : dice.below(65536))};
+  }
+  Duration shift() {
+    return from_seconds(are_bounded ? dice.between(-0.5, 0.05) : dice.between(-20.0, 20.0));
+  }
+};
+
+/// One kind of a report's fields becomes a lie. Every field is such a kind.
+void replace_field(Report& report, Lies lies) {
+  switch (lies.dice.below(18)) {
     case 0:
-      return change_each(report.imu, [&](auto& s) { s.gyro_radps(0) = extreme(dice); });
+      return change_each(report.imu, [&](auto& s) { s.gyro_radps(0) = lies.number(-34, 34); });
     case 1:
-      return change_each(report.imu, [&](auto& s) { s.accel_mps2(2) = extreme(dice); });
+      return change_each(report.imu, [&](auto& s) { s.accel_mps2(2) = lies.number(-150, 150); });
     case 2:
-      return change_each(report.imu, [&](auto& s) { stamp(s.stamp); });
+      return change_each(report.imu, [&](auto& s) { s.stamp += lies.shift(); });
     case 3:
-      return change_each(report.ranges, [&](auto& r) { r.range_m = extreme(dice); });
+      return change_each(report.ranges, [&](auto& r) { r.range_m = lies.number(0.01, 200); });
     case 4:
-      return change_each(report.bearings, [&](auto& b) { b.sigma_rad = extreme(dice); });
+      return change_each(report.ranges, [&](auto& r) { r.stamp += lies.shift(); });
     case 5:
-      return change_each(report.bearings, [&](auto& b) { b.p_B_C(1) = extreme(dice); });
+      return change_each(report.ranges, [&](auto& r) { r.neighbor = lies.robot(); });
     case 6:
-      return change_each(report.estimates, [&](auto& e) {
-        e.T_B_N.pose.p(0) = extreme(dice);
-        e.T_B_N.covariance *= extreme(dice);
+      return change_each(report.ranges, [&](auto& r) {
+        r.first_path_dbm = lies.number(-127, 0);
+        r.received_dbm = lies.number(-127, 0);
       });
+    case 7:
+      return change_each(report.bearings, [&](auto& b) { b.sigma_rad = lies.number(1e-5, 1); });
+    case 8:
+      return change_each(report.bearings, [&](auto& b) { b.p_B_C(1) = lies.number(-100, 100); });
+    case 9:
+      return change_each(report.bearings, [&](auto& b) { b.u_B = lies.direction(); });
+    case 10:
+      return change_each(report.bearings, [&](auto& b) { b.neighbor = lies.robot(); });
+    case 11:
+      return change_each(report.bearings, [&](auto& b) { b.stamp += lies.shift(); });
+    case 12:
+      return change_each(report.estimates, [&](auto& e) {
+        e.T_B_N.pose.p(0) = lies.number(-1e3, 1e3);
+        e.v_B_N(0) = lies.number(-1e3, 1e3);
+      });
+    case 13:
+      return change_each(report.estimates,
+                         [&](auto& e) { e.T_B_N.covariance *= lies.number(1e-6, 1e6); });
+    case 14:
+      return change_each(report.estimates, [&](auto& e) {
+        e.T_B_N.pose.q = Eigen::AngleAxisd(lies.number(-3, 3), lies.direction().normalized());
+      });
+    case 15:
+      return change_each(report.estimates, [&](auto& e) {
+        e.stamp += lies.shift();
+        e.neighbor = lies.robot();
+      });
+    case 16:
+      report.tilt.up_B = lies.direction();
+      return;
     default:
-      report.tilt.sigma_rad = extreme(dice);
-      return stamp(report.tilt.stamp);
+      report.tilt.sigma_rad = lies.number(1e-5, 3);
+      report.tilt.stamp += lies.shift();
+      return;
   }
 }
 
@@ -97,7 +150,9 @@ void lie(const Fault& fault, Dice& dice, Report& report) {
     case Kind::kLiarImu:
       return change_each(report.imu, [&](auto& s) { s.gyro_radps *= 1.0 + fault.rate; });
     case Kind::kLiarExtremes:
-      return exaggerate(report, dice);
+      return replace_field(report, {dice, false});
+    case Kind::kLiarWithinBounds:
+      return replace_field(report, {dice, true});
     default:
       return;
   }
@@ -112,10 +167,21 @@ void FaultyNetwork::strike(const std::vector<Fault>& faults) {
 
 void FaultyNetwork::operator()(RobotId from, RobotId to, double sent_s,
                                std::vector<Delivery>& deliveries) {
-  std::vector<Delivery>& recorded = recorded_[from];
-  if (!deliveries.empty() && recorded.size() < kRecorded) recorded.push_back(deliveries.front());
+  if (!deliveries.empty()) record(deliveries.front(), from, sent_s);
   for (const Fault& fault : faults_)
     if (fault.lasts_at(sent_s)) apply(fault, from, to, sent_s, deliveries);
+}
+
+/// What an adversary on the air keeps. A robot that restarts for `kReplayedSession` leaves a
+/// session that has ended.
+void FaultyNetwork::record(const Delivery& delivery, RobotId from, double sent_s) {
+  for (const Fault& fault : faults_)
+    if (fault.kind == Kind::kReplayedSession && fault.robot == from && fault.lasts_at(sent_s) &&
+        !ended_.contains(from))
+      ended_[from] = std::exchange(recorded_[from], {});
+  std::deque<Bytes>& recorded = recorded_[from];
+  recorded.push_back(delivery.bytes);
+  if (recorded.size() > kRecorded) recorded.pop_front();
 }
 
 void FaultyNetwork::apply(const Fault& fault, RobotId from, RobotId to, double sent_s,
@@ -193,10 +259,11 @@ void FaultyNetwork::flood(const Fault& fault, double sent_s, std::vector<Deliver
 
 void FaultyNetwork::replay(const Fault& fault, RobotId from, double sent_s,
                            std::vector<Delivery>& deliveries) {
-  const std::vector<Delivery>& all = recorded_[from];
+  const std::deque<Bytes>& all =
+      fault.kind == Kind::kReplayedSession ? ended_[from] : recorded_[from];
   for (int i = 0; i < kReplays * fault.rate && !all.empty(); ++i)
     deliveries.push_back(
-        {sent_s + 0.01, all[dice_.below(all.size())].bytes, replay_address(RobotId{98})});
+        {sent_s + 0.01, all[dice_.below(all.size())], replay_address(RobotId{98})});
 }
 
 void FaultyNetwork::damage(Bytes& bytes) {

@@ -1,6 +1,7 @@
 /// Faults of the network and of what a robot reports.
 #pragma once
 
+#include <deque>
 #include <map>
 #include <optional>
 #include <vector>
@@ -29,6 +30,7 @@ class FaultyNetwork {
   void apply(const Fault& fault, RobotId from, RobotId to, double sent_s,
              std::vector<Delivery>& deliveries);
   void flood(const Fault& fault, double sent_s, std::vector<Delivery>& deliveries);
+  void record(const Delivery& delivery, RobotId from, double sent_s);
   void replay(const Fault& fault, RobotId from, double sent_s, std::vector<Delivery>& deliveries);
   void damage(Bytes& bytes);
   [[nodiscard]] Bytes of_second_robot(const Bytes& bytes, RobotId from) const;
@@ -36,7 +38,8 @@ class FaultyNetwork {
   std::vector<Fault> faults_;
   Dice dice_{0};
   std::optional<PacketSeal> seal_;
-  std::map<RobotId, std::vector<Delivery>> recorded_;  ///< by sender: the first seconds
+  std::map<RobotId, std::deque<Bytes>> recorded_;  ///< by sender: the latest
+  std::map<RobotId, std::deque<Bytes>> ended_;     ///< of sessions that have ended since
 };
 
 /// What lying robots change in the reports that they send at `true_s`.

@@ -10,6 +10,9 @@ namespace {
 constexpr double kLongestGap_s = 0.1;  // between poses that follow each other
 constexpr double kWindow_s = 0.3;
 
+/// Not a number if one is none.
+double larger(double a, double b) { return a >= b || std::isnan(a) ? a : b; }
+
 }  // namespace
 
 void PoseTrace::add(const NeighborPose& pose, const Pose& truth, double true_s) {
@@ -18,16 +21,22 @@ void PoseTrace::add(const NeighborPose& pose, const Pose& truth, double true_s) 
   not_finite_ += numbers.allFinite() && pose.T_B_N.covariance.allFinite() ? 0 : 1;
   for (const double number : numbers)
     hash_ = hash_ * 1099511628211U ^ std::bit_cast<std::uint64_t>(number);
-  const Eigen::Vector3d error = pose_difference(pose.T_B_N.pose, truth).head<3>();
-  const Eigen::Matrix3d P = pose.T_B_N.covariance.topLeftCorner<3, 3>();
-  errors_.push_back({true_s, error.norm(), error.dot(P.llt().solve(error))});
+  const Vector6d error = pose_difference(pose.T_B_N.pose, truth);
+  const auto mahalanobis2 = [&](Eigen::Index at) {
+    const Eigen::Vector3d part = error.segment<3>(at);
+    return part.dot(pose.T_B_N.covariance.block<3, 3>(at, at).llt().solve(part));
+  };
+  errors_.push_back({.true_s = true_s,
+                     .error_m = error.head<3>().norm(),
+                     .error_rad = error.tail<3>().norm(),
+                     .mahalanobis2 = larger(mahalanobis2(0), mahalanobis2(3))});
 }
 
 Beyond PoseTrace::beyond(const Span& span) const {
   Beyond beyond;
   std::optional<double> since_s;
   double latest_s = 0.0;
-  for (const auto& [true_s, error_m, mahalanobis2] : errors_) {
+  for (const auto& [true_s, error_m, error_rad, mahalanobis2] : errors_) {
     if (!span.contains(true_s)) continue;
     const bool is_beyond = !(mahalanobis2 <= kBeyond5Sigma);
     const bool goes_on = is_beyond && since_s && true_s - latest_s < kLongestGap_s;
@@ -36,20 +45,25 @@ Beyond PoseTrace::beyond(const Span& span) const {
     if (!since_s) continue;
     beyond.longest_s = std::max(beyond.longest_s, true_s - *since_s);
     beyond.worst_m = std::max(beyond.worst_m, error_m);
+    beyond.worst_rad = std::max(beyond.worst_rad, error_rad);
   }
   return beyond;
 }
 
-double PoseTrace::rmse_m(const Span& span) const {
+double PoseTrace::rmse(const Span& span, double PoseError::*error) const {
   double square = 0.0;
   double count = 0.0;
   for (const PoseError& pose : errors_) {
     if (!span.contains(pose.true_s)) continue;
-    square += pose.error_m * pose.error_m;
+    square += pose.*error * pose.*error;
     ++count;
   }
   return count == 0.0 ? 0.0 : std::sqrt(square / count);
 }
+
+double PoseTrace::rmse_m(const Span& span) const { return rmse(span, &PoseError::error_m); }
+
+double PoseTrace::rmse_rad(const Span& span) const { return rmse(span, &PoseError::error_rad); }
 
 double PoseTrace::worst_m(const Span& span) const {
   double worst = 0.0;

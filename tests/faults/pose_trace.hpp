@@ -17,19 +17,22 @@ struct Span {
   [[nodiscard]] bool contains(double t_s) const { return t_s >= from_s && t_s <= to_s; }
 };
 
-/// A position of which Mahalanobis^2 is above this is off by more than 5 sigma (one in 10^7).
+/// A position or an attitude of which Mahalanobis^2 is above this is off by more than 5 sigma (one
+/// in 10^7).
 inline constexpr double kBeyond5Sigma = 35.0;
 
 struct PoseError {
   double true_s = 0.0;
   double error_m = 0.0;
-  double mahalanobis2 = 0.0;  ///< of the position
+  double error_rad = 0.0;
+  double mahalanobis2 = 0.0;  ///< of position or attitude, whichever is larger
 };
 
 /// Poses off by more than 5 sigma, on end.
 struct Beyond {
   double longest_s = 0.0;
   double worst_m = 0.0;
+  double worst_rad = 0.0;
 };
 
 class PoseTrace {
@@ -45,6 +48,7 @@ class PoseTrace {
   [[nodiscard]] Beyond beyond(const Span& span) const;
   /// Root mean square; 0 without poses.
   [[nodiscard]] double rmse_m(const Span& span) const;
+  [[nodiscard]] double rmse_rad(const Span& span) const;
   [[nodiscard]] double worst_m(const Span& span) const;
   /// The longest time without a pose.
   [[nodiscard]] double longest_absence_s(const Span& span) const;
@@ -53,6 +57,8 @@ class PoseTrace {
   [[nodiscard]] double recovered_at_s(const Span& span, double rmse_m) const;
 
  private:
+  [[nodiscard]] double rmse(const Span& span, double PoseError::*error) const;
+
   std::vector<PoseError> errors_;
   std::uint64_t not_finite_ = 0;
   std::uint64_t hash_ = 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <set>
 #include <utility>
 
 #include "estimator/core/contract.hpp"
@@ -47,6 +48,8 @@ class Schedule {
 
   std::vector<Action> actions_;
   std::shared_ptr<Originals> originals_ = std::make_shared<Originals>();
+  std::shared_ptr<std::set<RobotId>> killed_ = std::make_shared<std::set<RobotId>>();
+  std::shared_ptr<MeshKey> swarm_key_ = std::make_shared<MeshKey>(replay_swarm_key());
 };
 
 void Schedule::add(const Fault& fault) {
@@ -59,10 +62,21 @@ void Schedule::add(const Fault& fault) {
 void Schedule::change_power(const Fault& fault) {
   const RobotId robot = fault.robot;
   const auto off = [robot](VirtualSwarm& swarm) { swarm.switch_off(robot); };
-  const auto on = [robot](VirtualSwarm& swarm) { swarm.switch_on(robot); };
+  const auto on = [robot, killed = killed_](VirtualSwarm& swarm) {
+    if (!killed->contains(robot)) swarm.switch_on(robot);
+  };
   if (fault.kind == Kind::kReboot) {
     at(fault.from_s, off);
     at(fault.to_s, on);
+  } else if (fault.kind == Kind::kReplayedSession) {
+    constexpr double kBoot_s = 0.3;
+    at(fault.from_s, off);
+    at(std::min(fault.from_s + kBoot_s, fault.to_s), on);
+  } else if (fault.kind == Kind::kKilled) {
+    at(fault.from_s, [robot, killed = killed_](VirtualSwarm& swarm) {
+      killed->insert(robot);
+      swarm.switch_off(robot);
+    });
   } else if (fault.kind == Kind::kRebootLoop) {
     const double half_s = 0.5 * fault.rate;
     for (double t = fault.from_s; t < fault.to_s; t += 2 * half_s) {
@@ -70,8 +84,11 @@ void Schedule::change_power(const Fault& fault) {
       at(std::min(t + half_s, fault.to_s), on);
     }
   } else if (fault.kind == Kind::kFreeze) {
-    at(fault.from_s, [robot](VirtualSwarm& swarm) { swarm.freeze(robot); });
-    at(fault.to_s, [robot, end_s = fault.to_s](VirtualSwarm& swarm) {
+    at(fault.from_s, [robot, killed = killed_](VirtualSwarm& swarm) {
+      if (!killed->contains(robot)) swarm.freeze(robot);
+    });
+    at(fault.to_s, [robot, end_s = fault.to_s, killed = killed_](VirtualSwarm& swarm) {
+      if (killed->contains(robot)) return;
       CREPES_EXPECT(swarm.thaw(robot, end_s).has_value(), "there are no pictures");
     });
   }
@@ -97,19 +114,25 @@ void Schedule::change_keys(const Fault& fault) {
     });
   };
   if (fault.kind == Kind::kWrongKey) {
-    change(fault.from_s, [](VirtualRobot& r) { r.seal.emplace(MeshKey{{9}}); });
+    change(fault.from_s, [](VirtualRobot& r) { r.seal.emplace(MeshKey{{99}}); });
   } else if (fault.kind == Kind::kNoKey) {
     change(fault.from_s, [](VirtualRobot& r) { r.seal.reset(); });
   } else if (fault.kind == Kind::kWrongSignature) {
     change(fault.from_s, [](VirtualRobot& r) { r.signer.emplace(replay_robot_key(RobotId{77})); });
+  } else if (fault.kind == Kind::kOldKey) {
+    at(fault.from_s, [robot = fault.robot, key = swarm_key_](VirtualSwarm& swarm) {
+      ++key->bytes.front();  // a new key
+      for (VirtualRobot& one : swarm.robots())
+        if (one.id() != robot) one.seal.emplace(*key);
+    });
   } else {
     return;
   }
-  change(fault.to_s, [](VirtualRobot& r) {
+  change(fault.to_s, [key = swarm_key_](VirtualRobot& r) {
     const bool is_sealed = !r.trust.keys.empty();
     r.seal.reset();
     r.signer.reset();
-    if (is_sealed) r.seal.emplace(replay_swarm_key());
+    if (is_sealed || *key != replay_swarm_key()) r.seal.emplace(*key);
     if (is_sealed) r.signer.emplace(replay_robot_key(r.id()));
   });
 }

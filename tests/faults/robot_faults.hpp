@@ -15,7 +15,8 @@ struct Action {
   std::function<void(VirtualSwarm&)> apply;
 };
 
-/// In order of time. Every change is taken back when its fault ends, except what a clock is ahead.
+/// In order of time. Every change is taken back when its fault ends, except what a clock is ahead,
+/// a robot that was killed, and a new key of the swarm, which its last robot then takes too.
 [[nodiscard]] std::vector<Action> actions_of(const std::vector<Fault>& faults);
 
 }  // namespace crepes::faults

@@ -1,6 +1,7 @@
 #include "tests/faults/sensor_faults.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <variant>
 
@@ -59,6 +60,8 @@ bool SensorFault::change(ImuSample& sample) {
       return false;
     case Kind::kImuHalfRate:
       return dice_.happens(0.5);
+    case Kind::kImuSlow:
+      return averages(sample);
     case Kind::kImuScaled:
       sample.gyro_radps *= 1.0 + fault_.rate;
       break;
@@ -69,6 +72,20 @@ bool SensorFault::change(ImuSample& sample) {
       break;
   }
   sample.stamp = stamp;
+  return true;
+}
+
+/// As a sensor that is set to a lower rate: means over longer intervals.
+bool SensorFault::averages(ImuSample& sample) {
+  summed_.push_back(sample);
+  if (static_cast<double>(summed_.size()) < std::ceil(6.0 * fault_.rate)) return false;
+  ImuSample mean{.stamp = sample.stamp};
+  for (const ImuSample& each : summed_) {
+    mean.gyro_radps += each.gyro_radps / static_cast<double>(summed_.size());
+    mean.accel_mps2 += each.accel_mps2 / static_cast<double>(summed_.size());
+  }
+  summed_.clear();
+  sample = mean;
   return true;
 }
 

@@ -27,6 +27,7 @@ class SensorFault {
   [[nodiscard]] bool change(ImuSample& sample);
   [[nodiscard]] bool change(UwbRange& range);
   [[nodiscard]] bool change(SpotFrame& frame);
+  [[nodiscard]] bool averages(ImuSample& sample);
   [[nodiscard]] Spot random_spot();
 
   Fault fault_;
@@ -34,6 +35,7 @@ class SensorFault {
   std::optional<ImuSample> first_sample_;
   std::optional<std::vector<Spot>> first_spots_;
   std::deque<ImuSample> earlier_samples_;
+  std::vector<ImuSample> summed_;
   std::deque<std::vector<Spot>> earlier_spots_;
 };
 

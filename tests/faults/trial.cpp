@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <numbers>
 #include <sstream>
 
 #include "estimator/core/contract.hpp"
 #include "tests/faults/in_child.hpp"
+#include "tests/faults/shrink.hpp"
 #include "tests/study/simulated_swarm.hpp"
 
 namespace crepes::faults {
@@ -17,6 +19,7 @@ constexpr std::array<std::string_view, 3> kScenarioNames{"four", "occluded", "cl
 constexpr double kLongestBeyond_s = 0.5;
 constexpr double kLongestAbsence_s = 0.5;
 constexpr double kGone_s = 2.0;
+constexpr double kDegrees = 180.0 / std::numbers::pi;  // a radian
 
 double first_s(const std::vector<Fault>& faults) {
   return std::ranges::min_element(faults, {}, &Fault::from_s)->from_s;
@@ -35,16 +38,26 @@ bool is_excused(const std::vector<Fault>& faults, const Pair& pair) {
   });
 }
 
+/// Killed for good: nobody sees it again.
+bool is_lost(const std::vector<Fault>& faults, const Pair& pair) {
+  return std::ranges::any_of(faults, [&](const Fault& fault) {
+    return fault.kind == Kind::kKilled && is_of(fault, pair);
+  });
+}
+
 /// Learned calibration may have to be learned anew.
 double allowed_rmse_m(double reference_m) { return 2.0 * reference_m + 0.03; }
+double allowed_rmse_rad(double reference_rad) { return 2.0 * reference_rad + 0.02; }
 
 /// Poses of a robot that is switched off or frozen: while they are published, they are honest.
 bool is_ghost(const std::vector<Fault>& faults, RobotId robot, const PoseError& pose) {
   return !(pose.mahalanobis2 <= kBeyond5Sigma) &&
          std::ranges::any_of(faults, [&](const Fault& fault) {
-           const bool is_gone = fault.kind == Kind::kReboot || fault.kind == Kind::kFreeze;
+           const bool is_killed = fault.kind == Kind::kKilled;
+           const bool is_gone =
+               is_killed || fault.kind == Kind::kReboot || fault.kind == Kind::kFreeze;
            return is_gone && fault.robot == robot && pose.true_s > fault.from_s + kGone_s &&
-                  pose.true_s < fault.to_s;
+                  (is_killed || pose.true_s < fault.to_s);
          });
 }
 
@@ -59,10 +72,11 @@ class PairJudge {
         all_{first_s(faults), end_s(faults)},
         after_{recovered_s(faults), end_s(faults)} {}
 
-  [[nodiscard]] std::vector<std::string> broken() {
-    if (found_.not_finite() > 0) add(fmt::format("{} poses not finite", found_.not_finite()));
+  [[nodiscard]] std::vector<Broken> broken() {
+    if (const auto count = found_.not_finite(); count > 0)
+      add(Promise::kFinite, static_cast<double>(count), fmt::format("{} poses not finite", count));
     judge_honesty();
-    if (reference_.rmse_m(after_) > 0.0) judge_recovery();
+    if (reference_.rmse_m(after_) > 0.0 && !is_lost(faults_, pair_)) judge_recovery();
     return std::move(broken_);
   }
 
@@ -71,13 +85,15 @@ class PairJudge {
     const bool excused = is_excused(faults_, pair_);
     const Beyond beyond = found_.beyond(excused ? after_ : all_);
     if (beyond.longest_s > kLongestBeyond_s)
-      add(fmt::format("beyond 5 sigma for {:.2f} s, up to {:.2f} m", beyond.longest_s,
-                      beyond.worst_m));
+      add(Promise::kHonest, beyond.longest_s,
+          fmt::format("beyond 5 sigma for {:.2f} s, up to {:.2f} m and {:.2f} rad",
+                      beyond.longest_s, beyond.worst_m, beyond.worst_rad));
     const auto ghosts = std::ranges::count_if(found_.errors(), [&](const PoseError& pose) {
       return is_ghost(faults_, pair_.second, pose);
     });
     if (!excused && ghosts > 0)
-      add(fmt::format("{} dishonest poses of a robot that is gone", ghosts));
+      add(Promise::kNoGhosts, static_cast<double>(ghosts),
+          fmt::format("{} dishonest poses of a robot that is gone", ghosts));
   }
 
   void judge_recovery() {
@@ -85,16 +101,25 @@ class PairJudge {
     const double allowed_s =
         std::max(kLongestAbsence_s, reference_.longest_absence_s(after_) + 0.1);
     if (absence_s > allowed_s)
-      add(fmt::format("no pose for {:.2f} s after the recovery", absence_s));
+      add(Promise::kPresent, absence_s,
+          fmt::format("no pose for {:.2f} s after the recovery", absence_s));
     const double without_m = reference_.rmse_m(after_);
     const double rmse_m = found_.rmse_m(after_);
     if (rmse_m > allowed_rmse_m(without_m))
-      add(fmt::format("error {:.3f} m after the recovery, {:.3f} m without faults", rmse_m,
+      add(Promise::kError, rmse_m,
+          fmt::format("error {:.3f} m after the recovery, {:.3f} m without faults", rmse_m,
                       without_m));
+    const double without_rad = reference_.rmse_rad(after_);
+    const double rmse_rad = found_.rmse_rad(after_);
+    if (rmse_rad > allowed_rmse_rad(without_rad))
+      add(Promise::kTurn, rmse_rad * kDegrees,
+          fmt::format("turned by {:.2f} deg after the recovery, {:.2f} deg without faults",
+                      rmse_rad * kDegrees, without_rad * kDegrees));
   }
 
-  void add(const std::string& what) {
-    broken_.push_back(fmt::format("r{} -> r{}: {}", pair_.first.value, pair_.second.value, what));
+  void add(Promise promise, double size, const std::string& what) {
+    broken_.push_back({promise, size,
+                       fmt::format("r{} -> r{}: {}", pair_.first.value, pair_.second.value, what)});
   }
 
   const std::vector<Fault>& faults_;
@@ -103,7 +128,7 @@ class PairJudge {
   const PoseTrace& reference_;
   Span all_;
   Span after_;
-  std::vector<std::string> broken_;
+  std::vector<Broken> broken_;
 };
 
 void measure(const std::vector<Fault>& faults, const Traces& traces, const Traces& reference,
@@ -118,17 +143,18 @@ void measure(const std::vector<Fault>& faults, const Traces& traces, const Trace
       verdict.beyond_s = std::max(verdict.beyond_s, trace.beyond(during).longest_s);
     }
     const double without_m = reference.at(pair).rmse_m(after);
-    if (without_m == 0.0) continue;
+    if (without_m == 0.0 || is_lost(faults, pair)) continue;
     const double recovered_s = trace.recovered_at_s(after, allowed_rmse_m(without_m));
     verdict.recovery_s = std::max(verdict.recovery_s, recovered_s - last_s);
   }
 }
 
-/// What a copy of the process tells.
+/// What a copy of the process reports.
 std::string to_text(const Verdict& verdict) {
   std::string text = fmt::format("{} {} {} {} {}\n", verdict.worst_m, verdict.beyond_s,
                                  verdict.recovery_s, verdict.heap_growth, verdict.hash);
-  for (const std::string& line : verdict.broken) text += line + "\n";
+  for (const Broken& one : verdict.broken)
+    text += fmt::format("{} {} {}\n", name_of(one.promise), one.size, one.text);
   return text;
 }
 
@@ -137,10 +163,12 @@ Verdict read_verdict(const ChildResult& child) {
   std::istringstream text(child.text);
   text >> verdict.worst_m >> verdict.beyond_s >> verdict.recovery_s >> verdict.heap_growth >>
       verdict.hash;
-  std::string line;
-  std::getline(text, line);
-  while (std::getline(text, line)) verdict.broken.push_back(line);
-  if (!child.crash.empty()) verdict.broken.push_back(child.crash);
+  Broken one;
+  for (std::string name; text >> name >> one.size && std::getline(text >> std::ws, one.text);) {
+    one.promise = promise_of(name).value_or(Promise::kRuns);
+    verdict.broken.push_back(one);
+  }
+  if (!child.crash.empty()) verdict.broken.push_back({Promise::kRuns, 1.0, child.crash});
   return verdict;
 }
 
@@ -150,12 +178,13 @@ class Branches {
   Branches(const study::Swarm& swarm, bool sealed, const Traces& reference)
       : flight_(swarm, sealed), reference_(reference) {}
 
-  [[nodiscard]] Verdict judge(const Trial& trial) {
+  [[nodiscard]] Verdict judge(const Trial& trial,
+                              const std::function<bool(const Verdict&)>& is_to_shrink) {
     flight_.fly_until(first_s(trial.faults) - 1e-3);
     Verdict verdict = fly(trial.faults);
     verdict.trial = trial;
     verdict.smallest = trial.faults;
-    shrink(verdict);
+    if (is_to_shrink(verdict)) shrink(verdict);
     return verdict;
   }
 
@@ -167,26 +196,22 @@ class Branches {
       flight_.fly_until(end_s(faults));
       verdict.heap_growth = flight_.heap_growth();
       measure(faults, flight_.traces(), reference_, verdict);
-      verdict.broken = flight_.complaints();
-      for (std::string& line : broken_promises(faults, flight_.traces(), reference_))
-        verdict.broken.push_back(std::move(line));
+      verdict.broken = broken_promises(faults, flight_.traces(), reference_);
+      for (std::string& line : flight_.complaints())
+        verdict.broken.push_back({Promise::kProgram, 1.0, std::move(line)});
       return to_text(verdict);
     }));
   }
 
-  /// Leaves out faults as long as a promise is still broken.
+  /// The smallest schedule that still breaks one of the promises.
   void shrink(Verdict& verdict) {
-    std::vector<Fault>& faults = verdict.smallest;
-    for (std::size_t i = 0; !verdict.broken.empty() && faults.size() > 1 && i < faults.size();) {
-      std::vector<Fault> fewer = faults;
-      fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
-      if (Verdict still = fly(fewer); still.broken.empty()) {
-        ++i;
-      } else {
-        faults = std::move(fewer);
-        verdict.broken = std::move(still.broken);
-      }
-    }
+    const auto is_same = [&](const Broken& one) {
+      return std::ranges::any_of(verdict.broken,
+                                 [&](const Broken& b) { return b.promise == one.promise; });
+    };
+    verdict.smallest = shrunk(verdict.smallest, [&](const std::vector<Fault>& faults) {
+      return std::ranges::any_of(fly(faults).broken, is_same);
+    });
   }
 
   Flight flight_;
@@ -248,17 +273,18 @@ double recovered_s(const std::vector<Fault>& faults) {
   return std::ranges::max_element(faults, {}, &Fault::to_s)->to_s + kRecovery_s;
 }
 
-std::vector<std::string> broken_promises(const std::vector<Fault>& faults, const Traces& traces,
-                                         const Traces& reference) {
-  std::vector<std::string> broken;
+std::vector<Broken> broken_promises(const std::vector<Fault>& faults, const Traces& traces,
+                                    const Traces& reference) {
+  std::vector<Broken> broken;
   for (const auto& [pair, trace] : traces)
-    for (std::string& line : PairJudge(faults, pair, trace, reference.at(pair)).broken())
-      broken.push_back(std::move(line));
+    for (Broken& one : PairJudge(faults, pair, trace, reference.at(pair)).broken())
+      broken.push_back(std::move(one));
   return broken;
 }
 
 void try_all(const std::vector<Trial>& trials,
-             const std::function<void(const Verdict&)>& on_verdict) {
+             const std::function<void(const Verdict&)>& on_verdict,
+             const std::function<bool(const Verdict&)>& is_to_shrink) {
   if (trials.empty()) return;
   const World& world = trials.front().world;
   double last_s = 0.0;
@@ -272,7 +298,7 @@ void try_all(const std::vector<Trial>& trials,
   std::ranges::stable_sort(sorted, {}, [](const Trial& trial) { return first_s(trial.faults); });
   for (const Trial& trial : sorted) {
     CREPES_EXPECT(trial.world == world, "all trials are of one world");
-    on_verdict(branches.judge(trial));
+    on_verdict(branches.judge(trial, is_to_shrink));
   }
 }
 

@@ -9,14 +9,17 @@
 
 #include "tests/faults/fault.hpp"
 #include "tests/faults/flight.hpp"
+#include "tests/faults/promise.hpp"
 
 namespace crepes::faults {
 
 inline constexpr double kRecovery_s = 2.0;  ///< after the last fault
 inline constexpr double kJudged_s = 3.0;    ///< after the recovery
 /// Faults of seconds; and of up to half a minute.
-inline constexpr FaultTimes kShort{.from_s = 5.0, .to_s = 9.0, .longest_s = 4.0};
-inline constexpr FaultTimes kLong{.from_s = 5.0, .to_s = 40.0, .longest_s = 30.0};
+inline constexpr FaultTimes kShort{
+    .from_s = 5.0, .to_s = 9.0, .longest_s = 4.0, .longest_without_sight_s = 4.0};
+inline constexpr FaultTimes kLong{
+    .from_s = 5.0, .to_s = 40.0, .longest_s = 30.0, .longest_without_sight_s = 180.0};
 
 /// A simulated swarm. Many trials share one: to simulate and to fly it without faults takes longer
 /// than a trial.
@@ -44,25 +47,29 @@ struct Trial {
 
 struct Verdict {
   Trial trial;
-  std::vector<Fault> smallest;      ///< part of the schedule that still breaks a promise
-  std::vector<std::string> broken;  ///< what it breaks, a line each; empty if all holds
-  double worst_m = 0.0;             ///< error while faults last, of pairs without a fault
-  double beyond_s = 0.0;            ///< the longest that one of these was off by more than 5 sigma
-  double recovery_s = 0.0;          ///< after the last fault, of all pairs
-  std::uint64_t heap_growth = 0;    ///< of the whole swarm [bytes]
-  std::uint64_t hash = 0;           ///< of all poses
+  std::vector<Fault> smallest;    ///< part of the schedule that still breaks a promise
+  std::vector<Broken> broken;     ///< empty if all holds
+  double worst_m = 0.0;           ///< error while faults last, of pairs without a fault
+  double beyond_s = 0.0;          ///< the longest that one of these was off by more than 5 sigma
+  double recovery_s = 0.0;        ///< after the last fault, of all pairs
+  std::uint64_t heap_growth = 0;  ///< of the whole swarm [bytes]
+  std::uint64_t hash = 0;         ///< of all poses
 };
 
+/// Whether a promise was not kept.
+[[nodiscard]] inline bool is_broken(const Verdict& verdict) { return !verdict.broken.empty(); }
+
 /// Trials of one world, which is simulated once. They are flown in the order of their first faults:
-/// each in a copy of the process that branches off the flight without faults.
+/// each in a copy of the process that branches off the flight without faults. Schedules of which
+/// `is_to_shrink` are reduced.
 void try_all(const std::vector<Trial>& trials,
-             const std::function<void(const Verdict&)>& on_verdict);
+             const std::function<void(const Verdict&)>& on_verdict,
+             const std::function<bool(const Verdict&)>& is_to_shrink = is_broken);
 
 /// When the swarm must have recovered from the faults.
 [[nodiscard]] double recovered_s(const std::vector<Fault>& faults);
-/// What of a flight with faults was not as promised, a line each. `reference`: without faults.
-[[nodiscard]] std::vector<std::string> broken_promises(const std::vector<Fault>& faults,
-                                                       const Traces& traces,
-                                                       const Traces& reference);
+/// What of a flight with faults was not as promised. `reference`: without faults.
+[[nodiscard]] std::vector<Broken> broken_promises(const std::vector<Fault>& faults,
+                                                  const Traces& traces, const Traces& reference);
 
 }  // namespace crepes::faults

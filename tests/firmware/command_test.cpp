@@ -47,8 +47,8 @@ TEST(LedCommand, SetsStoresAndReportsSettings) {
   EXPECT_EQ(board.answer.type, LED_SETTINGS);
   EXPECT_EQ(board.ask(LED_GET, {}), LED_EFFECT_NONE);
 
-  const led_settings told = led_settings_read(board.answer.payload);
-  EXPECT_EQ(bytes_of(told), bytes_of(settings));
+  const led_settings reported = led_settings_read(board.answer.payload);
+  EXPECT_EQ(bytes_of(reported), bytes_of(settings));
   EXPECT_EQ(bytes_of(led_settings_load(&board.board.flash)), bytes_of(settings));
 }
 
@@ -75,7 +75,7 @@ TEST(LedCommand, RefusesBadSettingsWithAReasonAndKeepsTheOld) {
   EXPECT_EQ(refused([](led_settings& s) { s.pattern |= 1U << 10; }), LED_BAD_PATTERN);
   EXPECT_EQ(refused([](led_settings& s) { s.lit_ticks = 99; }), LED_BAD_TIME);
   EXPECT_EQ(refused([](led_settings& s) { s.lit_ticks = s.dark_ticks = 19; }), LED_BAD_TIME);
-  EXPECT_EQ(refused([](led_settings& s) { s.lit_ticks = s.dark_ticks = 501; }), LED_BAD_TIME);
+  EXPECT_EQ(refused([](led_settings& s) { s.lit_ticks = s.dark_ticks = 701; }), LED_BAD_TIME);
   EXPECT_EQ(refused([](led_settings& s) { s = duty_settings(3, 4, 200); }), LED_BAD_TIME);
   EXPECT_EQ(refused([](led_settings& s) { s = duty_settings(3, 50, 49); }), LED_BAD_TIME);
   EXPECT_EQ(refused([](led_settings& s) { s = duty_settings(3, 1000, 1001); }), LED_BAD_TIME);

@@ -173,9 +173,9 @@ TEST(LedImage, AnswersOnItsSerialLineAndOutlivesDeadClockAndFlash) {
   EXPECT_TRUE(std::ranges::equal(led_status_read(status->payload).version,
                                  std::array{CREPES_VERSION_NUMBERS}));
 
-  const auto told = answer_to(*board, request_of(LED_GET));
-  ASSERT_TRUE(told && told->type == LED_SETTINGS);
-  EXPECT_EQ(bytes_of(led_settings_read(told->payload)), bytes_of(settings));
+  const auto reported = answer_to(*board, request_of(LED_GET));
+  ASSERT_TRUE(reported && reported->type == LED_SETTINGS);
+  EXPECT_EQ(bytes_of(led_settings_read(reported->payload)), bytes_of(settings));
 
   led_frame set = request_of(LED_SET);
   set.size = LED_SETTINGS_SIZE;

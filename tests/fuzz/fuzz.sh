@@ -1,5 +1,7 @@
 #!/usr/bin/env bash
-# Runs libFuzzer and keeps what it finds:  fuzz.sh [SECONDS [TARGET...]]  (default: a minute each of all)
+# Runs libFuzzer and keeps what it finds:
+#   fuzz.sh [SECONDS [TARGET...]]         a minute each of all targets, unless given
+#   RUNS=10000000 fuzz.sh 0 [TARGET...]   so many executions of each: a night (0: no limit of time)
 # Needs clang (Debian: clang, libclang-rt-14-dev), which building and testing do not.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -7,26 +9,26 @@ seconds=${1:-60}
 targets=("${@:2}")
 
 cmake --preset fuzz >/dev/null
-cmake --build build/fuzz --target fuzz_corpus $(ninja -C build/fuzz -t targets all | sed -n 's/^\(fuzz_[a-z_]*\): phony$/\1/p')
+cmake --build build/fuzz --target fuzz_corpus fuzz_target
 programs=build/fuzz/tests/fuzz/libfuzzer
-[ ${#targets[@]} -gt 0 ] ||
-  mapfile -t targets < <(find "$programs" -maxdepth 1 -name 'fuzz_*' -type f -printf '%f\n' | sed 's/^fuzz_//' | grep -v '^corpus$' | sort)
+[ ${#targets[@]} -gt 0 ] || mapfile -t targets < <("$programs"/fuzz_corpus list)
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 for target in "${targets[@]}"; do
   echo "== $target"
+  export CREPES_FUZZ_TARGET=$target CREPES_FUZZ_HISTORY=$work/history
   "$programs"/fuzz_corpus unpack "$target" "$work/$target"
-  "$programs/fuzz_$target" -max_total_time="$seconds" -timeout=5 -rss_limit_mb=1024 -use_value_profile=1 \
-    -max_len=4096 -artifact_prefix="$work/" "$work/$target" 2>"$work/log" || {
+  "$programs/fuzz_target" -max_total_time="$seconds" -runs="${RUNS:--1}" -timeout=5 -rss_limit_mb=1024 \
+    -use_value_profile=1 -max_len=4096 -print_final_stats=1 -artifact_prefix="$work/" "$work/$target" 2>"$work/log" || {
     tail -40 "$work/log"
-    cp "$work"/{crash,timeout,oom,leak}-* . 2>/dev/null || true
+    cp "$work"/{crash,timeout,oom,leak}-* "$work/history" . 2>/dev/null || true
     exit 1
   }
-  grep -E '^Done|^stat::' "$work/log" || tail -1 "$work/log"
+  grep -E '^Done|^stat::(number|average)' "$work/log" || tail -1 "$work/log"
   # As few inputs as reach the same places.
   mkdir -p "$work/$target-kept"
-  "$programs/fuzz_$target" -merge=1 -max_len=300 "$work/$target-kept" "$work/$target" 2>/dev/null
+  "$programs/fuzz_target" -merge=1 -max_len=300 "$work/$target-kept" "$work/$target" 2>/dev/null
   "$programs"/fuzz_corpus pack "$target" "$work/$target-kept"
   wc -lc "tests/fuzz/corpus/$target.hex"
 done

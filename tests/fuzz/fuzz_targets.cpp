@@ -338,9 +338,19 @@ const FuzzTarget& fuzz_target(std::string_view name) {
   return *found;
 }
 
-std::vector<FuzzInput> kept_inputs(std::string_view target) {
+std::string hex_of(std::span<const std::uint8_t> input) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string text;
+  for (const std::uint8_t byte : input) {
+    text += kDigits[byte >> 4U];
+    text += kDigits[byte & 15U];
+  }
+  return text;
+}
+
+std::vector<FuzzInput> read_hex_lines(const std::string& file_name) {
   std::vector<FuzzInput> inputs;
-  std::ifstream file(corpus_file(target));
+  std::ifstream file(file_name);
   for (std::string line; std::getline(file, line);) {
     FuzzInput input;
     for (std::size_t at = 0; at + 2 <= line.size(); at += 2)
@@ -350,16 +360,16 @@ std::vector<FuzzInput> kept_inputs(std::string_view target) {
   return inputs;
 }
 
+std::vector<FuzzInput> kept_inputs(std::string_view target) {
+  return read_hex_lines(corpus_file(target));
+}
+
 void keep_inputs(std::string_view target, std::vector<FuzzInput> inputs) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
   std::ranges::sort(inputs, [](const FuzzInput& a, const FuzzInput& b) {
     return std::pair(a.size(), a) < std::pair(b.size(), b);
   });
   std::ofstream file(corpus_file(target));
-  for (const FuzzInput& input : inputs) {
-    for (const std::uint8_t byte : input) file << kDigits[byte >> 4U] << kDigits[byte & 15U];
-    file << '\n';
-  }
+  for (const FuzzInput& input : inputs) file << hex_of(input) << '\n';
 }
 
 }  // namespace crepes

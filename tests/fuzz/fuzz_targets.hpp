@@ -22,6 +22,9 @@ struct FuzzTarget {
 /// Aborts when there is no such target.
 [[nodiscard]] const FuzzTarget& fuzz_target(std::string_view name);
 
+[[nodiscard]] std::string hex_of(std::span<const std::uint8_t> input);
+/// One input a line.
+[[nodiscard]] std::vector<FuzzInput> read_hex_lines(const std::string& file_name);
 /// Inputs kept from earlier runs, in corpus/NAME.hex: one a line.
 [[nodiscard]] std::vector<FuzzInput> kept_inputs(std::string_view target);
 void keep_inputs(std::string_view target, std::vector<FuzzInput> inputs);

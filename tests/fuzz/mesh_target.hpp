@@ -1,4 +1,4 @@
-/// Mad contents behind a valid checksum, signature and seal, into the link and the estimator.
+/// Mad contents behind a valid checksum and seal, into the link and the estimator.
 #pragma once
 
 #include <span>
@@ -8,8 +8,10 @@
 
 namespace crepes {
 
-/// A conversation of two robots. Each datagram of the second takes its changes from the input: a
-/// byte with how many, then two bytes with a place and one with the bits for each.
+/// A conversation with a neighbor whose datagrams the input changes: for each a byte with how many
+/// fields, then the changes of `BodyChanger`. The pair goes on from input to input and is renewed
+/// from time to time. With CREPES_FUZZ_HISTORY in the environment, that file has all inputs of the
+/// present pair, one a line: `fuzz_corpus run mesh FILE` repeats what failed.
 void run_mesh(std::span<const std::uint8_t> data);
 [[nodiscard]] std::vector<FuzzInput> mesh_seeds();
 

@@ -148,11 +148,11 @@ def judge(robot, peer, found):
 
 
 def can_run():
-    """False where user-mode Linux cannot start any program, which its kernel tells by a panic."""
+    """False where user-mode Linux cannot start any program, which its kernel shows by a panic."""
     with tempfile.TemporaryDirectory(prefix="crepes-mesh.") as place:
         tried = subprocess.run(["linux.uml", "mem=64M", "root=/dev/root", "rootfstype=hostfs", "rootflags=/", "ro", f"uml_dir={place}/",
                                 "init=/bin/true", "con=null", "con0=null,fd:1"], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
-    # Its init may not end, so that it panics in any case. The first line tells why.
+    # Its init may not end, so that it panics in any case. The first line says why.
     return "ptrace set fp regs failed" not in tried.stdout
 
 

@@ -12,7 +12,7 @@ from manual import commands_in, keys_of, tool
 
 
 
-def told(*words):
+def output_of(*words):
     return subprocess.run(words, capture_output=True, text=True, check=True).stdout
 
 
@@ -20,10 +20,10 @@ def options_in(text):
     return set(re.findall(r"--[a-z][a-z-]*", text))
 
 
-tools = {command: told(crepesctl, command, "--help") for command in commands_in(told(crepesctl, "--help"))}
+tools = {command: output_of(crepesctl, command, "--help") for command in commands_in(output_of(crepesctl, "--help"))}
 for command in list(tools):
     if "Subcommands:" in tools[command]:
-        tools[command] += "".join(told(crepesctl, command, inner, "--help") for inner in commands_in(tools[command]))
+        tools[command] += "".join(output_of(crepesctl, command, inner, "--help") for inner in commands_in(tools[command]))
 pages = [source / "README.md", *sorted(source.glob("config/docs/**/*.md")), *sorted(source.glob("systemd/*.md")),
          source / "firmware/HARDWARE.md", *sorted(source.glob("config/examples/*/README.md"))]
 keys = {key.path for key in keys_of((source / "config/crepesd.yaml").read_text())}
@@ -46,7 +46,7 @@ for page in pages:
             if not (page.parent / link).exists():
                 faults.append(f"{where}: {link}: no such file")
 manual = (source / "config/packaging/crepesd.8").read_text().replace("\\-", "-")
-options = options_in(told(crepesd, "--help"))
+options = options_in(output_of(crepesd, "--help"))
 faults += [f"crepesd.8: nothing of {option}" for option in sorted(options) if option not in manual]
 readme = (source / "README.md").read_text()
 faults += [f"README.md: nothing of crepesctl {command}" for command in tools if not re.search(rf"^(eval .*)?crepesctl {command}\b", readme, re.MULTILINE)]
@@ -55,7 +55,7 @@ faults += [f"daemon/ctl/README.md: nothing of {command}" for command in tools if
 pins = set(re.findall(r"\bPA\d+\b", (source / "firmware/led_board/README.md").read_text()))
 for file in ("firmware/HARDWARE.md", "firmware/pictures/led_board.svg"):
     faults += [f"{file}: nothing of {pin}, which the firmware uses" for pin in sorted(pins) if not re.search(rf"\b{pin}\b", (source / file).read_text())]
-completion, manual = told(crepesctl, "completion", "bash"), "\n".join(tool(crepesctl)).replace("\\-", "-")
+completion, manual = output_of(crepesctl, "completion", "bash"), "\n".join(tool(crepesctl)).replace("\\-", "-")
 for command, text in tools.items():
     faults += [f"completion: nothing of {option} of {command}" for option in sorted(options_in(text)) if option not in completion]
     faults += [f"crepesctl.1: nothing of {option} of {command}" for option in sorted(options_in(text)) if option not in manual]

@@ -127,8 +127,9 @@ class Page:
         raise AssertionError(f"waited in vain for: {what or expression}")
 
     def key(self, key):
+        text = "\r" if key == "Enter" else key if len(key) == 1 else ""
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, text=key if len(key) == 1 and kind == "keyDown" else "")
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, text=text if kind == "keyDown" else "", **({"windowsVirtualKeyCode": 13} if key == "Enter" else {}))
 
     def click(self, x, y):
         for kind in ("mousePressed", "mouseReleased"):

@@ -1,7 +1,7 @@
 """The socket of a daemon's pictures, as recorder_stage.hpp says: a thread of this process."""
 import contextlib
 import json
-import os
+import pathlib
 import random
 import socket
 import threading
@@ -53,7 +53,7 @@ class FakeCameras:
         self.is_over = True
         self.thread.join()
         self.listener.close()
-        os.unlink(self.path)
+        pathlib.Path(self.path).unlink(missing_ok=True)
 
     def run(self):
         while not self.is_over:
@@ -67,7 +67,7 @@ class FakeCameras:
     def serve(self, client):
         client.settimeout(0.1)
         self.send(client, "config", self.config.encode())
-        told = self.config
+        reported = self.config
         while not self.is_over:
             try:
                 request = client.recv(100)
@@ -75,9 +75,9 @@ class FakeCameras:
                 continue
             if not request:
                 return
-            if told != self.config:
-                told = self.config
-                self.send(client, "config", told.encode())
+            if reported != self.config:
+                reported = self.config
+                self.send(client, "config", reported.encode())
             self.asked += 1
             self.send(client, "look", self.look())
 

@@ -2,6 +2,7 @@
 """The page of crepesctl view in a real browser: what it draws, read back."""
 import json
 import math
+import os
 import pathlib
 import re
 import shutil
@@ -17,7 +18,7 @@ from urllib.parse import urlsplit
 
 from devtools import Browser, CannotStart
 from fake_cameras import CONFIG, FakeCameras
-from fake_daemon import FakeDaemon, position_of
+from fake_daemon import RING, FakeDaemon, position_of
 from viewer import RECORDING, TOOL, Viewer, replayed, wait
 
 class PageTest(unittest.TestCase):
@@ -48,11 +49,9 @@ class PageTest(unittest.TestCase):
 class Live(PageTest):
     def setUp(self):
         self.daemon = FakeDaemon(neighbors=4)
+        self.addCleanup(lambda: self.daemon.stop())  # a test may have another one
         self.viewer = Viewer("--port", self.daemon.port)
-
-    def tearDown(self):
-        self.viewer.stop()
-        self.daemon.stop()
+        self.addCleanup(lambda: self.viewer.stop())
 
     def test_robots_stand_where_the_poses_are(self):
         page = self.open(self.viewer)
@@ -81,9 +80,9 @@ class Live(PageTest):
         page.wait("crepes.store.link.ok")
         port = self.daemon.port
         self.daemon.stop()
-        # In two seconds; the rest is for the machine on which this runs.
         took = page.wait("document.getElementById('link').classList.contains('bad')", "a warning")
-        print(f"a stopped daemon is shown after {took:.2f} s", file=sys.stderr)
+        # Two seconds, which LiveMessages' test has to the millisecond; the rest is for the machine on which this runs.
+        self.assertLess(took, 10)
         self.assertIn("is crepesd running there?", page.value("document.getElementById('link').textContent"))
         page.wait("crepes.scene.robots.every(({ mode }) => mode === 'none')", "no poses")
         self.daemon = FakeDaemon(neighbors=4, port=port)
@@ -115,11 +114,51 @@ class Live(PageTest):
         self.assertTrue(page.value("crepes.scene.robots.every(({ measured }) => measured === undefined)"))
         page.key("m")
         page.wait("crepes.scene.robots.every(({ measured }) => measured?.bearing && measured.range)", "rays and circles")
-        page.wait("crepes.scene.robots.every(({ name, measured }) => measured.peer_bearing === (name !== 'r4'))", "a blind side")
+        page.wait("crepes.scene.robots.every(({ name, measured }) => (measured.peer_bearing === null) === (name === 'r4'))", "a blind side")
         self.assertFalse(page.value("document.querySelector('[data-measured]').hidden"))
         # The table of links marks the same: sees us, and what is lost now.
         marked = "[...document.querySelectorAll('#links tbody tr')].map((row) => [...row.cells].filter((cell) => cell.classList.contains('bad')).map(({ cellIndex }) => cellIndex).join())"
         page.wait(f"JSON.stringify({marked}) === JSON.stringify(['', '', '2,10', ''])", "marked cells of r4")
+
+    def test_a_swapped_side_and_a_long_range_are_drawn_where_they_were_measured(self):
+        self.daemon.turned[3] = 1.0
+        self.daemon.too_long[5] = 0.8
+        page = self.open(self.viewer, width=1280)
+        page.key("m")
+        page.wait("crepes.scene.robots.length === 4 && crepes.scene.robots.every(({ measured }) => Number.isFinite(measured?.range?.offBy) && measured.peer_bearing)")
+        drawn = page.value("Object.fromEntries(crepes.scene.robots.map(({ name, position, measured }) => [name, { position, ...measured }]))")
+        for name, robot in drawn.items():
+            # Rays end at the other's lights, where the bearing is right. Positions are interpolated between rows of 40 ms.
+            ring = [x + r for x, r in zip(robot["position"], RING)]
+            off = math.dist(robot["bearing"]["end"], ring)
+            if name != "r3":
+                self.assertLess(off, 0.02, name)
+                self.assertLess(robot["bearing"]["offBy"], 0.01, name)
+            # Around the antenna; the section of the sphere at the height of the neighbor's.
+            across = [robot["position"][i] for i in (0, 1)]
+            expected = math.hypot(*across)
+            distance = math.dist(robot["position"], (0, 0, 0)) + self.daemon.too_long.get(int(name[1:]), 0)
+            section = math.sqrt(distance**2 - robot["position"][2] ** 2)
+            self.assertAlmostEqual(robot["range"]["radius"], section, delta=0.02)
+            self.assertAlmostEqual(robot["range"]["offBy"], 0.8 if name == "r5" else 0, delta=0.01)
+            self.assertEqual(section > expected + 0.5, name == "r5")
+            self.assertLess(math.dist(robot["peer_bearing"]["end"], RING), 0.02)
+        # r3 is seen elsewhere: so is its ray, however well the pose pretends to know.
+        r3 = drawn["r3"]
+        start = r3["bearing"]["start"]
+        true = [x + r - s for x, r, s in zip(r3["position"], RING, start)]
+        side = math.atan2(r3["bearing"]["end"][1] - start[1], r3["bearing"]["end"][0] - start[0])
+        turn = (side - math.atan2(true[1], true[0]) + math.pi) % (2 * math.pi) - math.pi
+        self.assertAlmostEqual(turn, 1.0, delta=0.01)
+        self.assertAlmostEqual(r3["bearing"]["offBy"], 1.0, delta=0.1)  # less than the azimuth: it is seen from below
+
+    def test_a_robot_that_is_seen_but_not_located_has_its_ray(self):
+        self.daemon.lost.add(3)
+        page = self.open(self.viewer, width=1280)
+        page.key("m")
+        page.wait("crepes.scene.robots.length === 3")
+        drawn = "(() => { const words = [], { scene } = crepes, text = scene.text; scene.text = (...all) => { words.push(all[0]); text.apply(scene, all); }; scene.draw(crepes.store.now(performance.now() / 1000)); scene.text = text; return words; })()"
+        page.wait(f"{drawn}.includes('r3 is seen')", "a lone ray")
 
     def test_a_screen_reader_finds_names(self):
         page = self.open(self.viewer, width=1280)
@@ -151,6 +190,90 @@ class Live(PageTest):
         self.assertEqual(row[head.index("off by cm")], "-3.1")
         self.assertEqual(row[head.index("air %")], "4.20")
 
+    def test_live_charts_show_nis_and_biases_of_one_neighbor(self):
+        page = self.open(self.viewer)
+        page.wait("crepes.store.neighbors.get('3')?.nis?.length > 1", "NIS")
+        page.value("crepes.charts.setFocus('3')")
+        last = "Object.fromEntries(crepes.charts.figures.map(({ panel, lines }) => [panel.title, Object.fromEntries((lines || []).map(({ label, points }) => [label, points.at(-1)?.[1]]))]))"
+        page.wait(f"{last}['NIS by degree of freedom']?.bearing > 0", "the chart")
+        shown = page.value(last)
+        self.assertAlmostEqual(shown["NIS by degree of freedom"]["bearing"], 0.3)
+        self.assertAlmostEqual(shown["gyro bias of the observer"]["y"], math.degrees(-0.02), places=4)
+        self.assertAlmostEqual(shown["accelerometer bias of the neighbor"]["z"], 0.03)
+        self.assertAlmostEqual(shown["range bias"]["bias"], 5)
+        self.assertAlmostEqual(shown["misalignment of the neighbor's camera"]["x"], 0.01)
+
+    def test_events_are_told_as_they_happen(self):
+        page = self.open(self.viewer)
+        page.wait("crepes.store.status.config && crepes.store.status.team")
+        told = "[...document.querySelectorAll('#events li')].map(({ textContent }) => textContent)"
+
+        def wait_for(text):
+            page.wait(f"{told}.some((text) => text.includes({json.dumps(text)}))", text)
+        self.daemon.resets += 1
+        wait_for("r3: its filter started anew")
+        self.daemon.liars[4] = "its ranges are 0.5 m too long"
+        wait_for("r4: its ranges are 0.5 m too long")
+        page.wait("[...document.querySelectorAll('#team tbody tr')].some((row) => row.textContent.includes('r4no9.50'))", "the liar in the team's table")
+        self.daemon.config = {"generation": 2}
+        wait_for("the configuration was reloaded")
+        self.daemon.config = {"generation": 2, "fault": "crepesd.yaml:7: uwb.noise_m: outside"}
+        wait_for("reload refused: crepesd.yaml:7: uwb.noise_m: outside")
+        self.daemon.start = time.monotonic()
+        wait_for("the daemon has started anew")
+        self.daemon.broken["uwb"] = "no such file: plug it in"
+        wait_for("uwb: no such file: plug it in")
+        self.daemon.broken.clear()
+        wait_for("uwb: works again")
+
+    def test_what_comes_and_goes_shifts_nothing(self):
+        page = self.open(self.viewer, width=1440, height=900)
+        page.wait("document.querySelectorAll('#sensors .tile').length === 3 && document.querySelectorAll('#links tbody tr').length === 4")
+        # Without the shifts of the beginning, when lists are still empty.
+        page.value("globalThis.shift = 0; new PerformanceObserver((list) => { for (const { value } of list.getEntries()) globalThis.shift += value; }).observe({ type: 'layout-shift' })")
+        self.daemon.lost.add(3)
+        self.daemon.resets += 1
+        page.wait("document.querySelector('#neighbors .bad')?.textContent.includes('Are its LEDs on?')", "the advice")
+        page.key("m")
+        self.daemon.lost.clear()
+        page.wait("!document.querySelector('#neighbors .bad')")
+        page.value("new Promise((done) => setTimeout(done, 500))")
+        # web.dev calls up to 0.1 good.
+        self.assertLess(page.value("globalThis.shift"), 0.1)
+
+    def test_keys_lead_to_robots_and_through_charts(self):
+        page = self.open(self.viewer, width=1440, height=900)
+        page.wait("document.querySelectorAll('#scene-robots button').length === 4")
+        page.value("document.getElementById('scene-canvas').focus()")
+        page.key("Tab")
+        self.assertEqual(page.value("document.activeElement.getAttribute('aria-label')"), "r2: its view or charts")
+        box = page.value("(({ x, y, width, height }) => [x + width / 2, y + height / 2])(document.activeElement.getBoundingClientRect())")
+        near = page.value(f"(({{ x, y }}) => crepes.scene.robotAt({box[0]} - x, {box[1]} - y)?.name)(crepes.scene.canvas.getBoundingClientRect())")
+        self.assertEqual(near, "r2")
+        page.key("Tab")
+        page.key("Enter")
+        page.wait("document.getElementById('focus').selectedOptions[0].text === 'r3'", "the charts of r3")
+        page.wait("crepes.charts.figures[0].lines?.[0]?.points.length > 20", "points in the charts")
+        page.value("document.querySelector('#charts canvas').focus()")
+        page.key("ArrowLeft")
+        page.key("ArrowLeft")
+        page.wait("crepes.charts.hover !== null", "the charts' cursor")
+        self.assertEqual(page.value("crepes.scene.camera.azimuth"), 0)
+        page.key("+")
+        self.assertAlmostEqual(page.value("(([from, to]) => to - from)(crepes.charts.window)"), 18, delta=0.1)  # of half a minute
+        page.key("Enter")
+        page.wait("crepes.store.cursor !== null && Math.abs(crepes.store.cursor - Math.min(crepes.charts.hover, crepes.store.range()[1])) < 0.1", "the charts' instant in the scene")
+
+    def test_captions_have_the_values_of_all_neighbors(self):
+        page = self.open(self.viewer, width=1280)
+        page.wait("crepes.charts.figures[0].caption.children.length === 5")
+        cut = page.value("""crepes.charts.figures.flatMap(({ caption }) => [...caption.children].filter((span) => {
+            const [inner, outer] = [span, caption.parentElement].map((node) => node.getBoundingClientRect());
+            return inner.width === 0 || inner.bottom > outer.bottom || inner.right > outer.right + 1; }).map(({ textContent }) => textContent))""")
+        self.assertEqual(cut, [])
+        legend, stage = page.value("['.legend', '.stage'].map((name) => (({ top, bottom }) => [top, bottom])(document.querySelector(name).getBoundingClientRect()))")
+        self.assertGreaterEqual(legend[0], stage[1])
+
     def test_dark_and_light_follow_the_system_and_the_user(self):
         page = self.open(self.viewer, dark=True)
         self.assertEqual(page.value("document.documentElement.dataset.theme"), "dark")
@@ -164,9 +287,16 @@ class Live(PageTest):
         self.viewer = Viewer("--port", self.daemon.port)
         page = self.open(self.viewer)
         page.wait("crepes.scene.robots.length === 19", "all robots")
-        milliseconds = page.value("""(() => { const start = performance.now(); const t = crepes.store.now(start / 1000);
-            for (let i = 0; i < 20; ++i) crepes.scene.draw(t); return (performance.now() - start) / 20; })()""")
-        print(f"a scene of 20 robots is drawn in {milliseconds:.1f} ms", file=sys.stderr)
+        page.key("m")
+        page.wait("crepes.scene.robots.filter(({ measured }) => measured?.bearing).length > 9", "measurements")
+        # Thirty pictures a second. The least of many: others use the machine, too.
+        milliseconds = page.value("""(() => { const t = crepes.store.now(performance.now() / 1000);
+            return Math.min(...Array.from({ length: 40 }, () => { const start = performance.now(); crepes.scene.draw(t); return performance.now() - start; })); })()""")
+        self.assertLess(milliseconds, 33)
+        # Robots of the same color have another dash.
+        first, ninth = page.value("(async () => { const { colorOf, dashOf } = await import('/dom.js'); return [0, 8].map((index) => [colorOf({ index }), dashOf({ index }).join()]); })()")
+        self.assertEqual(first[0], ninth[0])
+        self.assertNotEqual(first[1], ninth[1])
 
 
 class Camera(PageTest):
@@ -261,6 +391,26 @@ class Camera(PageTest):
         page.value(f"(() => {{ const slider = document.getElementById('{name}'); slider.value = {value};"
                    " for (const type of ['input', 'change']) slider.dispatchEvent(new Event(type)); })()")
 
+    def test_the_coverage_of_a_running_calibration_lies_over_the_picture(self):
+        page = self.open_camera(width=1400, height=900)
+        self.assertTrue(page.value("document.getElementById('camera-coverage').hidden"))
+        cells = ["#" * 8 + "." * 7 + " "] * 10
+        file = self.folder / "socket.coverage"
+        file.write_text(json.dumps({"share": 0.5, "picture": 0.53, "seen_s": 31, "boards": [2], "cells": cells, "missing": ["turn more about z (yaw)"]}))
+        page.wait("!document.getElementById('camera-coverage').hidden", "the coverage")
+        numbers = page.value("document.getElementById('camera-coverage').textContent")
+        for part in ("50 % of what", "53 % of the picture", "31 s (2)", "turn more about z (yaw)"):
+            self.assertIn(part, numbers)
+        # Read back from the picture: the middle of a covered cell is green, that of a missing one is as before.
+        covered, missing = page.value("""(() => { const { canvas } = crepes.camera;
+            const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+            return [1.5, 12.5].map((column) => { const i = 4 * (Math.round(canvas.width * column / 16) + canvas.width * Math.round(canvas.height * 0.75));
+              return [...data.slice(i, i + 3)]; }); })()""")
+        self.assertGreater(covered[1], covered[0] + 20)
+        self.assertLess(max(missing) - min(missing), 3)
+        file.write_text("{}")  # no coverage
+        page.wait("document.getElementById('camera-coverage').hidden", "the end of the calibration")
+
     def test_without_control_nothing_moves(self):
         self.write(control=False)
         page = self.open_camera()
@@ -274,8 +424,8 @@ class Camera(PageTest):
 
     def test_a_missing_daemon_is_said(self):
         page = self.open_camera()
-        self.cameras.is_over = True
-        page.wait("document.getElementById('camera-note').textContent !== ''", "the reason")
+        self.cameras.stop()
+        page.wait("document.getElementById('camera-note').textContent.includes('is crepesd running, with recording.socket set?')", "the reason")
 
     def test_it_fits_a_phone_and_has_names(self):
         page = self.open_camera(width=360, height=640)
@@ -335,11 +485,27 @@ class Replay(PageTest):
         page.value("crepes.charts.zoom(0.2)")
         self.assertLess(len(page.value("crepes.charts.csv(crepes.store.now(0))").splitlines()), everything / 3)
 
+    def test_scene_and_charts_can_be_saved_as_pictures(self):
+        page = self.open(self.viewer, width=1280)
+        page.call("Page.setDownloadBehavior", behavior="deny")
+        page.wait("crepes.charts.figures[0].lines?.length > 0 && crepes.scene.robots.length > 0", "charts")
+        for what in ("scene", "charts"):
+            width, height, colors = page.value(f"""(async () => {{ const picture = await createImageBitmap(await crepes.{what}.savePng());
+                const pen = new OffscreenCanvas(picture.width, picture.height).getContext('2d');
+                pen.drawImage(picture, 0, 0);
+                const {{ data }} = pen.getImageData(0, 0, picture.width, picture.height);
+                return [picture.width, picture.height, new Set(new Uint32Array(data.buffer)).size]; }})()""")
+            self.assertGreater(min(width, height), 200, what)
+            self.assertGreater(colors, 20, what)
+
     def test_innovations_and_biases_have_charts(self):
         page = self.open(self.viewer)
         page.value("crepes.charts.setFocus('r2'); crepes.seek(10)")
-        page.wait("crepes.charts.figures.length > 10 && crepes.charts.figures.every(({ lines }) => lines?.some(({ points }) => points.length > 100))",
+        page.wait("crepes.charts.figures.length > 14 && crepes.charts.figures.every(({ panel, lines }) => lines?.some(({ points }) => points.length > (panel.rows === 'gated' ? 15 : 100)))",
                   "charts of all records")
+        ages = page.value("crepes.charts.figures.find(({ panel }) => panel.title.startsWith('age')).lines[0].points.map(([, value]) => value)")
+        self.assertLess(sorted(ages)[len(ages) // 2], 0.2)  # s; a camera sees the other almost always
+        self.assertGreater(max(ages), 0)
 
     def test_measurements_of_a_replay_are_drawn(self):
         page = self.open(self.viewer)
@@ -457,6 +623,6 @@ if __name__ == "__main__":
     try:
         Browser().close()
     except CannotStart as why:
-        print(f"skipped: {why}")
-        sys.exit(77)  # as ctest knows it
+        print(f"{'failed' if 'CI' in os.environ else 'skipped'}: {why}")
+        sys.exit(1 if "CI" in os.environ else 77)  # as ctest knows it
     unittest.main(verbosity=2)

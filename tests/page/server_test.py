@@ -1,7 +1,9 @@
 #!/usr/bin/python3
 """Hostile and honest requests to crepesctl view. No browser."""
+import gzip
 import json
 import os
+import pathlib
 import re
 import resource
 import socket
@@ -9,9 +11,10 @@ import subprocess
 import tempfile
 import time
 import unittest
+import urllib.request
 
 from fake_daemon import FakeDaemon
-from viewer import RECORDING, TOOL, Viewer, replayed, wait
+from viewer import RECORDING, SOURCE, TOOL, Viewer, replayed, wait
 
 
 def raw(viewer, text, patience_s=10):
@@ -72,6 +75,16 @@ class Server(unittest.TestCase):
             reply = get(self.viewer, path)
             self.assertNotIn(status_of(reply), (200, 500), path)
             self.assertNotIn("root:", reply, path)
+
+    def test_the_whole_page_is_small(self):
+        names = [file.name for file in (SOURCE / "daemon/ctl/view/page").iterdir() if file.suffix != ".md"]
+        self.assertIn("main.js", names)
+        texts = [self.viewer.get(name).encode() for name in names]
+        compressed = sum(len(gzip.compress(text)) for text in texts)
+        # A megabyte was asked for. What ARCHITECTURE.md says of it holds.
+        self.assertLess(compressed, 50_000)
+        said = int(re.search(r"plain files of about (\d+) kB", (SOURCE / "ARCHITECTURE.md").read_text()).group(1))
+        self.assertAlmostEqual(sum(map(len, texts)) / 1000, said, delta=5)
 
     def test_wrong_robots_are_not_found(self):
         for query in ("", "?robot=", "?robot=1", "?robot=-1", "?robot=99999999999999999999", "?robot=0x0", "?robot=0.0", "?x=0", "?robot=nan"):
@@ -228,6 +241,43 @@ class Start(unittest.TestCase):
             file.write("short")
             file.flush()
             self.assertIn("16 characters", self.refusal("--listen", "127.0.0.1:0", "--token-file", file.name))
+
+    def test_messages_do_not_repeat_their_prefix(self):
+        for command in (["view", "/nonexistent"], ["view", "--listen", "localhost"], ["replay", "/nonexistent", "--out", "/tmp/never"],
+                        ["evaluate", "/nonexistent"], ["convert", "/nonexistent", "--to", "mcap"], ["plot", "/nonexistent"], ["spots", "/nonexistent"],
+                        ["calibrate", "imu", "/nonexistent", "--out", "/tmp/never"], ["status", "--port", "1"]):
+            done = subprocess.run([TOOL, *command], capture_output=True, text=True, timeout=60)
+            self.assertNotEqual(done.returncode, 0, command)
+            for line in done.stderr.splitlines():
+                parts = [part.strip() for part in line.split(": ")]
+                self.assertEqual(len(parts), len(set(parts)), line)
+                self.assertLessEqual(line.count("/nonexistent"), 1, line)
+
+    def test_open_starts_the_desktops_browser_with_the_address(self):
+        with tempfile.TemporaryDirectory() as folder:
+            browser, told = pathlib.Path(folder, "xdg-open"), pathlib.Path(folder, "told")
+            browser.write_text(f'#!/bin/sh\necho "$1" > {told}.part && mv {told}.part {told}\n')
+            browser.chmod(0o755)
+            viewer = Viewer("--port", 1, "--open", PATH=f"{folder}:{os.environ['PATH']}")
+            try:
+                wait(told.exists, "the browser")
+                self.assertEqual(told.read_text().strip(), viewer.url)
+            finally:
+                viewer.stop()
+
+    def test_the_demo_has_a_page_until_it_is_interrupted(self):
+        with tempfile.NamedTemporaryFile("w+") as log:
+            demo = subprocess.Popen([TOOL, "demo", "--scenario", "two", "--view", "--listen", "127.0.0.1:0", "--port", "47591"], stdout=log, stderr=log)
+            try:
+                said = pathlib.Path(log.name)
+                wait(lambda: demo.poll() is not None or "page: " in said.read_text(), "the address of the page")
+                url = re.search(r"page: (http\S+)", said.read_text()).group(1)
+                wait(lambda: re.search(r"world time [\d.]+ s\n", said.read_text()), "a demo of no end")
+                with urllib.request.urlopen(f"{url}robots", timeout=30) as reply:
+                    self.assertEqual(len(json.load(reply)["robots"]), 2)
+            finally:
+                demo.terminate()
+                demo.wait(30)
 
     def test_an_address_in_use_is_an_error(self):
         viewer = Viewer("--port", 1)

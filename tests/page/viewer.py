@@ -19,8 +19,9 @@ def replayed(out):
 
 
 class Viewer:
-    def __init__(self, *arguments, listen="127.0.0.1:0"):
-        self.process = subprocess.Popen([TOOL, "view", "--listen", listen, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def __init__(self, *arguments, listen="127.0.0.1:0", **environment):
+        self.process = subprocess.Popen([TOOL, "view", "--listen", listen, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                        env={**os.environ, **environment})
         if not select.select([self.process.stdout], [], [], 30)[0]:
             raise TimeoutError("crepesctl view prints no address")
         line = self.process.stdout.readline().strip()

@@ -43,7 +43,7 @@ TEST(Bearings, PointAtTheNeighborsThatWereThere) {
     ASSERT_GT(seen.visible, 300U) << name;
     EXPECT_GT(identified_share(seen), 0.97) << name;
     EXPECT_EQ(seen.wrong, 0U) << name;
-    EXPECT_LT(seen.rms_rad(), 0.06 * kRadPerDeg) << name;
+    EXPECT_LT(seen.rms_rad(), radians(0.06)) << name;
   }
 }
 
@@ -60,7 +60,7 @@ class RecordedBearings : public testing::TestWithParam<const char*> {
 
 TEST_P(RecordedBearings, AreExactAndNeverAnothers) {
   for (const auto& [name, seen] : watch_all(dataset())) {
-    EXPECT_LT(seen.rms_rad(), 0.06 * kRadPerDeg) << name;
+    EXPECT_LT(seen.rms_rad(), radians(0.06)) << name;
     EXPECT_EQ(seen.wrong, 0U) << name;
   }
 }
@@ -88,7 +88,7 @@ TEST_P(MirroringFloor, IsTheOnlyOtherPlaceWhereRobotsAreSeen) {
       const double azimuth = std::atan2(measured_W.y(), measured_W.x());
       const double true_azimuth = std::atan2(true_W.y(), true_W.x());
       EXPECT_LT(std::abs(std::remainder(azimuth - true_azimuth, 2.0 * std::numbers::pi)),
-                2.0 * kRadPerDeg)
+                radians(2.0))
           << name;
     }
 }

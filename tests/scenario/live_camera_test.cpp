@@ -106,7 +106,7 @@ TEST_F(LiveCamera, LocatesANeighborThroughAGigEVisionCamera) {
   }));
 }
 
-TEST_F(LiveCamera, TellsWhatIsWrongWithTheCameraAndRecovers) {
+TEST_F(LiveCamera, ReportsWhatIsWrongWithTheCameraAndRecovers) {
   auto camera = plug_camera_in();
   const Runtime runtime(real_, machine_);
   Client client(real_);
@@ -114,8 +114,9 @@ TEST_F(LiveCamera, TellsWhatIsWrongWithTheCameraAndRecovers) {
 
   camera->lose_packets(0.01);
   EXPECT_TRUE(client.await_status([](const Json& status) {
-    const Json told = sensor_of(status, "cam0");
-    return tells(told, "incomplete") && told.value("/faults/missing_packets"_json_pointer, 0) > 0;
+    const Json reported = sensor_of(status, "cam0");
+    return mentions(reported, "incomplete") &&
+           reported.value("/faults/missing_packets"_json_pointer, 0) > 0;
   }));
   camera->lose_packets(0.0);
   EXPECT_TRUE(client.await_status(is_well));

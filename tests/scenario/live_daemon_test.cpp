@@ -55,7 +55,7 @@ TEST_F(LiveDaemon, OpensASerialDeviceThatComesGoesAndComesAgain) {
     return encode_witmotion({0.01 * (++turn % 100), 0.2, 0.3}, {0.0, 0.0, 9.81});
   };
   const auto missing = [](const Json& status) {
-    return tells(sensor_of(status, "imu"), "crepes-imu-");
+    return mentions(sensor_of(status, "imu"), "crepes-imu-");
   };
 
   EXPECT_TRUE(client.await_status(missing));
@@ -73,13 +73,13 @@ TEST_F(LiveDaemon, OpensASerialDeviceThatComesGoesAndComesAgain) {
   }
 }
 
-TEST_F(LiveDaemon, TellsThatTheMeshInterfaceIsNotThereAndGoesOn) {
+TEST_F(LiveDaemon, ReportsThatTheMeshInterfaceIsNotThereAndGoesOn) {
   Config config = pair_config(1, mesh_port_);
   config.net.interface = "nosuch0";
   const Runtime runtime(config, machine_);
 
   EXPECT_TRUE(Client(config).await_status([](const Json& status) {
-    return tells(sensor_of(status, "mesh"), "nosuch0") &&
+    return mentions(sensor_of(status, "mesh"), "nosuch0") &&
            sensor_of(status, "imu").value("ok", false) &&
            status["neighbors"][0]["reason"] == "never heard";
   }));

@@ -200,6 +200,20 @@ TEST_F(Record, ShowsAPictureToWhoLooksBesideARecording) {
   EXPECT_FALSE(next_block(recording, "picture", end, machine_).content.empty());
 }
 
+TEST_F(Record, EndsAfterItsDurationThoughNothingIsMeasured) {
+  Config config = without_devices(mesh_port_);
+  config.recording.socket = folder_.path() / "r1.socket";
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+  const Timestamp start = machine_.now();
+
+  const auto summary = record(options(config, 0.5));
+
+  EXPECT_LT(machine_.now() - start, kPatience);
+  const std::string why = summary ? summary->end_reason : summary.error().message;
+  EXPECT_NE(why.find("--duration is over"), std::string::npos) << why;
+}
+
 TEST_F(Record, StopsAtItsSizeAndRefusesToWriteOverADataSet) {
   const Config config = recorded_config(1);
   const Runtime runtime(config, machine_);
@@ -232,7 +246,7 @@ TEST_F(Record, FailsWithAFullDiskAndTheDaemonDoesNotNotice) {
   }));
 }
 
-TEST_F(Record, DropsTheNewestForAToolThatDoesNotReadAndTellsHowMany) {
+TEST_F(Record, DropsTheNewestForAToolThatDoesNotReadAndReportsHowMany) {
   const Config config = recorded_config(1);
   RecordQueue events{100, Overflow::kDropNewest};
   std::deque<PictureTap> pictures;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 
 #include <algorithm>
@@ -133,7 +134,7 @@ TEST_F(Reload, TakesTheKeyThatHasTakenTheOldOnesPlace) {
   ASSERT_TRUE(one.reconfigure(configs[0]));
   for (const Config& config : configs) {
     EXPECT_TRUE(Client(config).await_status([](const Json& status) {
-      return tells(sensor_of(status, "mesh"), "net.key_file") &&
+      return mentions(sensor_of(status, "mesh"), "net.key_file") &&
              status["network"].value("refused_seal_broken", 0) > 50;
     }));
   }
@@ -184,7 +185,7 @@ TEST_F(Reload, ExcludesALostRobotByOneLine) {
   std::swap(mistaken.swarm.members.at(0).public_key, mistaken.swarm.members.at(1).public_key);
   ASSERT_TRUE(one.reconfigure(mistaken));
   EXPECT_TRUE(client.await_status([](const Json& status) {
-    return tells(sensor_of(status, "mesh"), "public_key") &&
+    return mentions(sensor_of(status, "mesh"), "public_key") &&
            status["network"].value("refused_signature_wrong", 0) > 50;
   }));
 }
@@ -197,7 +198,7 @@ TEST_F(Reload, SendsNothingWhileItsKeyCannotBeRead) {
   Client client(config);
 
   const auto fault = client.await_status([](const Json& status) {
-    return tells(sensor_of(status, "mesh"), "No such file") &&
+    return mentions(sensor_of(status, "mesh"), "No such file") &&
            sensor_of(status, "imu").value("counts", Json::object()).value("samples", 0) > 50;
   });
   ASSERT_TRUE(fault);
@@ -247,9 +248,9 @@ TEST_F(Reload, OpensOtherPortsOfMeshSubscriptionAndSensors) {
   ASSERT_TRUE(runtime.reconfigure(wanted));
 
   EXPECT_TRUE(Client(wanted).await_status([](const Json& status) {
-    return tells(sensor_of(status, "mesh"), "nosuch0") &&
-           tells(sensor_of(status, "imu"), "/nowhere/imu") &&
-           tells(sensor_of(status, "uwb"), "/nowhere/uwb");
+    return mentions(sensor_of(status, "mesh"), "nosuch0") &&
+           mentions(sensor_of(status, "imu"), "/nowhere/imu") &&
+           mentions(sensor_of(status, "uwb"), "/nowhere/uwb");
   }));
 }
 
@@ -279,7 +280,7 @@ class NotifySocket {
   std::string heard_;
 };
 
-TEST_F(Reload, HappensOnSighupAndSystemdIsTold) {
+TEST_F(Reload, HappensOnSighupAndSystemdIsNotified) {
   const ScratchDirectory folder = ScratchDirectory::create({}).value();
   const auto file = folder.path() / "crepesd.yaml";
   Config config = pair_config(1, mesh_port_);
@@ -290,7 +291,7 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsTold) {
   NotifySocket systemd(folder.path() / "notify");
   ::setenv("NOTIFY_SOCKET", (folder.path() / "notify").c_str(),
            1);  // NOLINT(concurrency-mt-unsafe)
-  const auto daemon =
+  auto daemon =
       ChildProcess::start(crepesd_path(), {"--config", file.string()}, folder.path() / "log");
   ::unsetenv("NOTIFY_SOCKET");  // NOLINT(concurrency-mt-unsafe)
   ASSERT_TRUE(daemon) << daemon.error().message;
@@ -325,6 +326,18 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsTold) {
   write("");
   daemon->send_signal(SIGHUP);
   EXPECT_TRUE(client.await_status(has_generation(3)));
+
+  // A pipe in the place of the file neither blocks the daemon nor its end.
+  std::filesystem::remove(file);
+  ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+  daemon->send_signal(SIGHUP);
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    return status["config"].value("fault", "").find("is not a file") != std::string::npos;
+  }));
+  daemon->terminate();
+  const Timestamp end_of_first = clock.now() + std::chrono::seconds{20};
+  while (!daemon->exit_reason() && clock.now() < end_of_first) ::poll(nullptr, 0, 20);
+  EXPECT_EQ(daemon->exit_reason(), "exit code 0");
 
   const std::string heard = systemd.heard();
   EXPECT_NE(heard.find("RELOADING=1\nMONOTONIC_USEC="), std::string::npos) << heard;

@@ -102,7 +102,7 @@ void expect_sound(const SwarmScore& score, double max_clock_error_s) {
 void expect_accuracy(const SwarmScore& score, double median_m, double median_deg) {
   for (const ScoredPair& pair : score.pairs) {
     EXPECT_LE(statistics_of(pair.score.position_errors_m).median, median_m) << name_of(pair);
-    EXPECT_LE(statistics_of(pair.score.rotation_errors_rad).median, median_deg * kRadPerDeg)
+    EXPECT_LE(statistics_of(pair.score.rotation_errors_rad).median, radians(median_deg))
         << name_of(pair);
   }
 }
@@ -176,7 +176,7 @@ TEST_F(Replay, PicturesGiveThePosesOfIdealSpots) {
       if (same == other.end()) continue;
       const Vector6d d = pose_difference(pose.T_B_N.pose, same->second);
       meters.push_back(d.head<3>().norm());
-      degrees.push_back(d.tail<3>().norm() / kRadPerDeg);
+      degrees.push_back(d.tail<3>().norm() * kDegPerRad);
     }
     ASSERT_GT(meters.size(), 300U);
     EXPECT_LT(statistics_of(meters).rmse, 0.02);

@@ -41,7 +41,7 @@ UNIT
 
 status=0
 timeout --kill-after=10 300 systemd-nspawn --quiet --boot --directory="$place/tree" --private-network --register=no \
-  --keep-unit --console=read-only --kill-signal=SIGRTMIN+4 systemd.unit=service-test.service systemd.show_status=false \
+  --system-call-filter=@memlock --keep-unit --console=read-only --kill-signal=SIGRTMIN+4 systemd.unit=service-test.service systemd.show_status=false \
   </dev/null >"$place/tree/crepes/console" 2>&1 || status=$?
 cat "$place/tree/crepes/output" || { cat "$place/tree/crepes/console"; exit 1; }
 exit "$status"

@@ -15,6 +15,7 @@
 #include "daemon/service/logging.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/imu/witmotion.hpp"
+#include "drivers/uwb/nlink_encoder.hpp"
 #include "drivers/uwb/nlink_frame.hpp"
 #include "estimator/core/contract.hpp"
 #include "net/mesh/peer_message.hpp"
@@ -29,8 +30,8 @@ using std::chrono::milliseconds;
 
 constexpr double kGyroStep = 0.05;  // rad/s
 
-/// The six numbers of sample `number` tell each other: any two samples mixed, or a bit changed,
-/// shows. From one sample to the next they change as little as a robot's motion does.
+/// The six numbers of sample `number` determine each other: any two samples mixed, or a bit
+/// changed, shows. From one sample to the next they change as little as a robot's motion does.
 ImuSample sample_of(std::uint32_t number) {
   const unsigned x = number % 16;
   const unsigned y = number / 16 % 16;
@@ -270,7 +271,7 @@ std::string to_string(const SoakReport& report) {
         << to_seconds(report.mishaps[i].longest) << " s\n";
   }
   out << (report.camera_is_gige ? "GigE camera" : "folder")
-      << " unplugged: " << report.pictures_returned << ", told to work again within "
+      << " unplugged: " << report.pictures_returned << ", reported to work again within "
       << to_seconds(report.longest_camera) << " s\n"
       << report.samples << " samples, " << report.ranges
       << " ranges; wrong: " << (report.wrong.empty() ? "none" : report.wrong) << '\n'

@@ -90,12 +90,13 @@ void SoakDevice::send(Timestamp now) {
   line_->write(bytes);
 }
 
-std::optional<Recovery> SoakDevice::heard(Timestamp stamp, Timestamp now, Timestamp told_since) {
+std::optional<Recovery> SoakDevice::heard(Timestamp stamp, Timestamp now,
+                                          Timestamp reported_since) {
   if (!recovering_ || mishap_ != Mishap::kNone || stamp < over_) return std::nullopt;
   recovering_ = false;
   well_since_ = now;
   next_change_ = now + between(0.2, 1.5);
-  return Recovery{last_mishap_, now - std::max(over_, told_since)};
+  return Recovery{last_mishap_, now - std::max(over_, reported_since)};
 }
 
 std::optional<Duration> SoakDevice::waiting(Timestamp now) const {

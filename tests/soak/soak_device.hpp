@@ -47,8 +47,8 @@ class SoakDevice {
 
   void step(Timestamp now);
   /// A measurement with this stamp came out of the daemon, which said nothing at all before
-  /// `told_since`; what it ended.
-  std::optional<Recovery> heard(Timestamp stamp, Timestamp now, Timestamp told_since = {});
+  /// `reported_since`; what it ended.
+  std::optional<Recovery> heard(Timestamp stamp, Timestamp now, Timestamp reported_since = {});
   /// Whether mishaps begin.
   void stir(bool stirred) { is_calm_ = !stirred; }
   /// When it last recovered.

@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "estimator/calibration/camera_batch.hpp"
-#include "estimator/calibration/camera_start.hpp"
-#include "estimator/calibration/jet_geometry.hpp"
+#include "estimator/calibration/batch/jet_geometry.hpp"
+#include "estimator/calibration/camera/camera_batch.hpp"
+#include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 #include "tests/support/calibration_recording.hpp"
 
 namespace crepes {
@@ -127,8 +128,9 @@ Score trial(std::uint64_t seed, const simulated::HandHeld& hand) {
 }
 
 double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
   std::ranges::sort(values);
-  return values.empty() ? 0.0 : values[values.size() / 2];
+  return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
 }
 
 std::vector<double> column(const std::vector<Score>& scores, double Score::*value) {

@@ -39,13 +39,19 @@ Motion motion_of(const Crowd& crowd, std::size_t index, int seed) {
   const double x =
       crowd.distance_m * static_cast<double>(ring) + crowd.radius_m * std::cos(bearing);
   const double height = 1.4 + noise.uniform(draw++);
-  return {.rule = AttitudeRule::kThrust,
-          .x = wander(noise, draw, x, 0.6, 0.17),
-          .y = wander(noise, draw, crowd.radius_m * std::sin(bearing), 0.6, 0.17),
-          .z = wander(noise, draw, height, 0.35, 0.13),
-          .yaw = wander(noise, draw, bearing + kPi, 20 * kPi / 180, 0.12),
-          .pitch = {},
-          .roll = {}};
+  Motion motion = {.rule = AttitudeRule::kThrust,
+                   .x = wander(noise, draw, x, 0.6, 0.17),
+                   .y = wander(noise, draw, crowd.radius_m * std::sin(bearing), 0.6, 0.17),
+                   .z = wander(noise, draw, height, 0.35, 0.13),
+                   .yaw = wander(noise, draw, bearing + kPi, 20 * kPi / 180, 0.12),
+                   .pitch = {},
+                   .roll = {}};
+  if (crowd.meeting_s > 0.0) {
+    const double half = 0.5 * (crowd.distance_m - crowd.nearest_m) * static_cast<double>(ring);
+    motion.x.offset -= half;
+    motion.x.sines.push_back({half, kPi / crowd.meeting_s, 0.5 * kPi});
+  }
+  return motion;
 }
 
 /// Like a robot of the demo, with patterns for all.

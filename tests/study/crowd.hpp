@@ -13,6 +13,8 @@ struct Crowd {
   std::size_t rings = 1;
   double radius_m = 8.0;    ///< of a ring
   double distance_m = 0.0;  ///< from one ring's center to the next
+  double nearest_m = 0.0;   ///< the same when they have met
+  double meeting_s = 0.0;   ///< which is then; afterwards they part again. 0: never
   double sight_m = 40.0;    ///< of cameras and UWB modules
 };
 

@@ -1,4 +1,4 @@
-/// Faulty members: one robot that tells the others what is not true.
+/// Faulty members: one robot that reports false measurements.
 #pragma once
 
 #include <array>

@@ -14,13 +14,18 @@ std::vector<OrderedPair> pairs_of(const Swarm& swarm) {
 }
 
 Result<PairScores> replay_scores(const Swarm& swarm, const ReplayOptions& options, double after_s,
-                                 const std::function<void(Report&)>& on_report) {
+                                 const ReplayHooks& hooks) {
   std::map<OrderedPair, std::vector<NeighborPose>> poses;
   ReplaySinks sinks;
   sinks.on_pose = [&poses](RobotId observer, const NeighborPose& pose) {
     poses[{observer, pose.neighbor}].push_back(pose);
   };
-  sinks.on_report = on_report;
+  sinks.on_report = hooks.on_report;
+  if (hooks.on_team) {
+    sinks.on_records = [&hooks](RobotId observer, const Records& records) {
+      for (const TeamRecord& record : records.team) hooks.on_team(observer, record);
+    };
+  }
   const auto report = replay_dataset(swarm.dataset, std::nullopt, options, sinks);
   if (!report) return tl::unexpected(report.error());
 

@@ -17,10 +17,15 @@ using PairScores = std::map<OrderedPair, PairScore>;
 
 [[nodiscard]] std::vector<OrderedPair> pairs_of(const Swarm& swarm);
 
-/// By the code of `crepesctl replay`, over poses from `after_s` on. `on_report` may change what
-/// robots broadcast; it may be empty. The error says which input is wrong.
+/// What else is seen of a replay; each may be empty.
+struct ReplayHooks {
+  std::function<void(Report&)> on_report{};  ///< may change what robots broadcast
+  std::function<void(RobotId observer, const TeamRecord&)> on_team{};
+};
+
+/// By the code of `crepesctl replay`, over poses from `after_s` on. The error says which input is
+/// wrong.
 [[nodiscard]] Result<PairScores> replay_scores(const Swarm& swarm, const ReplayOptions& options,
-                                               double after_s,
-                                               const std::function<void(Report&)>& on_report = {});
+                                               double after_s, const ReplayHooks& hooks = {});
 
 }  // namespace crepes::study

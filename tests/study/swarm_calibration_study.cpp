@@ -7,8 +7,9 @@
 #include <vector>
 
 #include "daemon/ctl/calibrate/swarm_recording.hpp"
+#include "drivers/sim/ring_renderer.hpp"
 #include "drivers/sim/seeded_noise.hpp"
-#include "estimator/calibration/swarm_batch.hpp"
+#include "estimator/calibration/swarm/swarm_batch.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 #include "tests/study/replay_scores.hpp"
@@ -79,6 +80,7 @@ void apply(const SwarmBatchResult& found, Swarm& swarm) {
     camera.intrinsics.assign(constants.camera.lens.begin(), constants.camera.lens.end());
     camera.T_cam_imu = constants.camera.T_C_B();
     camera.timeshift_cam_imu = constants.camera.shift_s;
+    swarm.dataset.robots[r].config.uwb.noise.bias_sigma_m = remaining_range_bias(found, r);
     for (RobotRecording& reader : swarm.dataset.robots) {
       for (MemberConfig& member : reader.config.swarm.members) {
         if (member.id != swarm.dataset.robots[r].robot.id) continue;
@@ -90,7 +92,25 @@ void apply(const SwarmBatchResult& found, Swarm& swarm) {
   }
 }
 
-/// NEES by degree of freedom of cameras' rotations and rings, against what spoiled them.
+/// The cameras as they truly are in this world; rings and antennas are as configured.
+std::vector<RobotConstants> true_constants(const Swarm& swarm, int seed) {
+  SimConfig sim;
+  sim.scenario = SimScenario::kFour;
+  sim.seed = seed;
+  const SimWorld world(sim);
+  std::vector<RobotConstants> truth;
+  for (const RobotRecording& robot : swarm.dataset.robots) {
+    RobotConstants& constants = truth.emplace_back(configured_constants(robot.config).value());
+    const auto renderer = RingRenderer::make(world, robot.robot.id, robot.config.swarm,
+                                             robot.config.cameras.front().calibration, 0);
+    const Pose T_C_B = renderer.value().T_C_B();
+    constants.camera.q_C_B = T_C_B.q;
+    constants.camera.p_B_C = T_C_B.inverse().p;
+  }
+  return truth;
+}
+
+/// NEES by degree of freedom of cameras' rotations and rings.
 double nees_of(const SwarmBatchResult& found, const std::vector<RobotConstants>& truth) {
   double sum = 0.0;
   for (std::size_t r = 0; r < truth.size(); ++r) {
@@ -108,12 +128,9 @@ double nees_of(const SwarmBatchResult& found, const std::vector<RobotConstants>&
 void run(int seed) {
   constexpr Scenario kFour{.name = "four", .world = SimScenario::kFour};
   Swarm swarm = simulate_swarm(kFour, seed, kDuration_s);
-  std::vector<RobotConstants> truth;
+  const std::vector<RobotConstants> truth = true_constants(swarm, seed);
   std::vector<std::string> names;
-  for (const RobotRecording& robot : swarm.dataset.robots) {
-    truth.push_back(configured_constants(robot.config).value());
-    names.push_back(robot.robot.name);
-  }
+  for (const RobotRecording& robot : swarm.dataset.robots) names.push_back(robot.robot.name);
   const PoseError best = replayed_error(swarm);
   spoil(swarm, seed);
   const PoseError before = replayed_error(swarm);

@@ -99,9 +99,10 @@ struct Part {
   MatrixXd H;
 };
 
-class Team {
+/// The covariance of all states of a team along the true motion, as the readings correct it.
+class TeamCovariance {
  public:
-  Team(const Swarm& swarm, const SensorPriors& priors)
+  TeamCovariance(const Swarm& swarm, const SensorPriors& priors)
       : swarm_(swarm),
         priors_(priors),
         layout_(layout_of(swarm, priors)),
@@ -117,8 +118,8 @@ class Team {
   /// From `t` to `t + dt`.
   void propagate(double t, double dt);
   /// What was measured since the last update, as if at `t`.
-  void see(Index observer, Index seen, const Sighting& z, double sigma_px, double t);
-  void range(Index a, Index b, double sigma_m, double t);
+  void add_sighting(Index observer, Index seen, const Sighting& z, double sigma_px, double t);
+  void add_range(Index a, Index b, double sigma_m, double t);
   void update();
 
   struct Variance {
@@ -142,7 +143,7 @@ class Team {
   MatrixXd information_;  ///< of what was measured since the last update
 };
 
-Truth Team::truth(Index robot, double t) const {
+Truth TeamCovariance::truth(Index robot, double t) const {
   const auto& robots = swarm_.dataset.robots;
   const Pose T_W_R = swarm_.truth.pose(robots.front().robot.id, t).value();
   const auto k = static_cast<std::size_t>(robot);
@@ -213,7 +214,7 @@ Transition transition_of(const Truth& x, const MotionSample& reference,
           .G_reference = G_reference};
 }
 
-void Team::propagate(double t, double dt) {
+void TeamCovariance::propagate(double t, double dt) {
   const Index n = layout_.motions();
   const Index constants = layout_.constants;
   const Index reference = layout_.constant(0);
@@ -252,7 +253,8 @@ void Team::propagate(double t, double dt) {
 }
 
 /// u = Exp(m) d / |d| in the observer's body O, d = R_R_O^T (p_R_N + R_R_N l - p_R_O) - p_camera.
-void Team::see(Index observer, Index seen, const Sighting& z, double sigma_px, double t) {
+void TeamCovariance::add_sighting(Index observer, Index seen, const Sighting& z, double sigma_px,
+                                  double t) {
   const Truth from = truth(observer, t);
   const Truth to = truth(seen, t);
   const Vector3d& p_led = members_[static_cast<std::size_t>(seen)].p_body_led;
@@ -275,7 +277,7 @@ void Team::see(Index observer, Index seen, const Sighting& z, double sigma_px, d
       Eigen::Matrix2d(by_px * by_px.transpose()).inverse());
 }
 
-void Team::range(Index a, Index b, double sigma_m, double t) {
+void TeamCovariance::add_range(Index a, Index b, double sigma_m, double t) {
   const Truth from = truth(a, t);
   const Truth to = truth(b, t);
   const Vector3d& p_from = members_[static_cast<std::size_t>(a)].p_body_uwb;
@@ -292,7 +294,7 @@ void Team::range(Index a, Index b, double sigma_m, double t) {
       MatrixXd::Constant(1, 1, 1.0 / square(sigma_m)));
 }
 
-void Team::add(const std::array<Part, 5>& parts, const MatrixXd& weight) {
+void TeamCovariance::add(const std::array<Part, 5>& parts, const MatrixXd& weight) {
   for (const Part& a : parts) {
     if (a.at < 0) continue;  // the reference's own motion is no state
     for (const Part& b : parts) {
@@ -303,7 +305,7 @@ void Team::add(const std::array<Part, 5>& parts, const MatrixXd& weight) {
 }
 
 /// P+ = (I + P L)^-1 P with the information L: exact also where P is singular.
-void Team::update() {
+void TeamCovariance::update() {
   MatrixXd I_PL = P_ * information_;
   I_PL.diagonal().array() += 1.0;
   const MatrixXd updated = I_PL.partialPivLu().solve(P_);
@@ -312,7 +314,7 @@ void Team::update() {
 }
 
 ///   p_O_N = R_O^T (p_N - p_O),  R_O_N = R_O^T R_N
-Team::Variance Team::variance(Index observer, Index neighbor, double t) const {
+TeamCovariance::Variance TeamCovariance::variance(Index observer, Index neighbor, double t) const {
   const Matrix3d R_O_R = truth(observer, t).T_R_N.R().transpose();
   const Pose T_O_N = truth(observer, t).T_R_N.inverse() * truth(neighbor, t).T_R_N;
   // By p and theta of the observer, then of the neighbor.
@@ -386,7 +388,7 @@ TeamBound team_bound(const Swarm& swarm, const SensorPriors& priors, double afte
   const std::vector<Due> readings = schedule(swarm, ways);
   const auto& robots = swarm.dataset.robots;
   const auto n = static_cast<Index>(robots.size());
-  Team team(swarm, priors);
+  TeamCovariance team(swarm, priors);
   std::map<std::pair<RobotId, RobotId>, Roots> roots;
   auto next = readings.begin();
   for (int i = 0; (i + 1) * kUpdatePeriod < swarm.dataset.manifest.duration_s; ++i) {
@@ -395,9 +397,9 @@ TeamBound team_bound(const Swarm& swarm, const SensorPriors& priors, double afte
     team.propagate(i * kUpdatePeriod + kMotionStep, kMotionStep);
     for (; next != readings.end() && next->true_s <= end; ++next) {
       if (next->sighting != nullptr) {
-        team.see(next->from, next->to, *next->sighting, next->sigma, end);
+        team.add_sighting(next->from, next->to, *next->sighting, next->sigma, end);
       } else {
-        team.range(next->from, next->to, next->sigma, end);
+        team.add_range(next->from, next->to, next->sigma, end);
       }
     }
     team.update();

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
+#include <map>
+#include <set>
 #include <utility>
 
 #include "daemon/ctl/text_table.hpp"
@@ -137,6 +139,47 @@ Swarm removed(Swarm swarm, RobotId robot) {
   return swarm;
 }
 
+/// When the honest robots name the liar, and whom else.
+class NamingWatch {
+ public:
+  NamingWatch(const Swarm& swarm, RobotId liar) : swarm_(swarm), liar_(liar) {}
+
+  void add(RobotId observer, const TeamRecord& record) {
+    if (observer == liar_) return;
+    const double t_s = recording_of(swarm_.dataset, observer).robot.clock.true_s(record.stamp);
+    if (std::ranges::any_of(record.calibrations,
+                            [&](const RobotCalibration& c) { return c.robot == liar_; }))
+      met_s_.try_emplace(observer, t_s);
+    for (const TeamFault& fault : record.faults) {
+      if (fault.robot == liar_) {
+        named_s_.try_emplace(observer, t_s);
+      } else {
+        false_names_.emplace(observer, fault.robot);
+      }
+    }
+  }
+
+  [[nodiscard]] Naming naming() const {
+    Naming naming{.observers = swarm_.dataset.manifest.robots.size() - 1,
+                  .named_by = named_s_.size(),
+                  .false_names = false_names_.size()};
+    for (const auto& [observer, t_s] : named_s_) {
+      naming.slowest_s = std::max(naming.slowest_s, t_s);
+      const auto met = met_s_.find(observer);
+      const double since_s = met == met_s_.end() ? 0.0 : std::max(0.0, t_s - met->second);
+      naming.slowest_since_met_s = std::max(naming.slowest_since_met_s, since_s);
+    }
+    return naming;
+  }
+
+ private:
+  const Swarm& swarm_;
+  RobotId liar_;
+  std::map<RobotId, double> met_s_;
+  std::map<RobotId, double> named_s_;
+  std::set<OrderedPair> false_names_;
+};
+
 Swarm with_method(Swarm swarm, std::optional<TeamMethod> method) {
   for (RobotRecording& robot : swarm.dataset.robots)
     robot.config.graph.method = method.value_or(robot.config.graph.method);
@@ -190,15 +233,20 @@ Result<LiarTrial> run_liar_trial(const Swarm& swarm, const Liar& liar,
   corrupt(liar.lie, robot, corrupted.dataset);
   const auto without = replay_scores(honest, options.replay, options.after_s);
   if (!without) return tl::unexpected(without.error());
-  const auto with =
-      replay_scores(corrupted, options.replay, options.after_s, corrupted_reports(liar.lie, robot));
+  NamingWatch watch(corrupted, robot);
+  const auto with = replay_scores(corrupted, options.replay, options.after_s,
+                                  {.on_report = corrupted_reports(liar.lie, robot),
+                                   .on_team = [&](RobotId observer, const TeamRecord& record) {
+                                     watch.add(observer, record);
+                                   }});
   if (!with) return tl::unexpected(with.error());
   const auto alone = replay_scores(removed(honest, robot), options.replay, options.after_s);
   if (!alone) return tl::unexpected(alone.error());
   return LiarTrial{.name = swarm.dataset.manifest.scenario,
                    .without = quality_of(without_robot(*without, robot)),
                    .with = quality_of(without_robot(*with, robot)),
-                   .alone = quality_of(*alone)};
+                   .alone = quality_of(*alone),
+                   .naming = watch.naming()};
 }
 
 std::string table_of(const std::vector<TeamTrial>& trials) {
@@ -245,6 +293,20 @@ std::string table_of(const std::vector<LiarTrial>& trials) {
       {"nees", 2, [](T t) { return t.with.median_nees; }, Pool::kMedian},
       {"avail %", 1, [](T t) { return 100.0 * t.with.worst_availability; }, Pool::kLowest}};
   add_gross_columns(columns, &LiarTrial::with);
+  const auto if_named = [](T t, double value) { return t.naming.named_by > 0 ? value : NAN; };
+  columns.push_back({"named %", 0,
+                     [](T t) {
+                       return 100.0 * static_cast<double>(t.naming.named_by) /
+                              static_cast<double>(t.naming.observers);
+                     },
+                     Pool::kMean});
+  columns.push_back(
+      {"named s", 1, [=](T t) { return if_named(t, t.naming.slowest_s); }, Pool::kHighest});
+  columns.push_back({"since met s", 1,
+                     [=](T t) { return if_named(t, t.naming.slowest_since_met_s); },
+                     Pool::kHighest});
+  columns.push_back({"false names", 0,
+                     [](T t) { return static_cast<double>(t.naming.false_names); }, Pool::kSum});
   return table(columns, trials);
 }
 

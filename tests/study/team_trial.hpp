@@ -40,12 +40,22 @@ struct TeamTrialOptions {
 
 [[nodiscard]] Result<TeamTrial> run_team_trial(const Swarm& swarm, const TeamTrialOptions& options);
 
+/// What the honest robots said about the liar.
+struct Naming {
+  std::size_t observers = 0;         ///< that are honest
+  std::size_t named_by = 0;          ///< of these
+  double slowest_s = 0.0;            ///< from the recording's beginning, when the fault begins
+  double slowest_since_met_s = 0.0;  ///< from when its sensors were first estimated
+  std::size_t false_names = 0;       ///< honest robots that an honest one named, each counted once
+};
+
 /// The honest pairs of one swarm with a liar among them, with the same robot honest, and alone.
 struct LiarTrial {
   std::string name;
   TeamQuality without;
   TeamQuality with;
   TeamQuality alone;
+  Naming naming;
 };
 
 /// The robot of the highest id lies; poses of it and by it do not count.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "drivers/sim/motion.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/core/contract.hpp"
 
 namespace crepes::study {
@@ -23,7 +23,7 @@ TrueMotion::TrueMotion(const SwarmTruth& truth, RobotId robot, double duration_s
     samples_.push_back(
         {.v_W_B = (after->p - before->p) / (2.0 * kTruthStep),
          .w_B = so3_log(before->q.conjugate() * after->q) / (2.0 * kTruthStep),
-         .f_B = here->q.conjugate() * (a_W + kWorldGravityMps2 * Eigen::Vector3d::UnitZ())});
+         .f_B = here->q.conjugate() * (a_W + kNominalGravityMps2 * Eigen::Vector3d::UnitZ())});
   }
   CREPES_EXPECT(samples_.size() > 1, "a path of more than a moment");
 }

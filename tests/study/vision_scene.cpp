@@ -5,7 +5,9 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <utility>
 
+#include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 #include "estimator/vision/blink_tracker.hpp"
 #include "estimator/vision/codebook.hpp"
@@ -17,7 +19,6 @@ namespace {
 constexpr std::size_t kBoards = 4;
 constexpr double kFrame_s = 0.005;
 constexpr double kNear_px = 2.0;
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr Timestamp kStart{std::chrono::seconds{100}};
 
 CameraCalibration fisheye(double row_delay_s = 0.0) {
@@ -62,17 +63,16 @@ class Stage {
     std::uniform_real_distribution<double> turn(0.0, 2.0 * std::numbers::pi);
     for (Way& way : ways_)
       for (double& phase : way.phases) phase = turn(random_);
-    for (std::size_t i = 0; i < kBoards; ++i)
-      ways_[i].azimuth = (-45.0 + 30.0 * double(i)) * kDegree;
+    for (std::size_t i = 0; i < kBoards; ++i) ways_[i].azimuth = radians(-45.0 + 30.0 * double(i));
   }
 
   [[nodiscard]] double yaw(double t_s) const {
     const double w = 2.0 * std::numbers::pi * scene_.turns_hz;
-    return scene_.peak_rate_dps * kDegree / w * std::sin(w * t_s);
+    return radians(scene_.peak_rate_dps) / w * std::sin(w * t_s);
   }
   [[nodiscard]] double yaw_rate(double t_s) const {
     const double w = 2.0 * std::numbers::pi * scene_.turns_hz;
-    return scene_.peak_rate_dps * kDegree * std::cos(w * t_s);
+    return radians(scene_.peak_rate_dps) * std::cos(w * t_s);
   }
   /// The board in the body.
   [[nodiscard]] Pose T_B_M(std::size_t board, double t_s) const {
@@ -129,6 +129,7 @@ struct Board {
   double rate = 1.0;
   double glimpsed_s = 0.0;
   std::optional<double> first_id_s;  ///< in glimpsed time
+  bool was_hidden = false;           ///< since it was counted last
 
   [[nodiscard]] Duration time(double t_s) const { return from_seconds(phase_s + t_s * rate); }
 };
@@ -165,6 +166,7 @@ class Trial {
       add_gyro(t);
       if (!lost[k]) look(t);
     }
+    score_.board_s = scene_.duration_s * static_cast<double>(boards_.size());
     for (const Board& board : boards_) {
       score_.never += board.first_id_s ? 0 : 1;
       score_.slowest_s = std::max(score_.slowest_s, board.first_id_s.value_or(board.glimpsed_s));
@@ -198,9 +200,10 @@ class Trial {
     std::array<std::optional<Eigen::Vector2d>, kBoards> centers;
     for (std::size_t i = 0; i < kBoards; ++i)
       centers[i] = model_.project(camera_.T_cam_imu * stage_.T_B_M(i, t_s).p);
-    score_spots(found, centers);
+    const bool is_scored = t_s >= scene_.score_from_s;
+    if (is_scored) score_spots(found, centers);
     score_bearings(bearings, centers, t_s);
-    ++score_.pictures;
+    score_.pictures += is_scored ? 1 : 0;
   }
 
   /// The part of an exposure in which the board shines.
@@ -239,6 +242,7 @@ class Trial {
         return center && (*center - Eigen::Vector2d(spot.u_px, spot.v_px)).norm() < reach;
       });
       score_.false_spots += is_board ? 0 : 1;
+      if (is_board) score_.peaks.push_back(spot.peak - scene_.effects.background);
     }
   }
 
@@ -246,6 +250,7 @@ class Trial {
                       const std::array<std::optional<Eigen::Vector2d>, kBoards>& centers,
                       double t_s) {
     std::array<bool, kBoards> is_found{};
+    const bool is_scored = t_s >= scene_.score_from_s;
     for (const Bearing& bearing : bearings) {
       const Eigen::Vector2d uv = model_.project(camera_.T_cam_imu.q * bearing.u_B).value();
       std::optional<std::size_t> named;
@@ -262,8 +267,9 @@ class Trial {
       }
       if (named && own <= kNear_px) {
         is_found.at(*named) = true;
-        if (t_s >= 1.0) score_.errors_px.push_back(own);
-      } else if (!named || (nearest <= kNear_px && own > 12.0)) {
+        if (is_scored) score_.errors_px.push_back(own);
+        if (is_scored && bearing.how == Naming::kPredicted) ++score_.predicted;
+      } else if (!named || nearest <= kNear_px) {
         ++score_.wrong;
       } else {
         ++score_.astray;
@@ -272,13 +278,16 @@ class Trial {
     for (std::size_t i = 0; i < kBoards; ++i) {
       Board& board = boards_[i];
       if (is_found[i] && !board.first_id_s) board.first_id_s = board.glimpsed_s;
-      if (!(scene_.is_hidden && scene_.is_hidden(i, t_s))) board.glimpsed_s += kFrame_s;
-      if (!centers[i] || !is_counted(*centers[i])) continue;
+      const bool is_hidden = scene_.is_hidden && scene_.is_hidden(i, t_s);
+      board.was_hidden = board.was_hidden || is_hidden;
+      if (!is_hidden) board.glimpsed_s += kFrame_s;
+      if (!is_scored || !centers[i] || !is_counted(*centers[i])) continue;
       if (share_lit(i, t_s + exposed_after_s(*centers[i])) < 0.5) continue;
-      ++score_.all_lit;
-      if (t_s < 1.0) continue;
       ++score_.lit;
       score_.identified += is_found[i] ? 1 : 0;
+      if (!std::exchange(board.was_hidden, false)) continue;
+      ++score_.returns;
+      score_.unnamed_returns += is_found[i] ? 0 : 1;
     }
   }
 
@@ -300,13 +309,35 @@ class Trial {
 
 VisionScore score_vision(const VisionScene& scene) { return Trial(scene).run(); }
 
+double VisionScore::right_percent() const {
+  return 100.0 * static_cast<double>(identified) /
+         static_cast<double>(std::max<std::size_t>(1, lit));
+}
+
+void VisionScore::add(const VisionScore& other) {
+  lit += other.lit;
+  identified += other.identified;
+  predicted += other.predicted;
+  wrong += other.wrong;
+  astray += other.astray;
+  false_spots += other.false_spots;
+  pictures += other.pictures;
+  returns += other.returns;
+  unnamed_returns += other.unnamed_returns;
+  never += other.never;
+  board_s += other.board_s;
+  slowest_s = std::max(slowest_s, other.slowest_s);
+  errors_px.insert(errors_px.end(), other.errors_px.begin(), other.errors_px.end());
+  peaks.insert(peaks.end(), other.peaks.begin(), other.peaks.end());
+}
+
 RingScore score_rings(const RingPictures& rings) {
   CameraCalibration small = fisheye();
   small.intrinsics = {-0.1723, 0.5931, 316.8, 316.6, 240.2, 191.6};
   small.resolution = {480, 384};
   const CameraModel model = CameraModel::from(small).value();
   SpotDetector detector{VisionConfig{}};
-  std::mt19937 random(11);
+  std::mt19937 random(rings.seed);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   RingScore score;
   for (; score.pictures < rings.pictures; ++score.pictures) {
@@ -326,7 +357,7 @@ RingScore score_rings(const RingPictures& rings) {
     const Eigen::Quaterniond roll =
         so3_exp(std::numbers::pi * part(random) * Eigen::Vector3d::UnitX());
     const Pose T_C_M{range * toward, facing * tilt * roll};
-    BoardRenderer renderer(model, {}, k);
+    BoardRenderer renderer(model, {}, k + 1000 * rings.seed);
     renderer.add({board, [&](double) { return T_C_M; }, [](double) { return true; }});
     const auto& pixels = renderer.render(0.0);
     const Detection found =

@@ -16,7 +16,7 @@
 
 namespace crepes::test {
 
-/// What one camera told of one neighbor.
+/// What one camera reported of one neighbor.
 struct SeenNeighbor {
   std::size_t visible = 0;     ///< frames with a spot where the neighbor's ring is
   std::size_t identified = 0;  ///< of them, with a bearing to it

@@ -15,7 +15,8 @@
 #include <random>
 #include <vector>
 
-#include "estimator/calibration/camera_problem.hpp"
+#include "estimator/calibration/camera/camera_problem.hpp"
+#include "estimator/core/constants.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/sensor_noise.hpp"
 #include "estimator/core/so3.hpp"
@@ -71,7 +72,6 @@ inline ImuErrors draw_errors(Dice& dice, double matrix, double gyro_bias, double
 inline std::vector<ImuSample> imu_along(const Path& path, double duration_s, const ImuNoise& noise,
                                         ImuErrors& errors, Dice& dice) {
   constexpr double kPeriod = 0.01;
-  constexpr double kGravity = 9.81;
   constexpr double h = 1e-4;
   constexpr std::array<double, 5> kWeights{7.0 / 90, 32.0 / 90, 12.0 / 90, 32.0 / 90, 7.0 / 90};
   std::vector<ImuSample> samples;
@@ -93,7 +93,7 @@ inline std::vector<ImuSample> imu_along(const Path& path, double duration_s, con
       rate += kWeights[k] * so3_log(path.q_W_B(t - h).conjugate() * path.q_W_B(t + h)) / (2.0 * h);
       constexpr double H = 1e-3;
       const Eigen::Vector3d a = (path.p_W(t + H) - 2.0 * path.p_W(t) + path.p_W(t - H)) / (H * H);
-      force += kWeights[k] * (q.conjugate() * (a + kGravity * Eigen::Vector3d::UnitZ()));
+      force += kWeights[k] * (q.conjugate() * (a + kNominalGravityMps2 * Eigen::Vector3d::UnitZ()));
     }
     sample.gyro_radps =
         errors.S_gyro * rate + gyro_bias + dice.vector(noise.gyroscope_noise_density * white);
@@ -174,9 +174,10 @@ struct HandHeld {
   int boards = 2;
   bool is_chair = false;  ///< turned about the vertical alone
   double noise_px = 0.16;
-  double dark_share = 0.25;    ///< of the sightings
-  double moved_m = 0.0;        ///< how far the first board is moved at half time
-  bool hides_quarter = false;  ///< nothing falls on the lower left quarter
+  double dark_share = 0.25;                 ///< of the sightings
+  double moved_m = 0.0;                     ///< how far the first board is moved at half time
+  bool hides_quarter = false;               ///< nothing falls on the lower left quarter
+  std::optional<CameraConstants> camera{};  ///< without boards; empty: drawn
 };
 
 /// A robot before boards: what a calibration is given, and the truth.
@@ -247,6 +248,7 @@ inline CameraRecording hand_held(std::uint64_t seed, const HandHeld& hand, const
   truth.q_C_B = Eigen::Quaterniond(R_C_B) * so3_exp(dice.vector(0.07));
   truth.p_B_C = Eigen::Vector3d(0.06, 0.0, 0.01) + dice.vector(0.003);
   truth.shift_s = dice.uniform(-0.005, 0.005);
+  if (hand.camera) truth = *hand.camera;
   recording.errors = draw_errors(dice, 0.002, 0.01, 0.05);
   const Path path = hand_path(dice, hand);
   for (int b = 0; b < hand.boards; ++b) {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/calibration/swarm_batch.hpp"
+#include "estimator/calibration/swarm/swarm_batch.hpp"
 #include "tests/support/calibration_recording.hpp"
 
 namespace crepes::simulated {

@@ -2,6 +2,7 @@
 /// cameras, ranges, and datagrams between two clocks.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -21,11 +22,15 @@ namespace crepes::test {
 struct Conditions {
   bool in_view = true;         ///< of each other
   double decoy_rad = 0.0;      ///< our cameras see the neighbor's ring this far to the left instead
+  bool is_lamp = false;        ///< that light is a lamp, which does not blink; the ring is hidden
+  double ghost_rad = 0.0;      ///< beside it, this far to the left, a foreign board with its code
   double peer_turn_rad = 0.0;  ///< the neighbor's bearings of us point this far to the left
   bool peer_is_on = true;
   std::function<ImuSample(const ImuSample&)> own_imu{};  ///< what the IMU makes of the truth
   std::function<ImuSample(const ImuSample&)> peer_imu{};
   std::function<void(UwbRange&)> range{};
+  std::function<void(Report&)> peer_report{};                       ///< what the neighbor sends
+  std::function<void(std::vector<std::uint8_t>&)> peer_datagram{};  ///< as it is on the air
 };
 
 class EstimatorPair {
@@ -96,6 +101,12 @@ class EstimatorPair {
   [[nodiscard]] Timestamp own_time(Duration t) const { return Timestamp{t + own_clock_}; }
   /// When our cameras last identified the neighbor, true time.
   [[nodiscard]] Duration last_bearing() const { return last_bearing_; }
+  /// So many bearings of the neighbor were named in this way.
+  [[nodiscard]] int named(Naming how) const { return named_.at(static_cast<std::size_t>(how)); }
+  /// So often a light appeared after a second without any; so often it had the neighbor's ID in
+  /// its first frame.
+  [[nodiscard]] int returns() const { return returns_; }
+  [[nodiscard]] int named_returns() const { return named_returns_; }
   /// How often the neighbor went over from one of our cameras to the other.
   [[nodiscard]] int camera_changes() const { return camera_changes_; }
 
@@ -175,7 +186,7 @@ class EstimatorPair {
                                          so3_exp({0.0, 0.0, with.peer_turn_rad}) * z.u, z.camera,
                                          z.sigma_rad});
       }
-      if (with.peer_is_on) report_for_peer();
+      if (with.peer_is_on) report_for_peer(with);
       tick();
     }
   }
@@ -218,8 +229,10 @@ class EstimatorPair {
   void look(const Conditions& with) {
     static constexpr Duration kHandover = std::chrono::milliseconds{100};
     static constexpr Duration kPhase = std::chrono::microseconds{37123};  // of the neighbor's board
+    static constexpr Duration kGhostPhase = std::chrono::microseconds{99456};
     const IdLibrary library = IdLibrary::from(settings_.swarm).value();
-    const bool is_lit = with.in_view && library.entries()[1].code.is_lit(now_ + kPhase);
+    const bool is_lit =
+        with.is_lamp || (with.in_view && library.entries()[1].code.is_lit(now_ + kPhase));
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
       SpotFrame frame{own_time(now_), static_cast<std::uint8_t>(k), {}};
       const auto& [camera, T_B_C, misalignment] = cameras_[k];
@@ -228,7 +241,20 @@ class EstimatorPair {
       const auto uv = camera.project(T_B_C.q.conjugate() * u_B);
       if (is_lit && uv && camera.contains(*uv))
         frame.spots.push_back({uv->x(), uv->y(), 12.0, 255.0, 1.0});
+      if (with.ghost_rad != 0.0 && library.entries()[1].code.is_lit(now_ + kGhostPhase)) {
+        const auto ghost =
+            camera.project(T_B_C.q.conjugate() * (so3_exp({0.0, 0.0, with.ghost_rad}) * u_B));
+        if (ghost && camera.contains(*ghost))
+          frame.spots.push_back({ghost->x(), ghost->y(), 12.0, 255.0, 1.0});
+      }
       const Outputs outputs = step(frame);
+      for (const Bearing& bearing : outputs.bearings)
+        ++named_.at(static_cast<std::size_t>(bearing.how));
+      if (!frame.spots.empty()) {
+        const bool is_return = now_ - std::exchange(last_light_, now_) > std::chrono::seconds{1};
+        returns_ += is_return ? 1 : 0;
+        named_returns_ += is_return && !outputs.bearings.empty() ? 1 : 0;
+      }
       if (outputs.bearings.empty()) continue;
       last_bearing_ = now_;
       if (k != seeing_camera_ && now_ - last_seen_ < kHandover) continue;
@@ -237,12 +263,14 @@ class EstimatorPair {
     }
   }
 
-  void report_for_peer() {
+  void report_for_peer(const Conditions& with) {
     const Timestamp stamp{now_ + peer_clock_};
     peer_report_.sender = kOther;
     peer_report_.stamp = stamp;
     peer_report_.tilt = {stamp, pair_.sighting(Timestamp{now_}).N.up, 0.01};
+    if (with.peer_report) with.peer_report(peer_report_);
     in_flight_to_us_.push_back({now_, peer_link_.compose(peer_report_, stamp)});
+    if (with.peer_datagram) with.peer_datagram(in_flight_to_us_.back().bytes);
     peer_report_ = {};
   }
 
@@ -277,6 +305,10 @@ class EstimatorPair {
   std::size_t seeing_camera_ = 0;
   Duration last_seen_{};  ///< by that camera
   int camera_changes_ = 0;
+  std::array<int, 2> named_{};
+  Duration last_light_{};
+  int returns_ = 0;
+  int named_returns_ = 0;
   Report peer_report_;
   std::vector<Datagram> in_flight_to_us_;
   std::vector<Datagram> in_flight_to_peer_;

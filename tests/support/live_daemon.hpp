@@ -113,7 +113,7 @@ inline Json sensor_of(const Json& status, const std::string& name) {
   return Json::object();
 }
 
-inline bool tells(const Json& sensor, const std::string& part) {
+inline bool mentions(const Json& sensor, const std::string& part) {
   return !sensor.value("ok", true) && sensor.value("message", "").find(part) != std::string::npos;
 }
 
@@ -135,9 +135,9 @@ inline PoseError error_of(const Json& message, const Config& config) {
   };
   const auto p = [&](const char* axis) { return number("position", axis); };
   const auto q = [&](const char* axis) { return number("orientation", axis); };
-  const Pose told{Eigen::Vector3d(p("x"), p("y"), p("z")),
-                  Eigen::Quaterniond(q("w"), q("x"), q("y"), q("z"))};
-  const Vector6d d = pose_difference(truth, told);
+  const Pose reported{Eigen::Vector3d(p("x"), p("y"), p("z")),
+                      Eigen::Quaterniond(q("w"), q("x"), q("y"), q("z"))};
+  const Vector6d d = pose_difference(truth, reported);
   return {d.head<3>().norm(), d.tail<3>().norm()};
 }
 

@@ -93,6 +93,17 @@ class SimulatedTeam {
 
   /// T_S_N of a robot at the end of the last interval.
   [[nodiscard]] Pose truth(RobotId robot) const { return relative(kSelf, robot); }
+  [[nodiscard]] std::vector<RobotId> robots() const {
+    std::vector<RobotId> ids;
+    for (const auto& [id, body] : bodies_) ids.push_back(id);
+    return ids;
+  }
+  /// In the frame that falls with this robot, at the same time.
+  [[nodiscard]] FreeMotion true_motion(RobotId robot) const {
+    const FreeMotion& self = bodies_.at(kSelf).motion;
+    const Pose T = truth(robot);
+    return {T.p, self.q_F_B.conjugate() * (bodies_.at(robot).motion.v_F - self.v_F), T.q};
+  }
   [[nodiscard]] const Eigen::Vector3d& misalignment(RobotId robot) const {
     return bodies_.at(robot).misalignment;
   }
@@ -182,7 +193,8 @@ class SimulatedTeam {
     return {i,
             j,
             {perturbed(relative(i, j), random_.draw<6>(covariance)), covariance},
-            v + random_.vector(0.1)};
+            v + random_.vector(0.1),
+            now_};
   }
 
   RandomGeometry random_;

@@ -12,7 +12,7 @@
 
 namespace crepes {
 
-/// Sends 20 samples a second once it was unlocked and told to.
+/// Sends 20 samples a second once it was unlocked and commanded to.
 inline void run_witmotion_at_20_hz(PseudoTerminal& line, const std::stop_token& stop) {
   constexpr std::chrono::milliseconds kPeriod{50};
   const MonotonicClock clock;
@@ -20,9 +20,9 @@ inline void run_witmotion_at_20_hz(PseudoTerminal& line, const std::stop_token& 
   Timestamp next = clock.now();
   while (!stop.stop_requested()) {
     heard = heard + line.read(std::chrono::milliseconds{5});
-    const bool is_told =
+    const bool is_commanded =
         heard == bytes_of("ff aa 69 88 b5 ff aa 02 06 00 ff aa 03 07 00 ff aa 00 00 00");
-    if (!is_told) next = clock.now();
+    if (!is_commanded) next = clock.now();
     for (; next < clock.now(); next += kPeriod)
       line.write(encode_witmotion({0.1, 0.2, 0.3}, {0.0, 0.0, 9.81}));
   }

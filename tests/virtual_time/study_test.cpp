@@ -59,7 +59,7 @@ TEST_P(PublishedBound, IsReproduced) {
 
   // They know their noise; we read it off the recordings.
   EXPECT_NEAR(std::sqrt(position2 / n) / GetParam().position_m, 1.0, 0.08);
-  EXPECT_NEAR(std::sqrt(rotation2 / n) / (GetParam().rotation_deg * kRadPerDeg), 1.0, 0.08);
+  EXPECT_NEAR(std::sqrt(rotation2 / n) / radians(GetParam().rotation_deg), 1.0, 0.08);
 }
 INSTANTIATE_TEST_SUITE_P(
     Datasets, PublishedBound,

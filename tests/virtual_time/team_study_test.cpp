@@ -84,7 +84,7 @@ TEST_P(PublishedTeamBound, IsReproduced) {
 
   // They know their noise; we read it off the recordings.
   EXPECT_NEAR(all.position_rms_m / GetParam().position_m, 1.0, 0.12);
-  EXPECT_NEAR(all.rotation_rms_rad / (GetParam().rotation_deg * kRadPerDeg), 1.0, 0.12);
+  EXPECT_NEAR(all.rotation_rms_rad / radians(GetParam().rotation_deg), 1.0, 0.12);
 }
 INSTANTIATE_TEST_SUITE_P(Datasets, PublishedTeamBound,
                          testing::Values(Published{"four", 1, 0.015, 0.16},

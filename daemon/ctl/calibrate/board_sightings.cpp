@@ -14,7 +14,7 @@ namespace {
 
 /// Sightings under the robots' ids; a board that is seen twice in a frame is a mirror image of
 /// itself, and neither is used.
-class SightingLog {
+class SightingsByBoard {
  public:
   void add(Timestamp stamp, const std::vector<Bearing>& bearings, const Pose& T_C_B,
            const CameraModel& model) {
@@ -22,7 +22,9 @@ class SightingLog {
       const RobotId id = bearings[i].neighbor;
       const auto same = std::ranges::count(bearings, id, &Bearing::neighbor);
       const auto uv = model.project(T_C_B.q * bearings[i].u_B);
-      if (same == 1 && uv) found_[id].push_back({.stamp = stamp, .board = 0, .uv = *uv});
+      const bool was_read = bearings[i].how == Naming::kRead;
+      if (same == 1 && was_read && uv)
+        found_[id].push_back({.stamp = stamp, .board = 0, .uv = *uv});
     }
   }
 
@@ -86,16 +88,16 @@ Result<BoardSightings> board_sightings(const RobotRecording& recording,
   BlinkTracker tracker(camera, *model, recording.config.vision, *library,
                        recording.config.robot.id);
   FrameSource source(recording.cameras.front(), recording.config.vision);
-  SightingLog log;
+  SightingsByBoard by_board;
   auto sample = recording.imu.begin();
   for (std::size_t i = 0; i < source.size(); ++i) {
     for (; with_gyro && sample != recording.imu.end() && sample->stamp <= source.stamp(i); ++sample)
       tracker.add_imu(*sample);
     const Result<SpotFrame> frame = source.frame(i);
     if (!frame) return tl::unexpected(frame.error());
-    log.add(frame->stamp, tracker.step(*frame), camera.T_cam_imu, *model);
+    by_board.add(frame->stamp, tracker.step(*frame), camera.T_cam_imu, *model);
   }
-  BoardSightings all = std::move(log).boards();
+  BoardSightings all = std::move(by_board).boards();
   if (source.size() > 1)
     all.frame_rate_hz = static_cast<double>(source.size() - 1) /
                         to_seconds(source.stamp(source.size() - 1) - source.stamp(0));

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
-#include "estimator/calibration/camera_problem.hpp"
+#include "estimator/calibration/camera/camera_problem.hpp"
 #include "estimator/core/camera_calibration.hpp"
 #include "estimator/core/result.hpp"
 

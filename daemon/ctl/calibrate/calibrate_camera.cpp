@@ -7,9 +7,10 @@
 #include <vector>
 
 #include "daemon/ctl/calibrate/board_sightings.hpp"
+#include "daemon/ctl/calibrate/camchain.hpp"
 #include "daemon/ctl/calibrate/camera_report.hpp"
 #include "drivers/dataset/robot_folder.hpp"
-#include "estimator/calibration/camera_start.hpp"
+#include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {
@@ -88,8 +89,9 @@ Result<CalibrationReport> calibrate_camera(const CalibrateCameraOptions& options
   if (options.kannala_brandt && result.covariance.size() > 0)
     kb = to_kannala_brandt(result.constants.lens, camera.resolution[0], camera.resolution[1]);
   if (result.refusals.empty()) {
-    const auto written =
-        write_text_file(options.out, camchain_text(result.constants, camera.resolution, kb));
+    const auto written = write_text_file(
+        options.out, camchain_text(calibration_of(result.constants, camera.resolution, kb),
+                                   Mounting::kKnown, "camera"));
     if (!written) return tl::unexpected(written.error());
   }
   if (options.json) {

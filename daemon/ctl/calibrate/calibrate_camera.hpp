@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl calibrate camera`.
 struct CalibrateCameraOptions {
   std::filesystem::path robot_dir;
   std::filesystem::path out;

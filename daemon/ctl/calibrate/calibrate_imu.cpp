@@ -14,8 +14,8 @@
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/dataset/robot_folder.hpp"
-#include "estimator/calibration/allan_deviation.hpp"
-#include "estimator/calibration/imu_calibration.hpp"
+#include "estimator/calibration/imu/allan_deviation.hpp"
+#include "estimator/calibration/imu/imu_calibration.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {
@@ -189,6 +189,7 @@ Result<CalibrationReport> measure_noise(const CalibrateImuOptions& options,
   }
   const double period_s = duration_s / std::max(1.0, static_cast<double>(imu.size()) - 1.0);
   const AxesNoise gyro = noise_of(imu, period_s, 0);
+  if (options.on_progress) options.on_progress(0.6);
   const AxesNoise accel = noise_of(imu, period_s, 3);
   if (gyro.is_moving || accel.is_moving)
     report.reasons.emplace_back("the robot moved: the deviation grows with time; lay it down");
@@ -218,6 +219,7 @@ Result<CalibrationReport> calibrate_imu(const CalibrateImuOptions& options) {
   const auto recording =
       load_robot(options.robot_dir, {.imu = true, .ranges = false, .cameras = false}, faults);
   if (!recording) return tl::unexpected(recording.error());
+  if (options.on_progress) options.on_progress(0.2);
   ImuNoise noise = recording->config.imu.noise;
   if (options.rest) return measure_noise(options, recording->imu, noise);
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "config/writing/config_writer.hpp"
@@ -14,7 +16,7 @@
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/dataset/robot_folder.hpp"
-#include "estimator/calibration/range_calibration.hpp"
+#include "estimator/calibration/range/range_calibration.hpp"
 
 namespace crepes {
 namespace {
@@ -56,22 +58,109 @@ SwarmRanges ranges_of(const SwarmDataset& swarm) {
   return all;
 }
 
-std::vector<TapedRanges> taped_ranges(const SwarmRanges& all,
+/// The heading of a robot that turns, from its gyroscope about the vertical that its accelerometer
+/// shows. Its bias is what the gyroscope shows in the first second, before the turn begins.
+class Heading {
+ public:
+  Heading(const RobotRecording& robot, double from_s, double to_s) {
+    constexpr double kBefore_s = 1.0;
+    const auto true_s = [&](const ImuSample& sample) {
+      return robot.robot.clock.true_s(sample.stamp);
+    };
+    Eigen::Vector3d up = Eigen::Vector3d::Zero();
+    Eigen::Vector3d rest = Eigen::Vector3d::Zero();
+    double rests = 0.0;
+    for (const ImuSample& sample : robot.imu) {
+      const double t_s = true_s(sample);
+      if (t_s < from_s || t_s > to_s) continue;
+      up += sample.accel_mps2;
+      if (t_s > from_s + kBefore_s) continue;
+      rest += sample.gyro_radps;
+      rests += 1.0;
+    }
+    up.normalize();
+    const Eigen::Vector3d bias = rest / std::max(1.0, rests);
+    double heading = 0.0;
+    for (const ImuSample& sample : robot.imu) {
+      const double t_s = true_s(sample);
+      if (t_s < from_s || t_s > to_s) continue;
+      if (!times_s_.empty()) heading += up.dot(sample.gyro_radps - bias) * (t_s - times_s_.back());
+      times_s_.push_back(t_s);
+      headings_rad_.push_back(heading);
+    }
+  }
+
+  [[nodiscard]] double at(double true_s) const {
+    const auto next = std::ranges::lower_bound(times_s_, true_s);
+    if (times_s_.empty()) return 0.0;
+    const auto i = std::min<std::ptrdiff_t>(next - times_s_.begin(),
+                                            static_cast<std::ptrdiff_t>(times_s_.size()) - 1);
+    return headings_rad_[static_cast<std::size_t>(i)];
+  }
+
+ private:
+  std::vector<double> times_s_;
+  std::vector<double> headings_rad_;
+};
+
+std::optional<Heading> heading_of(const SwarmDataset& swarm, const TapeSegment& segment,
+                                  double first_s) {
+  const auto robot = std::ranges::find_if(swarm.robots, [&](const RobotRecording& recording) {
+    return recording.robot.id == segment.turning;
+  });
+  if (robot == swarm.robots.end()) return std::nullopt;
+  return Heading(*robot, first_s + segment.from_s, first_s + segment.to_s);
+}
+
+std::vector<TapedRanges> taped_ranges(const SwarmDataset& swarm, const SwarmRanges& all,
                                       const std::vector<TapeSegment>& tape) {
   std::vector<TapedRanges> taped;
   for (std::size_t k = 0; k < tape.size(); ++k) {
+    const auto heading = heading_of(swarm, tape[k], all.first_s);
     for (const TapedPair& pair : tape[k].pairs) {
-      TapedRanges part{
-          .pair = pair.pair, .segment = k, .distance_m = pair.distance_m, .ranges = {}};
+      TapedRanges part{.pair = pair.pair, .segment = k, .distance_m = pair.distance_m};
+      const bool turns =
+          heading && (pair.pair.a == tape[k].turning || pair.pair.b == tape[k].turning);
+      if (turns) part.turning = tape[k].turning;
       for (const SwarmRange& range : all.ranges) {
         const double t_s = range.true_s - all.first_s;
-        if (range.pair == pair.pair && t_s >= tape[k].from_s && t_s <= tape[k].to_s)
-          part.ranges.push_back(range.range);
+        if (range.pair != pair.pair || t_s < tape[k].from_s || t_s > tape[k].to_s) continue;
+        part.ranges.push_back(range.range);
+        if (turns) part.headings_rad.push_back(heading->at(range.true_s));
       }
       taped.push_back(std::move(part));
     }
   }
   return taped;
+}
+
+/// The tape, and one segment more of pairs that rested all the time.
+Result<std::vector<TapeSegment>> tape_of(const CalibrateRangeOptions& options,
+                                         const SwarmDataset& swarm) {
+  std::vector<TapeSegment> tape;
+  if (!options.tape.empty()) {
+    auto loaded = load_tape(options.tape);
+    if (!loaded) return loaded;
+    tape = std::move(*loaded);
+  }
+  if (options.distances.empty()) return tape;
+  std::map<std::string, RobotId> names;
+  for (const RobotRecording& robot : swarm.robots) names[robot.robot.name] = robot.robot.id;
+  TapeSegment whole{.from_s = 0.0, .to_s = std::numeric_limits<double>::infinity(), .pairs = {}};
+  for (const std::string& text : options.distances) {
+    const auto pair = parse_distance(text, names);
+    if (!pair) return tl::unexpected(pair.error());
+    whole.pairs.push_back(*pair);
+  }
+  tape.push_back(std::move(whole));
+  return tape;
+}
+
+LatePathLimits late_path_limits(const SwarmDataset& swarm) {
+  LatePathLimits limits;
+  for (const RobotRecording& robot : swarm.robots)
+    limits[robot.robot.id] = robot.config.uwb.noise.late_path_db;
+  return limits;
 }
 
 std::string file_text(const RangeCalibration& found) {
@@ -103,25 +192,39 @@ std::vector<ModuleBias> delays_of(const RangeCalibration& found) {
           {pair.pair.b, 0.5 * pair.bias_m, pair.sigma_m}};
 }
 
-/// A fragment for `crepesd.d/` of every robot.
+/// By which a range changes as antennas turn: between rests, or in a module's turn.
+double drift_of(const RangeCalibration& found) {
+  double drift = found.direction_sigma_m;
+  for (const ModulePattern& module : found.patterns) drift = std::max(drift, module.pattern.rms_m);
+  return drift;
+}
+
+/// A fragment for `crepesd.d/` of every robot: delays, and the errors that are left.
 std::string members_text(const RangeCalibration& found) {
   constexpr double kLeastBias = 0.005;  // m; temperature moves an antenna delay by so much
+  constexpr double kLeastNoise = 0.005;
   std::string text =
-      "# Written by crepesctl calibrate range: copy it to crepesd.d/ on every robot.\n"
-      "swarm:\n  members:\n";
-  for (const ModuleBias& module : delays_of(found)) {
+      "# Written by crepesctl calibrate range: copy it to crepesd.d/ on every robot.\n";
+  const std::vector<ModuleBias> delays = delays_of(found);
+  if (!delays.empty()) text += "swarm:\n  members:\n";
+  for (const ModuleBias& module : delays) {
     text += fmt::format("  - {{id: {}, range_delay_m: {}}}\n", module.id.value,
                         fixed(module.bias_m, 4));
   }
-  return text + fmt::format("uwb: {{bias_sigma_m: {}}}\n",
-                            fixed(std::max(remaining_bias(found), kLeastBias), 3));
+  text +=
+      fmt::format("uwb:\n  noise_m: {}\n  bias_sigma_m: {}\n  bias_drift_m: {}\n",
+                  fixed(std::max(found.noise_m, kLeastNoise), 3),
+                  fixed(std::max(remaining_bias(found), kLeastBias), 3), fixed(drift_of(found), 3));
+  if (found.late_path_db)
+    text += fmt::format("  late_path_db: {}\n", fixed(*found.late_path_db, 1));
+  return text;
 }
 
-/// FILE, and where the pairs determine the modules, the fragment beside it.
+/// FILE, and the fragment beside it.
 Result<void> write_files(const RangeCalibration& found, const std::filesystem::path& out) {
-  if (auto written = write_text_file(out, file_text(found)); !written) return written;
-  if (delays_of(found).empty()) return {};
-  return write_text_file(beside(out, kMembersSuffix), members_text(found));
+  return write_text_file(out, file_text(found)).and_then([&] {
+    return write_text_file(beside(out, kMembersSuffix), members_text(found));
+  });
 }
 
 Json json_of(const RangeCalibration& found) {
@@ -136,10 +239,34 @@ Json json_of(const RangeCalibration& found) {
   for (const ModuleBias& module : found.modules)
     json["modules"].push_back(
         {{"id", module.id.value}, {"bias_m", module.bias_m}, {"sigma_m", module.sigma_m}});
+  json["patterns"] = Json::array();
+  for (const ModulePattern& module : found.patterns)
+    json["patterns"].push_back({{"id", module.id.value},
+                                {"ids", {module.pair.a.value, module.pair.b.value}},
+                                {"rms_m", module.pattern.rms_m},
+                                {"mean_sigma_m", module.pattern.mean_sigma_m},
+                                {"deviation_m", module.pattern.deviation_m}});
   json["noise_m"] = found.noise_m;
   json["direction_sigma_m"] = found.direction_sigma_m;
   if (found.late_path_db) json["late_path_db"] = *found.late_path_db;
   return json;
+}
+
+/// Deviations in centimeters over the heading. The daemon knows no pattern, only its size.
+std::string patterns_text(const RangeCalibration& found) {
+  if (found.patterns.empty()) return "";
+  std::vector<std::vector<std::string>> rows{
+      {"cm at heading", "0 deg", "45", "90", "135", "180", "225", "270", "315", "RMS"}};
+  for (const ModulePattern& module : found.patterns) {
+    std::vector<std::string>& row = rows.emplace_back();
+    row.push_back(fmt::format("{} before {}", module.id.value,
+                              (module.pair.a == module.id ? module.pair.b : module.pair.a).value));
+    for (const double deviation : module.pattern.deviation_m)
+      row.push_back(fixed(100.0 * deviation, 1));
+    row.push_back(fixed(100.0 * module.pattern.rms_m, 1));
+  }
+  return "\n" + text_table(rows) +
+         "The daemon takes no pattern off; it counts as uwb.bias_drift_m.\n";
 }
 
 std::string text_of(const RangeCalibration& found, const std::filesystem::path& out) {
@@ -157,26 +284,24 @@ std::string text_of(const RangeCalibration& found, const std::filesystem::path& 
   for (const ModuleBias& module : found.modules)
     results.push_back({fmt::format("module {}", module.id.value), fixed(module.bias_m, 4),
                        fixed(module.sigma_m, 4)});
-  const std::string late =
-      found.late_path_db ? fmt::format(", late_path_db: {}", fixed(*found.late_path_db, 0)) : "";
-  return text_table(segments) + "\n" + text_table(results) +
-         fmt::format("\nuwb: {{noise_m: {}, bias_drift_m: {}{}}}\n", fixed(found.noise_m, 3),
-                     fixed(found.direction_sigma_m, 3), late) +
-         warning_lines(found.warnings) + fmt::format("written: {}\n", out.string()) +
-         (found.modules.empty() ? ""
-                                : fmt::format("written: {}, for crepesd.d/ of every robot\n",
-                                              beside(out, kMembersSuffix).string()));
+  return text_table(segments) + "\n" + text_table(results) + patterns_text(found) + "\n" +
+         members_text(found) + warning_lines(found.warnings) +
+         fmt::format("written: {}\nwritten: {}, for crepesd.d/ of every robot\n", out.string(),
+                     beside(out, kMembersSuffix).string());
 }
 
 }  // namespace
 
 Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options) {
-  const auto tape = load_tape(options.tape);
-  if (!tape) return tl::unexpected(tape.error());
+  if (options.tape.empty() && options.distances.empty())
+    return fail(ErrorCode::kUsage, "no distances: give --tape, or --distance r1,r2=5.00");
   const auto swarm = load_swarm(options.swarm_dir);
   if (!swarm) return tl::unexpected(swarm.error());
-  const RangeCalibration found = calibrate_ranges(taped_ranges(ranges_of(*swarm), *tape),
-                                                  swarm->robots.front().config.uwb.noise);
+  const auto tape = tape_of(options, *swarm);
+  if (!tape) return tl::unexpected(tape.error());
+  if (options.on_progress) options.on_progress(0.7);
+  const RangeCalibration found =
+      calibrate_ranges(taped_ranges(*swarm, ranges_of(*swarm), *tape), late_path_limits(*swarm));
   if (found.refusals.empty())
     if (const auto written = write_files(found, options.out); !written)
       return tl::unexpected(written.error());

@@ -6,7 +6,7 @@
 #include "daemon/ctl/calibrate/swarm_report.hpp"
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
 #include "drivers/dataset/robot_folder.hpp"
-#include "estimator/calibration/swarm_batch.hpp"
+#include "estimator/calibration/swarm/swarm_batch.hpp"
 
 namespace crepes {
 namespace {

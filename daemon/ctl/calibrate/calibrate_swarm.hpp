@@ -9,6 +9,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl calibrate swarm`.
 struct CalibrateSwarmOptions {
   std::filesystem::path swarm_dir;
   std::filesystem::path out;

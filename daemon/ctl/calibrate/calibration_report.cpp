@@ -2,11 +2,17 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/ctl/json_line.hpp"
+
 namespace crepes {
 
 nlohmann::ordered_json report_head(const std::vector<std::string>& reasons,
                                    const std::vector<std::string>& warnings) {
   return {{"ok", reasons.empty()}, {"reasons", reasons}, {"warnings", warnings}};
+}
+
+std::string failed_report(const Error& error) {
+  return json_line(report_head({error.message}, {}));
 }
 
 std::string warning_lines(const std::vector<std::string>& warnings) {

@@ -23,6 +23,9 @@ struct CalibrationReport {
 [[nodiscard]] nlohmann::ordered_json report_head(const std::vector<std::string>& reasons,
                                                  const std::vector<std::string>& warnings);
 
+/// The JSON object of a calibration that could not begin.
+[[nodiscard]] std::string failed_report(const Error& error);
+
 /// One line each.
 [[nodiscard]] std::string warning_lines(const std::vector<std::string>& warnings);
 

@@ -75,8 +75,11 @@ void CameraCoverage::add(const SpotFrame& frame) {
       return static_cast<std::size_t>(
           std::clamp(static_cast<int>(pixel / static_cast<double>(size) * cells), 0, cells - 1));
     };
-    ++sightings_.at(cell(uv->y(), camera_.resolution[1], kRows))
-          .at(cell(uv->x(), camera_.resolution[0], kColumns));
+    const std::size_t row = cell(uv->y(), camera_.resolution[1], kRows);
+    const std::size_t column = cell(uv->x(), camera_.resolution[0], kColumns);
+    if (++sightings_.at(row).at(column) == kLeastSightings)
+      farthest_px_ =
+          std::max(farthest_px_, radius_px(static_cast<int>(row), static_cast<int>(column)));
     boards_.insert(bearing.neighbor);
   }
   if (bearings.empty()) return;
@@ -84,12 +87,15 @@ void CameraCoverage::add(const SpotFrame& frame) {
   last_seen_ = frame.stamp;
 }
 
+double CameraCoverage::radius_px(int row, int column) const {
+  const double u = ((column + 0.5) / kColumns - 0.5) * camera_.resolution[0];
+  const double v = ((row + 0.5) / kRows - 0.5) * camera_.resolution[1];
+  return std::hypot(u, v);
+}
+
 bool CameraCoverage::is_inside(int row, int column) const {
-  const double width = camera_.resolution[0];
-  const double height = camera_.resolution[1];
-  const double u = (column + 0.5) / kColumns * width - 0.5 * width;
-  const double v = (row + 0.5) / kRows * height - 0.5 * height;
-  return std::hypot(u, v) < 0.5 * std::min(width, height);
+  const double nearer = 0.5 * std::min(camera_.resolution[0], camera_.resolution[1]);
+  return radius_px(row, column) < std::max(nearer, farthest_px_ + 1.0);
 }
 
 bool CameraCoverage::is_seen(int row, int column) const {

@@ -14,8 +14,8 @@
 
 namespace crepes {
 
-/// Counts where in the picture identified boards were seen, for how long, and how the body turned
-/// meanwhile. Needs no more than a guess of the lens.
+/// Counts where in the picture identified boards were seen and for how long, and how the body
+/// turned at that time. A guess of the lens is sufficient.
 class CameraCoverage {
  public:
   static constexpr int kRows = 10;
@@ -27,11 +27,12 @@ class CameraCoverage {
   void add(const ImuSample& sample);
   void add(const SpotFrame& frame);
 
-  /// Whether light can fall on this cell: its center is within the image circle.
+  /// Whether light can fall on this cell: its center is in the circle that touches the nearer
+  /// border of the picture, or no further out than a cell that was seen.
   [[nodiscard]] bool is_inside(int row, int column) const;
-  /// Whether a board was seen there some times.
+  /// Whether a board was seen there several times.
   [[nodiscard]] bool is_seen(int row, int column) const;
-  /// Seen cells over those inside.
+  /// The share of the cells inside that were seen.
   [[nodiscard]] double picture() const;
   /// Root mean square about each axis of the body.
   [[nodiscard]] Eigen::Vector3d rate_rms_radps() const;
@@ -39,7 +40,8 @@ class CameraCoverage {
   [[nodiscard]] double seen_s() const { return seen_s_; }
   [[nodiscard]] const std::set<RobotId>& boards() const { return boards_; }
 
-  /// 0 to 1, of what it has least. With 1 the recording is expected to be enough.
+  /// Progress of the requirement that is furthest from being met, 0 to 1. With 1 the recording is
+  /// expected to be sufficient.
   [[nodiscard]] double share() const;
   /// What to do, one sentence each; empty with a share of 1.
   [[nodiscard]] std::vector<std::string> missing() const;
@@ -48,6 +50,8 @@ class CameraCoverage {
   CameraCoverage(const CameraCalibration& camera, const CameraModel& model,
                  const IdLibrary& library, const Config& config);
 
+  /// Of a cell's center, from the picture's.
+  [[nodiscard]] double radius_px(int row, int column) const;
   /// Of a quarter of the picture: the first or second half of the rows and columns.
   [[nodiscard]] double picture_of(bool is_low, bool is_right) const;
 
@@ -55,6 +59,7 @@ class CameraCoverage {
   CameraModel model_;
   BlinkTracker tracker_;
   std::array<std::array<int, kColumns>, kRows> sightings_{};
+  double farthest_px_ = 0.0;  ///< radius of the outermost cell that was seen
   std::set<RobotId> boards_;
   std::optional<Timestamp> last_seen_;
   double seen_s_ = 0.0;

@@ -2,11 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "config/writing/config_writer.hpp"
 #include "daemon/ctl/calibrate/calibration_report.hpp"
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
@@ -42,18 +42,6 @@ std::vector<std::vector<std::string>> lens_rows(const CameraBatchResult& found) 
   return rows;
 }
 
-std::string lens_text(const CameraConstants& constants, const std::optional<KannalaBrandtFit>& kb) {
-  if (!kb) {
-    return fmt::format(
-        "  camera_model: ds\n  intrinsics: {}\n  distortion_model: none\n  distortion_coeffs: []\n",
-        to_yaml(numbers_of(constants.lens)));
-  }
-  return fmt::format(
-      "  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: equidistant\n"
-      "  distortion_coeffs: {}\n",
-      to_yaml(numbers_of(kb->pinhole)), to_yaml(std::vector<double>(kb->k.begin(), kb->k.end())));
-}
-
 std::string conversion_line(const std::optional<KannalaBrandtFit>& kb) {
   if (!kb) return "";
   return fmt::format(
@@ -74,20 +62,6 @@ std::string map_text(const ResidualMap& map) {
     text += "\n";
   }
   return text;
-}
-
-std::string camchain_text(const CameraConstants& constants, const std::array<int, 2>& resolution,
-                          const std::optional<KannalaBrandtFit>& kb, std::string_view command) {
-  const Pose T_C_B = constants.T_C_B();
-  const Eigen::Matrix3d R = T_C_B.R();
-  std::string text = fmt::format("# Written by crepesctl calibrate {}\ncam0:\n", command) +
-                     lens_text(constants, kb);
-  text += fmt::format("  resolution: {}\n  T_cam_imu:\n", to_yaml(resolution));
-  for (int i = 0; i < 3; ++i)
-    text += fmt::format("  - {}\n",
-                        to_yaml(std::vector<double>{R(i, 0), R(i, 1), R(i, 2), T_C_B.p[i]}));
-  text += "  - [0.0, 0.0, 0.0, 1.0]\n";
-  return text + fmt::format("  timeshift_cam_imu: {}\n", to_yaml(constants.shift_s));
 }
 
 std::string camera_text(const CameraBatchResult& found, std::size_t boards,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "daemon/ctl/calibrate/camera_coverage.hpp"
+#include "daemon/ctl/calibrate/coverage_file.hpp"
 #include "daemon/ctl/dataset/record.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
 #include "drivers/base/monotonic_clock.hpp"
@@ -15,29 +16,48 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// The coverage on standard output: a terminal that is redrawn, or lines.
+/// The coverage on standard output, a terminal that is redrawn or lines, unless it is quiet; and
+/// once a second in a file for the page of `crepesctl view`.
 class CoverageView {
  public:
-  explicit CoverageView(bool json) : json_(json) {
-    if (!json) screen_.emplace();
+  CoverageView(bool is_quiet, const std::filesystem::path& socket) : file_(socket) {
+    if (!is_quiet) screen_.emplace();
   }
   [[nodiscard]] bool is_terminal() const { return screen_ && screen_->is_terminal(); }
   void show(const CameraCoverage& coverage) {
-    const Duration period = is_terminal() ? 200ms : json_ ? 1s : 5s;
-    if (clock_.now() < next_) return;
-    next_ = clock_.now() + period;
-    if (json_) {
-      print(coverage_json(coverage));
-    } else {
-      screen_->show(coverage_text(coverage) + "\nq: calibrate with what there is\n");
+    const Timestamp now = clock_.now();
+    if (now >= next_file_) {
+      next_file_ = now + 1s;
+      const auto written = file_.write(coverage_json(coverage));
+      page_ = written ? "" : "crepesctl view does not show this: " + written.error().message + "\n";
     }
+    if (!screen_ || now < next_) return;
+    next_ = now + (is_terminal() ? 200ms : 5s);
+    screen_->show(coverage_text(coverage) + page_ + keys_text());
   }
 
+  /// `?` shows what the signs mean.
+  void toggle_help() { has_help_ = !has_help_; }
+
  private:
-  bool json_;
+  [[nodiscard]] std::string keys_text() const {
+    std::string text = "\nq: calibrate with what there is; ?: help\n";
+    if (!has_help_) return text;
+    return text +
+           "\n# a board was seen there three times or more, . not yet, blank: no light falls "
+           "there\n"
+           "The bar is what there is least of: the picture's cells, turns about each axis, time.\n"
+           "The recording ends by itself when it is full. The page of crepesctl view shows the\n"
+           "cells over the camera's picture.\n";
+  }
+
+  CoverageFile file_;
   MonotonicClock clock_;
   std::optional<LiveScreen> screen_;
   Timestamp next_ = Timestamp::min();
+  Timestamp next_file_ = Timestamp::min();
+  std::string page_;  ///< why the page does not show it
+  bool has_help_ = false;
 };
 
 }  // namespace
@@ -45,7 +65,7 @@ class CoverageView {
 Result<std::filesystem::path> record_for_camera(const RecordForCameraOptions& options) {
   std::optional<CameraCoverage> coverage;
   std::optional<Error> fault;
-  std::optional<CoverageView> view(std::in_place, options.json);
+  std::optional<CoverageView> view(std::in_place, options.is_quiet, options.socket);
   const KeyReader keys;
   RecordOptions recording;
   recording.dir = options.dir;
@@ -67,8 +87,10 @@ Result<std::filesystem::path> record_for_camera(const RecordForCameraOptions& op
       for (const SpotFrame& frame : spot_frames(rows)) coverage->add(frame);
   };
   recording.is_enough = [&] {
+    const auto key = keys.next();
+    if (key == '?') view->toggle_help();
     if (coverage) view->show(*coverage);
-    return fault || keys.next() == 'q' || (coverage && coverage->share() >= 1.0);
+    return fault || key == 'q' || (coverage && coverage->share() >= 1.0);
   };
   const Result<RecordSummary> recorded = record(recording);
   const bool is_terminal = view->is_terminal();

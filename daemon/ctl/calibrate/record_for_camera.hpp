@@ -7,10 +7,11 @@
 
 namespace crepes {
 
+/// Options of the recording.
 struct RecordForCameraOptions {
   std::filesystem::path dir;     ///< a new data set
   std::filesystem::path socket;  ///< of the daemon's recordings
-  bool json = false;             ///< the coverage as a JSON line a second
+  bool is_quiet = false;         ///< shows nothing on standard output
 };
 
 /// Records a running daemon until its camera has seen enough for a calibration, q, or a signal.

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
-#include "estimator/calibration/swarm_problem.hpp"
-#include "estimator/calibration/swarm_start.hpp"
-#include "estimator/calibration/swarm_state.hpp"
+#include "estimator/calibration/swarm/swarm_problem.hpp"
+#include "estimator/calibration/swarm/swarm_start.hpp"
+#include "estimator/calibration/swarm/swarm_state.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
@@ -20,14 +20,14 @@ struct SwarmMeasurements {
   SwarmStart start;
 };
 
-/// Replays the recording with what is configured, and with room for cameras that are turned by
-/// degrees and ranges that are off by decimeters: that gives the clocks, as the robots estimate
-/// them, and where the robots were. Stamps become those of the robot that had all others in sight
-/// most of the time. `on_progress`: 0..1, optional.
+/// Replays the recording with the configured calibration, but with larger sigmas: cameras may be
+/// turned by degrees and ranges off by decimeters. The replay estimates the clocks and the poses of
+/// the robots. All stamps are converted to the clock of the robot that saw the others most often.
+/// `on_progress`: 0..1, optional.
 [[nodiscard]] Result<SwarmMeasurements> swarm_measurements(
     const SwarmDataset& dataset, const std::function<void(double)>& on_progress);
 
-/// What a robot's configuration says of itself. Its first camera must be a Double Sphere.
+/// The constants of a robot's configuration. Its first camera must be a Double Sphere.
 [[nodiscard]] Result<RobotConstants> configured_constants(const Config& config);
 
 }  // namespace crepes

@@ -10,10 +10,10 @@
 
 #include "config/writing/config_writer.hpp"
 #include "daemon/ctl/calibrate/calibration_report.hpp"
-#include "daemon/ctl/calibrate/camera_report.hpp"
+#include "daemon/ctl/calibrate/camchain.hpp"
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
-#include "estimator/calibration/imu_calibration.hpp"
+#include "estimator/calibration/imu/imu_calibration.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 
@@ -42,7 +42,7 @@ std::string triad_line(std::string_view name, const TriadEstimate& triad) {
                      to_yaml(triad.bias), to_yaml(scale), to_yaml(misalignment));
 }
 
-std::string imu_part(const RobotCalibration& robot) {
+std::string imu_part(const CalibratedRobot& robot) {
   const CameraConstants& c = robot.after.camera;
   return "imu:\n" + triad_line("accelerometer", triad_of(c.M_accel, robot.accel_bias)) +
          triad_line("gyroscope", triad_of(c.M_gyro, robot.gyro_bias));
@@ -76,6 +76,11 @@ std::string members_part(const SwarmBatchResult& found, const SwarmDataset& data
   return text;
 }
 
+/// The default's bias is of ranges from which no delay was taken off.
+std::string uwb_part(const SwarmBatchResult& found, std::size_t robot) {
+  return fmt::format("uwb: {{bias_sigma_m: {}}}\n", fixed(remaining_range_bias(found, robot), 3));
+}
+
 std::string camera_part(const CameraConstants& constants, const CameraCalibration& camera) {
   const Pose T_C_B = constants.T_C_B();
   return fmt::format(
@@ -85,14 +90,14 @@ std::string camera_part(const CameraConstants& constants, const CameraCalibratio
 }
 
 /// A number before and after, its sigma, and whether the flight determined it.
-std::vector<std::string> row_of(const std::string& name, const RobotCalibration& robot, int index,
+std::vector<std::string> row_of(const std::string& name, const CalibratedRobot& robot, int index,
                                 double before, double after, double unit, int decimals) {
   return {name, fixed(unit * before, decimals), fixed(unit * after, decimals),
           fixed(unit * robot.sigma(index), decimals),
           robot.is_determined(index) ? "" : kNotDetermined};
 }
 
-std::vector<std::vector<std::string>> rows_of(const RobotCalibration& robot) {
+std::vector<std::vector<std::string>> rows_of(const CalibratedRobot& robot) {
   const RobotConstants& a = robot.before;
   const RobotConstants& b = robot.after;
   const RobotPriors moved = difference(a, b);
@@ -120,7 +125,7 @@ std::vector<std::vector<std::string>> rows_of(const RobotCalibration& robot) {
   return rows;
 }
 
-std::string imu_line(const RobotCalibration& robot) {
+std::string imu_line(const CalibratedRobot& robot) {
   int determined = 0;
   for (int i = swarm_at::kGyroMatrix; i < swarm_at::kRing; ++i)
     determined += robot.is_determined(i) ? 1 : 0;
@@ -137,7 +142,7 @@ Json triad_json(const TriadEstimate& triad) {
   return json;
 }
 
-Json robot_json(const RobotCalibration& robot, const SwarmRobot& name) {
+Json robot_json(const CalibratedRobot& robot, const SwarmRobot& name) {
   const RobotConstants& c = robot.after;
   const auto sigma3 = [&](int index) { return swarm_list(robot.sigma.segment<3>(index)); };
   Json json{{"id", name.id.value}, {"name", name.name}};
@@ -175,10 +180,11 @@ Json robot_json(const RobotCalibration& robot, const SwarmRobot& name) {
 
 std::string calibration_text(const SwarmBatchResult& found, const SwarmDataset& dataset,
                              std::size_t robot) {
-  const RobotCalibration& own = found.robots[robot];
+  const CalibratedRobot& own = found.robots[robot];
   const auto& resolution = dataset.robots[robot].config.cameras.front().calibration.resolution;
-  return camchain_text(own.after.camera, resolution, std::nullopt, "swarm") + imu_part(own) +
-         ranges_part(found, dataset) + members_part(found, dataset, false);
+  return camchain_text(calibration_of(own.after.camera, resolution, std::nullopt), Mounting::kKnown,
+                       "swarm") +
+         imu_part(own) + ranges_part(found, dataset) + members_part(found, dataset, false);
 }
 
 std::string fragment_text(const SwarmBatchResult& found, const SwarmDataset& dataset,
@@ -188,14 +194,15 @@ std::string fragment_text(const SwarmBatchResult& found, const SwarmDataset& dat
                      recording.robot.name) +
          camera_part(found.robots[robot].after.camera,
                      recording.config.cameras.front().calibration) +
-         imu_part(found.robots[robot]) + members_part(found, dataset, true);
+         imu_part(found.robots[robot]) + members_part(found, dataset, true) +
+         uwb_part(found, robot);
 }
 
 std::string swarm_text(const SwarmBatchResult& found, const SwarmDataset& dataset,
                        const std::filesystem::path& out) {
   std::string text;
   for (std::size_t r = 0; r < found.robots.size(); ++r) {
-    const RobotCalibration& robot = found.robots[r];
+    const CalibratedRobot& robot = found.robots[r];
     text +=
         fmt::format("{}: {} sightings, {} px before, {} px after, {} % outliers\n{}{}\n",
                     dataset.robots[r].robot.name, robot.sightings, fixed(robot.spot_before_px, 2),

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
-#include "estimator/calibration/swarm_batch.hpp"
+#include "estimator/calibration/swarm/swarm_batch.hpp"
 
 namespace crepes {
 

@@ -5,9 +5,12 @@
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include "drivers/base/number_text.hpp"
 #include "drivers/base/text_file.hpp"
 
 namespace crepes {
@@ -48,18 +51,19 @@ double number_of(const YAML::Node& node, const char* key, double min, double max
   return value;
 }
 
-RobotId id_of(const YAML::Node& node) {
-  const double id = number_of(node, "ids", 1.0, kLastTapedId);
-  if (id != std::floor(id)) refuse(node, "ids", "must be whole numbers");
+RobotId id_of(const YAML::Node& node, const char* key) {
+  const double id = number_of(node, key, 1.0, kLastTapedId);
+  if (id != std::floor(id)) refuse(node, key, "must be a whole number");
   return RobotId{static_cast<std::uint16_t>(id)};
 }
 
+constexpr double kLeastDistance_m = 0.05;
+
 TapedPair pair_of(const YAML::Node& node) {
-  constexpr double kLeastDistance_m = 0.05;
   const YAML::Node ids = list_of(node, "ids");
   if (ids.size() != 2) refuse(ids, "ids", "must be two robots");
-  RobotId a = id_of(ids[0]);
-  RobotId b = id_of(ids[1]);
+  RobotId a = id_of(ids[0], "ids");
+  RobotId b = id_of(ids[1], "ids");
   if (a == b) refuse(ids, "ids", "must be two robots");
   if (b < a) std::swap(a, b);
   return {{a, b},
@@ -72,10 +76,42 @@ TapeSegment segment_of(const YAML::Node& node) {
   segment.to_s = number_of(item_of(node, "to_s"), "to_s", 0.0, kLongestRecording_s);
   if (!(segment.to_s > segment.from_s)) refuse(node, "to_s", "must be after from_s");
   for (const YAML::Node& pair : list_of(node, "pairs")) segment.pairs.push_back(pair_of(pair));
+  if (const YAML::Node turning = node["turning"]; turning)
+    segment.turning = id_of(turning, "turning");
   return segment;
 }
 
+std::optional<RobotId> robot_of(const std::string& word,
+                                const std::map<std::string, RobotId>& names) {
+  if (const auto named = names.find(word); named != names.end()) return named->second;
+  int id = 0;
+  if (!parse_number(word, id).empty() || id < 1 || id > static_cast<int>(kLastTapedId))
+    return std::nullopt;
+  return RobotId{static_cast<std::uint16_t>(id)};
+}
+
 }  // namespace
+
+Result<TapedPair> parse_distance(const std::string& text,
+                                 const std::map<std::string, RobotId>& names) {
+  const auto refused = [&text](std::string_view reason) {
+    return fail(ErrorCode::kUsage,
+                fmt::format("--distance: '{}' {}; for example r1,r2=5.00", text, reason));
+  };
+  const std::size_t comma = text.find(',');
+  const std::size_t equals = text.find('=');
+  if (comma == std::string::npos || equals == std::string::npos || equals < comma)
+    return refused("is not ROBOT,ROBOT=METERS");
+  auto a = robot_of(text.substr(0, comma), names);
+  auto b = robot_of(text.substr(comma + 1, equals - comma - 1), names);
+  if (!a || !b || *a == *b) return refused("does not name two robots of the recording");
+  if (*b < *a) std::swap(a, b);
+  TapedPair pair{.pair = {*a, *b}};
+  if (!parse_number(text.substr(equals + 1), pair.distance_m).empty() ||
+      !(pair.distance_m >= kLeastDistance_m && pair.distance_m <= kMaxDistance_m))
+    return refused("has no distance in meters");
+  return pair;
+}
 
 Result<std::vector<TapeSegment>> load_tape(const std::filesystem::path& file) {
   const auto fault = [&file](int line, const std::string& message) {

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "daemon/ctl/calibrate/calibrate_camera.hpp"
+#include "daemon/ctl/calibrate/calibrate_grid.hpp"
 #include "daemon/ctl/calibrate/calibrate_imu.hpp"
 #include "daemon/ctl/calibrate/calibrate_range.hpp"
 #include "daemon/ctl/calibrate/calibrate_swarm.hpp"
@@ -14,11 +15,16 @@
 namespace crepes {
 namespace {
 
-/// Prints the report. Refused rows and the reasons of a refusal go to standard error, one a line.
-Result<void> finish(const Result<CalibrationReport>& report) {
-  if (!report) return tl::unexpected(report.error());
+/// Prints the report. Rows that were skipped and the reasons of a refusal go to standard error, one
+/// a line. With `json` there is one object on standard output, whatever happens.
+Result<void> finish(const Result<CalibrationReport>& report, bool json) {
+  if (!report) {
+    if (json)
+      if (auto printed = print_result(failed_report(report.error())); !printed) return printed;
+    return tl::unexpected(report.error());
+  }
   for (const std::string& fault : report->faults.list())
-    std::fprintf(stderr, "refused: %s\n", fault.c_str());
+    std::fprintf(stderr, "skipped: %s\n", fault.c_str());
   if (auto printed = print_result(report->text); !printed) return printed;
   if (report->reasons.empty()) return {};
   std::string message;
@@ -29,21 +35,51 @@ Result<void> finish(const Result<CalibrationReport>& report) {
 
 struct CameraCommand {
   CalibrateCameraOptions options;
+  std::string model = "ds";
   bool live = false;
   std::filesystem::path socket = RecordOptions{}.socket;
+  std::string grid;  ///< empty: boards are the target
+  double pitch_m = 0.0;
 };
 
+Result<CalibrationReport> calibrate_grid_with_progress(const CameraCommand& command) {
+  const auto grid = parse_grid(command.grid, command.pitch_m);
+  if (!grid) return tl::unexpected(grid.error());
+  if (command.live)
+    return fail(ErrorCode::kUsage, "--live: pictures of a grid are not recorded live");
+  const TerminalProgress progress;
+  return calibrate_grid({.pictures = command.options.robot_dir,
+                         .out = command.options.out,
+                         .grid = *grid,
+                         .fov_deg = command.options.fov_deg,
+                         .kannala_brandt = command.model == "kb",
+                         .json = command.options.json,
+                         .on_progress = progress.sink()});
+}
+
 Result<CalibrationReport> calibrate_camera_with_progress(const CameraCommand& command) {
+  if (command.model != "ds" && command.model != "kb")
+    return fail(ErrorCode::kUsage, "--model: '" + command.model + "' is none; ds or kb");
+  if (!command.grid.empty()) return calibrate_grid_with_progress(command);
   CalibrateCameraOptions options = command.options;
+  options.kannala_brandt = command.model == "kb";
   if (command.live) {
     auto folder = record_for_camera(
-        {.dir = options.robot_dir, .socket = command.socket, .json = options.json});
+        {.dir = options.robot_dir, .socket = command.socket, .is_quiet = options.json});
     if (!folder) return tl::unexpected(folder.error());
     options.robot_dir = std::move(*folder);
   }
   const TerminalProgress progress;
   options.on_progress = progress.sink();
   return calibrate_camera(options);
+}
+
+/// Runs `calibrate` with a bar on the terminal.
+template <class Options, class Calibrate>
+Result<CalibrationReport> with_progress(Options options, const Calibrate& calibrate) {
+  const TerminalProgress progress;
+  options.on_progress = progress.sink();
+  return calibrate(options);
 }
 
 void add_imu(CommandLine& line, CLI::App* calibrate) {
@@ -63,7 +99,10 @@ void add_imu(CommandLine& line, CLI::App* calibrate) {
       ->capture_default_str()
       ->check(CLI::Range(9.7, 9.9));
   add_json_flag(sub, options.json);
-  line.run(sub, [&options] { return finish(calibrate_imu(options)); });
+  line.run(sub, [&options] {
+    return finish(with_progress(options, [](const auto& o) { return calibrate_imu(o); }),
+                  options.json);
+  });
 }
 
 void add_range(CommandLine& line, CLI::App* calibrate) {
@@ -73,15 +112,22 @@ void add_range(CommandLine& line, CLI::App* calibrate) {
   sub->add_option("SWARM_DIR", options.swarm_dir, "the recording of all robots")->required();
   sub->add_option("--tape", options.tape,
                   "segments: [{from_s, to_s, pairs: [{ids: [1, 2], distance_m: 5.00}]}]; seconds "
-                  "after the first row, distances from antenna to antenna")
-      ->required();
+                  "after the first row, distances from antenna to antenna; with turning: ID in a "
+                  "segment that robot turned slowly about its antenna");
+  sub->add_option(
+         "--distance", options.distances,
+         "ROBOT,ROBOT=METERS, as in r1,r2=5.00: both rested for the whole recording; may be "
+         "repeated")
+      ->allow_extra_args(false);
   sub->add_option("--out", options.out,
-                  "biases of pairs and modules, YAML; a fragment of crepesd.yaml with "
-                  "range_delay_m of every "
-                  "module is written beside it as NAME.members.yaml")
+                  "biases of pairs and modules, YAML; a fragment of crepesd.yaml with delays and "
+                  "noise is written beside it as NAME.members.yaml")
       ->required();
   add_json_flag(sub, options.json);
-  line.run(sub, [&options] { return finish(calibrate_range(options)); });
+  line.run(sub, [&options] {
+    return finish(with_progress(options, [](const auto& o) { return calibrate_range(o); }),
+                  options.json);
+  });
 }
 
 void add_camera(CommandLine& line, CLI::App* calibrate) {
@@ -92,7 +138,8 @@ void add_camera(CommandLine& line, CLI::App* calibrate) {
       "Lens, mounting and time shift of the first camera: one to four LED boards at rest, 2 to 5 m "
       "away, and the robot turned by hand for a minute");
   sub->add_option("ROBOT_DIR", options.robot_dir,
-                  "the robot's folder of a recording; with --live a new directory for one")
+                  "the robot's folder of a recording; with --live a new directory for one; with "
+                  "--grid also a folder of pictures")
       ->required();
   sub->add_option("--out", options.out, "camchain-imucam.yaml of Kalibr")->required();
   sub->add_flag("--live", command.live,
@@ -104,20 +151,23 @@ void add_camera(CommandLine& line, CLI::App* calibrate) {
                   "the lens's rough field of view [deg]; default: start from the lens in "
                   "crepesd.yaml")
       ->check(CLI::Range(60.0, 220.0));
-  sub->add_option_function<std::string>(
-         "--model",
-         [&options](const std::string& model) { options.kannala_brandt = model == "kb"; },
-         "ds: Double Sphere (default); kb: Kannala-Brandt, Kalibr's pinhole with equidistant "
-         "distortion, converted from it")
-      ->check(CLI::IsMember({"ds", "kb"}));
+  sub->add_option("--model", command.model,
+                  "ds: Double Sphere; kb: Kannala-Brandt, Kalibr's pinhole with equidistant "
+                  "distortion")
+      ->capture_default_str();
+  CLI::Option* grid = sub->add_option(
+      "--grid", command.grid,
+      "the target is a flat grid of LEDs, rows x columns as in 5x7; ROBOT_DIR may be any folder of "
+      "pictures, and no IMU is needed");
+  CLI::Option* pitch =
+      sub->add_option("--pitch", command.pitch_m, "with --grid: from LED to LED [m]")
+          ->check(CLI::Range(0.001, 10.0));
+  pitch->needs(grid);
+  grid->needs(pitch);
   add_json_flag(sub, options.json);
-  line.run(sub, [&command] { return finish(calibrate_camera_with_progress(command)); });
-}
-
-Result<CalibrationReport> calibrate_swarm_with_progress(CalibrateSwarmOptions options) {
-  const TerminalProgress progress;
-  options.on_progress = progress.sink();
-  return calibrate_swarm(options);
+  line.run(sub, [&command] {
+    return finish(calibrate_camera_with_progress(command), command.options.json);
+  });
 }
 
 void add_swarm(CommandLine& line, CLI::App* calibrate) {
@@ -132,7 +182,10 @@ void add_swarm(CommandLine& line, CLI::App* calibrate) {
                   "robot is written beside it as <robot>.fragment.yaml")
       ->required();
   add_json_flag(sub, options.json);
-  line.run(sub, [&options] { return finish(calibrate_swarm_with_progress(options)); });
+  line.run(sub, [&options] {
+    return finish(with_progress(options, [](const auto& o) { return calibrate_swarm(o); }),
+                  options.json);
+  });
 }
 
 }  // namespace

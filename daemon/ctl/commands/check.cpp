@@ -17,6 +17,15 @@ void add_check(CommandLine& line) {
   sub->add_option("--for", options.duration_s, "seconds to watch")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 60.0));
+  sub->add_option("--led", options.led_port,
+                  "serial port of this robot's LED board: compare its pattern with --config's");
+  CLI::Option* walk = sub->add_option("--walk", options.walk,
+                                      "a neighbor, by name or id: say step by step where to carry "
+                                      "it, and whether its pose follows");
+  sub->add_option("--distance", options.distance_m,
+                  "with --walk: from robot to robot in the first step, by tape [m]")
+      ->needs(walk)
+      ->check(CLI::Range(0.1, 100.0));
   add_json_flag(sub, options.json);
   line.run(sub, [&options]() -> Result<void> {
     const Result<CheckReport> report = check(options);

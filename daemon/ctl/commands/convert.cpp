@@ -32,7 +32,7 @@ Result<void> run_convert(ConvertOptions options, bool json) {
   const Result<ConvertSummary> summary = convert_with_progress(options);
   if (!summary) return tl::unexpected(summary.error());
   for (const std::string& fault : summary->faults.list())
-    std::fprintf(stderr, "refused: %s\n", fault.c_str());
+    std::fprintf(stderr, "skipped: %s\n", fault.c_str());
   const std::string out = options.out.string();
   return print_result(json ? json_line({{"out", out},
                                         {"topics", summary->topics},

@@ -1,12 +1,13 @@
 #include "daemon/ctl/demo/demo.hpp"
 
+#include <limits>
+
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr double kViewFor = 600.0;      ///< s, with a page, unless --for is given
 constexpr double kFormationFor = 75.0;  ///< s, of which 60 are scored
 
 /// A live table, or a bar where standard output is for one object.
@@ -57,8 +58,8 @@ void add_demo(CommandLine& line) {
                   "directory in which configurations, logs and the true paths are kept");
   CLI::Option* view_flag =
       sub->add_flag("--view", view,
-                    "serve a page that shows the robots (crepesctl view), and run for ten minutes "
-                    "unless --for says otherwise");
+                    "serve a page that shows the robots (crepesctl view), and run until "
+                    "interrupted unless --for says otherwise");
   sub->add_option("--listen", listen, "where --view serves the page, ADDRESS:PORT")
       ->capture_default_str()
       ->needs(view_flag);
@@ -67,7 +68,7 @@ void add_demo(CommandLine& line) {
     if (view) options.view = listen;
     if (for_s->empty() && options.scenario == SimScenario::kFormation)
       options.for_s = kFormationFor;
-    if (view && for_s->empty()) options.for_s = kViewFor;
+    if (view && for_s->empty()) options.for_s = std::numeric_limits<double>::infinity();
     return run_demo(options, json);
   });
 }

@@ -22,10 +22,8 @@ Result<void> run_init(const InitOptions& options, bool asks) {
   if (auto printed = print_result(report->text); !printed) return printed;
   for (const ConfigFault& warning : report->warnings)
     std::fprintf(stderr, "still to do: %s\n", to_string(warning).c_str());
-  std::string faults;
-  for (const ConfigFault& fault : report->faults)
-    faults += (faults.empty() ? "" : "\n") + to_string(fault);
-  return faults.empty() ? Result<void>() : fail(ErrorCode::kConfig, faults);
+  return report->faults.empty() ? Result<void>()
+                                : fail(ErrorCode::kConfig, to_string(report->faults));
 }
 
 void add_camera_options(CLI::App* sub, InitOptions& options) {

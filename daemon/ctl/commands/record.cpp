@@ -9,6 +9,7 @@
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
 #include "daemon/ctl/json_line.hpp"
+#include "daemon/ctl/live/live_screen.hpp"
 #include "daemon/ctl/text_table.hpp"
 
 namespace crepes {
@@ -47,6 +48,8 @@ Result<void> run_record(RecordOptions options, bool json) {
                    static_cast<unsigned long long>(progress.rows));
     };
   }
+  const KeyReader keys;
+  options.is_enough = [&keys] { return keys.next() == 'q'; };
   const Result<RecordSummary> summary = record(options);
   if (options.on_progress) std::fputs("\r", stderr);
   if (!summary) return tl::unexpected(summary.error());
@@ -66,7 +69,7 @@ void add_record(CommandLine& line) {
   sub->add_flag("--images", options.pictures, "also record pictures, as many as time permits");
   sub->add_option_function<double>(
          "--duration", [&options](double seconds) { options.duration_s = seconds; },
-         "stop after this many seconds; default: stop with Ctrl-C")
+         "stop after this many seconds; default: stop with q or Ctrl-C")
       ->check(CLI::Range(0.1, 1e6));
   sub->add_option_function<double>(
          "--max-size",

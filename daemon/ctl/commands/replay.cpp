@@ -35,7 +35,7 @@ Result<void> run_replay(const ReplayOptions& options, bool json) {
   const Result<ReplaySummary> summary = replay_with_progress(options);
   if (!summary) return tl::unexpected(summary.error());
   for (const std::string& fault : summary->faults.list())
-    std::fprintf(stderr, "refused: %s\n", fault.c_str());
+    std::fprintf(stderr, "skipped: %s\n", fault.c_str());
   const std::string out = options.out_dir.string();
   return print_result(json ? json_of(*summary, out) : text_of(*summary, out));
 }

@@ -17,7 +17,7 @@ Result<void> run_spots(SpotsOptions options) {
   };
   options.on_fault = [&](const std::string& fault) {
     progress.clear();
-    std::fprintf(stderr, "refused: %s\n", fault.c_str());
+    std::fprintf(stderr, "skipped: %s\n", fault.c_str());
   };
   options.on_progress = progress.sink();
   return inspect_spots(options).map([](const SpotsSummary&) {});

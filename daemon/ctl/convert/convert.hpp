@@ -9,6 +9,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl convert`.
 struct ConvertOptions {
   std::filesystem::path source;  ///< a recorded swarm, or the output directory of replay
   std::filesystem::path swarm;   ///< of a replay: its data set, with clocks and truth; may be empty
@@ -16,6 +17,7 @@ struct ConvertOptions {
   std::function<void(double)> on_progress;  ///< progress, 0..1, called regularly
 };
 
+/// What was written.
 struct ConvertSummary {
   std::size_t topics = 0;
   std::uint64_t messages = 0;

@@ -1,5 +1,7 @@
 #include "daemon/ctl/convert/swarm_streams.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -49,7 +51,7 @@ void add_ranges(const SwarmDataset& dataset, const RobotRecording& robot,
 void add_camera(const RobotRecording& robot, std::size_t camera,
                 std::vector<MessageStream>& streams) {
   const CameraRecording& recording = robot.cameras[camera];
-  const std::string topic = "/" + robot.robot.name + "/cam" + std::to_string(camera);
+  const std::string topic = fmt::format("/{}/cam{}", robot.robot.name, camera);
   const std::string frame = topic.substr(1);
   const auto time_s = [&robot](const auto& row) { return robot.robot.clock.true_s(row.stamp); };
   streams.push_back(stream_of(topic + "/spots", annotations_kind(), recording.spots, time_s,

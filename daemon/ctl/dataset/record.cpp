@@ -160,7 +160,7 @@ std::string end_reason(const RecordOptions& options, const RecordProgress& progr
   constexpr double kLateSeconds =
       1.0;  // measurements come a little after they were made, or not at all
   if (signals.requested()) return "stopped";
-  if (options.is_enough && options.is_enough()) return "it is enough";
+  if (options.is_enough && options.is_enough()) return "ended";
   if (options.duration_s &&
       std::max(progress.seconds, to_seconds(elapsed) - kLateSeconds) >= *options.duration_s)
     return "--duration is over";

@@ -13,6 +13,7 @@
 
 namespace crepes {
 
+/// What has been recorded until now.
 struct RecordProgress {
   double seconds = 0.0;     ///< from the first measurement to the newest
   std::uint64_t bytes = 0;  ///< on disk
@@ -22,6 +23,7 @@ struct RecordProgress {
   int configurations = 0;     ///< more than one: the daemon was reloaded meanwhile
 };
 
+/// Options of `crepesctl record`.
 struct RecordOptions {
   static constexpr std::uint64_t kDefaultMaxBytes = std::uint64_t{1} << 30;
 
@@ -39,6 +41,7 @@ struct RecordOptions {
   std::function<bool()> is_enough{};
 };
 
+/// What was recorded, and why it ended.
 struct RecordSummary {
   RecordProgress progress;
   std::filesystem::path folder;  ///< the robot's

@@ -12,6 +12,7 @@
 
 namespace crepes {
 
+/// The file of a picture and its stamp.
 struct RecordedImage {
   Timestamp stamp{};
   std::filesystem::path file;

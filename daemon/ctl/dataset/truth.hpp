@@ -39,6 +39,7 @@ class Trajectory {
 /// The trajectories of all robots.
 class SwarmTruth {
  public:
+  /// The true motion of one robot.
   struct Robot {
     RobotClock clock;
     Trajectory path;

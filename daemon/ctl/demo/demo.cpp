@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <optional>
@@ -35,6 +36,7 @@ namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
 constexpr int kCommandPortOffset = 3;  ///< of the port for velocity commands: after three daemons
+constexpr Duration kScored = 60s;      ///< the newest, of a demo without an end
 constexpr double kInFlight = 0.1;      // s; the last poses have not arrived when the time is over
 
 /// One robot, and the connection to its daemon.
@@ -184,12 +186,14 @@ class Demo {
   }
 
  private:
+  [[nodiscard]] bool is_endless() const { return std::isinf(options_.for_s); }
   [[nodiscard]] double epoch_s() const { return to_seconds(start_.time_since_epoch()); }
   [[nodiscard]] double world_s() const { return to_seconds(clock_.now() - start_); }
 
   /// The start is reported separately, as the time to the first pose.
   [[nodiscard]] double scored_from_s() const {
-    return std::min(steered_ ? 15.0 : 5.0, end_s_ / 2.0);
+    const double settled_s = std::min(steered_ ? 15.0 : 5.0, end_s_ / 2.0);
+    return is_endless() ? std::max(settled_s, end_s_ - to_seconds(kScored)) : settled_s;
   }
 
   [[nodiscard]] std::string name_of(const Pair& pair) const {
@@ -297,6 +301,14 @@ class Demo {
     pair.view.update(pose, clock_.now());
     if (!pair.first_pose) pair.first_pose = clock_.now() - start_;
     if (pair.poses.empty() || pose.stamp > pair.poses.back().stamp) pair.poses.push_back(pose);
+    if (is_endless()) forget_old(pair.poses);
+  }
+
+  /// Rarely, because it moves all that stays.
+  static void forget_old(std::vector<NeighborPose>& poses) {
+    const Timestamp newest = poses.back().stamp;
+    if (newest - poses.front().stamp < 2 * kScored) return;
+    std::erase_if(poses, [&](const NeighborPose& pose) { return newest - pose.stamp > kScored; });
   }
 
   static std::optional<char> next_key(const std::optional<KeyReader>& keys) {
@@ -321,9 +333,11 @@ class Demo {
     std::vector<DemoRow> rows;
     rows.reserve(pairs_.size());
     for (const Pair& pair : pairs_) rows.push_back(live_row(pair));
-    const std::string page = page_ ? fmt::format("page: {}\n", page_->url()) : "";
-    const std::string head = fmt::format("{}world time {} s of {}\n{}", page, fixed(world_s(), 1),
-                                         fixed(options_.for_s, 0), steering());
+    const std::string url = page_ ? page_->url() : "";
+    const std::string page = url.empty() ? "" : fmt::format("page: {}\n", url);
+    const std::string end = is_endless() ? "" : fmt::format(" of {}", fixed(options_.for_s, 0));
+    const std::string head =
+        fmt::format("{}world time {} s{}\n{}", page, fixed(world_s(), 1), end, steering());
     return table_.text(head, rows, format);
   }
 

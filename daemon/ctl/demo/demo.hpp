@@ -11,10 +11,11 @@
 
 namespace crepes {
 
+/// Options of `crepesctl demo`.
 struct DemoOptions {
   SimScenario scenario = SimScenario::kFour;
   int seed = 1;
-  double for_s = 30.0;
+  double for_s = 30.0;         ///< infinite: until interrupted; the last minute is scored
   std::uint16_t port = 47481;  ///< subscription port of the first robot; the others follow
   std::filesystem::path keep;  ///< where configurations and logs are kept; empty: they are removed
   std::filesystem::path run;   ///< a program that steers the robots; empty: none

@@ -14,6 +14,7 @@
 namespace crepes {
 
 struct DemoSummary {
+  /// The poses of one robot by another, scored.
   struct Pair {
     RobotId observer{};
     RobotId neighbor{};

@@ -1,4 +1,4 @@
-/// Simulated robots that fly as programs tell them.
+/// Simulated robots that are steered by programs.
 #pragma once
 
 #include <Eigen/Core>

@@ -3,20 +3,21 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <map>
 #include <system_error>
 #include <utility>
 
 #include "config/reading/config_file.hpp"
 #include "config/writing/config_writer.hpp"
 #include "drivers/base/text_file.hpp"
-#include "drivers/dataset/robot_folder.hpp"
+#include "drivers/dataset/part_file.hpp"
 
 namespace crepes {
 namespace {
 
 namespace fs = std::filesystem;
 
-fs::path fragment_of(const fs::path& config, const char* name) {
+fs::path fragment_of(const fs::path& config, const std::string& name) {
   return config.parent_path() / (config.stem().string() + ".d") / name;
 }
 
@@ -31,23 +32,37 @@ std::string lights_text(const std::vector<NamedLight>& lights) {
   return text;
 }
 
+std::string threshold_text(int threshold) {
+  return fmt::format("# Written by the page of crepesctl view.\nvision:\n  threshold: {}\n",
+                     threshold);
+}
+
 /// As it was before: with its text, or not there.
 Result<void> restore(const fs::path& file, const Result<std::string>& before) {
-  if (before) return write_text_file(file, *before);
+  if (before) return replace_text_file(file, *before);
   std::error_code error;
   fs::remove(file, error);
   return {};
 }
 
-/// Writes a fragment that leaves the configuration without a fault, or none.
-Result<void> write_fragment(const fs::path& config, const char* name, const std::string& text) {
-  const fs::path file = fragment_of(config, name);
-  const Result<std::string> before = read_text_file(file, kMaxConfigBytes);
-  if (auto written = write_text_file(file, text); !written) return written;
-  const Result<Config> result = load_config(config);
-  if (result) return {};
-  if (auto restored = restore(file, before); !restored) return restored;
-  return tl::unexpected(result.error());
+/// Writes fragments, by name, that leave the configuration without a fault, or none.
+Result<void> write_fragments(const fs::path& config,
+                             const std::map<std::string, std::string>& fragments) {
+  std::map<fs::path, Result<std::string>> before;
+  Result<void> done;
+  for (const auto& [name, text] : fragments) {
+    const fs::path file = fragment_of(config, name);
+    before.emplace(file, read_text_file(file, kMaxConfigBytes));
+    std::error_code error;
+    fs::create_directories(file.parent_path(), error);
+    done = replace_text_file(file, text);
+    if (!done) break;
+  }
+  if (done) done = load_config(config).map([](const Config&) {});
+  if (done) return {};
+  for (const auto& [file, text] : before)
+    if (auto restored = restore(file, text); !restored) return restored;
+  return done;
 }
 
 }  // namespace
@@ -69,21 +84,16 @@ Result<CameraLights> CameraLights::load(const fs::path& config, const std::strin
   return CameraLights(config, std::move(lights), index);
 }
 
-Result<void> CameraLights::change(const CameraLight& light) {
+Result<void> CameraLights::change(const CameraLight& light, std::optional<int> threshold) {
   std::vector<NamedLight> wanted = lights_;
   if (light.exposure_us) wanted[chosen_].light.exposure_us = light.exposure_us;
   if (light.gain) wanted[chosen_].light.gain = light.gain;
-  if (auto written = write_fragment(config_, "90-exposure.yaml", lights_text(wanted)); !written)
-    return written;
+  std::map<std::string, std::string> fragments;
+  if (light.exposure_us || light.gain) fragments["90-exposure.yaml"] = lights_text(wanted);
+  if (threshold) fragments["90-threshold.yaml"] = threshold_text(*threshold);
+  if (auto written = write_fragments(config_, fragments); !written) return written;
   lights_ = std::move(wanted);
   return {};
-}
-
-Result<void> change_threshold(const fs::path& config, int threshold) {
-  return write_fragment(config, "90-threshold.yaml",
-                        fmt::format("# Written by the page of crepesctl view.\nvision:\n"
-                                    "  threshold: {}\n",
-                                    threshold));
 }
 
 }  // namespace crepes

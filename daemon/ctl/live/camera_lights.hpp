@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 
 namespace crepes {
 
+/// Exposure and gain of the camera of this name.
 struct NamedLight {
   std::string camera;
   CameraLight light;
@@ -26,9 +28,10 @@ class CameraLights {
   /// Of the camera to change.
   [[nodiscard]] const CameraLight& light() const { return lights_[chosen_].light; }
 
-  /// Changes what `light` has, and writes the fragment 90-exposure.yaml. With a fault in the
-  /// result, the fragment is as before and the fault is returned.
-  [[nodiscard]] Result<void> change(const CameraLight& light);
+  /// Changes what `light` has (fragment 90-exposure.yaml), and vision.threshold [grey levels; 0:
+  /// automatic] (fragment 90-threshold.yaml). All of it or nothing: with a fault in the result, the
+  /// fragments are as before and the fault is returned.
+  [[nodiscard]] Result<void> change(const CameraLight& light, std::optional<int> threshold = {});
 
  private:
   CameraLights(std::filesystem::path config, std::vector<NamedLight> lights, std::size_t chosen)
@@ -38,8 +41,5 @@ class CameraLights {
   std::vector<NamedLight> lights_;
   std::size_t chosen_;
 };
-
-/// Writes vision.threshold [grey levels; 0: automatic] to the fragment 90-threshold.yaml, as above.
-[[nodiscard]] Result<void> change_threshold(const std::filesystem::path& config, int threshold);
 
 }  // namespace crepes

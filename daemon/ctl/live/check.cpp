@@ -3,13 +3,17 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <iostream>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <variant>
 
 #include "config/reading/config_file.hpp"
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/live/full_status.hpp"
+#include "daemon/ctl/live/own_board.hpp"
 #include "daemon/ctl/live/robot_check.hpp"
+#include "daemon/ctl/live/walk_around.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 
 namespace crepes {
@@ -83,12 +87,54 @@ Json json_of(const std::vector<CheckFinding>& findings, const client::Status& st
   return json;
 }
 
+/// Behind the last one of its section.
+void add(std::vector<CheckFinding>& findings, CheckFinding finding) {
+  const auto last =
+      std::ranges::find(findings.rbegin(), findings.rend(), finding.about, &CheckFinding::about);
+  findings.insert(last.base(), std::move(finding));
+}
+
+/// What the members are: with --config from there.
+Result<SwarmConfig> members_of(const CheckOptions& options, const RobotObservation& seen) {
+  if (seen.config) return seen.config->swarm;
+  return fail(ErrorCode::kUsage,
+              "--led: --config must name the daemon's configuration, which has " +
+                  options.led_port + "'s pattern");
+}
+
+/// The newest pose of a neighbor, watched for a second each time.
+Result<std::vector<CheckFinding>> walk(const CheckOptions& options, const client::Status& status) {
+  const auto same = [&](const client::Status::Neighbor& neighbor) {
+    return neighbor.name == options.walk || std::to_string(neighbor.peer) == options.walk;
+  };
+  const auto neighbor = std::ranges::find_if(status.neighbors, same);
+  if (neighbor == status.neighbors.end())
+    return fail(ErrorCode::kUsage, "--walk: there is no neighbor " + options.walk);
+  const RobotId id{neighbor->peer};
+  const auto pose_now = [&]() -> std::optional<client::Pose> {
+    const auto poses = watch_poses(options.daemon, 1.0);
+    if (!poses || !poses->contains(id)) return std::nullopt;
+    return poses->at(id);
+  };
+  return walk_around(options.walk, options.distance_m, pose_now, std::cin, std::cerr);
+}
+
 }  // namespace
 
 Result<CheckReport> check(const CheckOptions& options) {
   const Result<RobotObservation> seen = observe(options);
   if (!seen) return tl::unexpected(seen.error());
-  const std::vector<CheckFinding> findings = check_robot(*seen);
+  std::vector<CheckFinding> findings = check_robot(*seen);
+  if (!options.led_port.empty()) {
+    const auto swarm = members_of(options, *seen);
+    if (!swarm) return tl::unexpected(swarm.error());
+    add(findings, check_own_board(options.led_port, *swarm, RobotId{seen->after.self}));
+  }
+  if (!options.walk.empty()) {
+    const auto walked = walk(options, seen->after);
+    if (!walked) return tl::unexpected(walked.error());
+    findings.insert(findings.end(), walked->begin(), walked->end());
+  }
   CheckReport report;
   report.is_good = std::ranges::count(findings, CheckVerdict::kFault, &CheckFinding::verdict) == 0;
   report.text = options.json ? json_line(json_of(findings, seen->after, report.is_good))

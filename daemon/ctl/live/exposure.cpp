@@ -143,15 +143,25 @@ std::optional<CameraLight> wanted_by(char key, const CameraLight& light) {
   }
 }
 
+constexpr const char* kKeys =
+    "\n+ - exposure   G g gain   q end   ? help; as short as far boards allow\n";
+constexpr const char* kHelp =
+    "\n+ and - make the exposure a quarter longer or shorter, G and g the gain a step higher or\n"
+    "lower; both are written to crepesd.d/90-exposure.yaml and are in force at once.\n"
+    "background, threshold: grey levels of the last second; faintest, brightest: of the lights\n"
+    "found. A far board must stay above the threshold, a near one below 255.\n";
+
 /// Until q.
 Result<void> show_live(const ExposureOptions& options, CameraLights& lights) {
   const LiveScreen screen;
   const KeyReader keys;
   StopSignals stop;
   std::string refused;
+  bool has_help = false;
   while (!stop.requested()) {
     while (const auto key = keys.next()) {
       if (*key == 'q') return {};
+      if (*key == '?') has_help = !has_help;
       const auto wanted = wanted_by(*key, lights.light());
       if (!wanted) continue;
       const Result<void> applied = apply(options, lights, *wanted);
@@ -159,8 +169,7 @@ Result<void> show_live(const ExposureOptions& options, CameraLights& lights) {
     }
     const Result<FullStatus> status = request_full_status(options.daemon);
     if (!status) return tl::unexpected(status.error());
-    screen.show(lights_table(status->message, lights) +
-                "\n+ - exposure   G g gain   q end; as short as far boards allow\n" + refused);
+    screen.show(lights_table(status->message, lights) + kKeys + refused + (has_help ? kHelp : ""));
     sleep_for(100ms);
   }
   return {};

@@ -12,6 +12,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl exposure`.
 struct ExposureOptions {
   DaemonAddress daemon;
   std::filesystem::path config = "/etc/crepes/crepesd.yaml";  ///< of this daemon

@@ -70,6 +70,28 @@ Result<void> ask_part(client::Connection& daemon, const std::string& part, Json&
   return {};
 }
 
+/// Of every robot that the team's filter estimates, in full. A daemon of an older version refuses.
+void ask_team(client::Connection& daemon, Json& whole) {
+  const auto has_team = [](const Json& json) { return json.contains("team"); };
+  const auto brief = ask(daemon, {.about = "team"}, has_team);
+  if (!brief || !*brief) return;
+  Json ids = Json::array();
+  for (const Json& robot : (**brief)["team"].value("robots", Json::array()))
+    ids.push_back(robot["robot"]);
+  for (const Json& id : (**brief).value("more", Json::array())) ids.push_back(id);
+  whole["team"] = (**brief)["team"];
+  whole["team"]["robots"] = Json::array();
+  for (const Json& id : ids) {
+    const auto part =
+        ask(daemon, {.peer = id.get<std::uint16_t>(), .about = "team"}, [&](const Json& json) {
+          return json.contains("team") && json["team"].contains("robots") &&
+                 json["team"]["robots"].size() == 1 && json["team"]["robots"][0]["robot"] == id &&
+                 json["team"]["robots"][0].contains("calibration");
+        });
+    if (part && *part) whole["team"]["robots"].push_back((**part)["team"]["robots"][0]);
+  }
+}
+
 Result<Json> ask_all(client::Connection& daemon, const DaemonAddress& address) {
   auto brief = ask(daemon, {}, [](const Json& json) {
     return json.contains("neighbors") && json.contains("sensors");
@@ -80,6 +102,7 @@ Result<Json> ask_all(client::Connection& daemon, const DaemonAddress& address) {
   for (const auto& done : {ask_part(daemon, "sensors", whole), ask_part(daemon, "network", whole),
                            ask_neighbors(daemon, whole)})
     if (!done) return tl::unexpected(done.error());
+  ask_team(daemon, whole);
   whole.erase("truncated");
   whole.erase("more");
   return whole;

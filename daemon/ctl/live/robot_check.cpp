@@ -9,8 +9,11 @@
 #include <string_view>
 #include <utility>
 
+#include "daemon/ctl/live/light_advice.hpp"
+#include "daemon/ctl/live/pose_advice.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "estimator/core/constants.hpp"
+#include "net/mesh/mesh_counters.hpp"
 
 namespace crepes {
 namespace {
@@ -54,9 +57,6 @@ const SensorLine* sensor_of(const client::Status& status, const std::string& nam
 constexpr std::string_view kSpots = " spots";
 
 bool is_spots(const SensorLine& sensor) { return sensor.name.ends_with(kSpots); }
-bool is_uncalibrated(const SensorLine& sensor) {
-  return sensor.message.starts_with("not calibrated");
-}
 
 std::string name_of_neighbor(const client::Status::Neighbor& neighbor) {
   return neighbor.name.empty() ? fmt::format("robot {}", neighbor.peer) : neighbor.name;
@@ -88,7 +88,7 @@ void check_sensors(const RobotObservation& seen, Section section) {
   if (seen.after.sensors.empty())
     section.fault("the daemon reports no sensor", "see its messages: journalctl -u crepesd");
   for (const SensorLine& sensor : seen.after.sensors) {
-    if (!sensor.ok && !is_uncalibrated(sensor)) {
+    if (!sensor.ok && sensor.calibrated) {
       section.fault(fmt::format("{}: {}", sensor.name,
                                 sensor.message.empty() ? "does not work" : sensor.message),
                     "crepesctl devices lists what is connected; see troubleshooting.md");
@@ -185,35 +185,20 @@ void check_clocks(const RobotObservation& seen, Section section) {
 }
 
 void check_picture(const SensorLine& spots, Section& section) {
-  constexpr std::uint64_t kBright = 60;  // gray levels of the darkest part of the picture
-  constexpr std::uint64_t kWhite = 250;
-  constexpr std::uint64_t kClutter = 30;  // spots in a frame
-  constexpr std::uint64_t kMargin = 20;   // gray levels above the threshold
   const std::uint64_t background = total(spots.counts, "background");
   const std::uint64_t brightest = total(spots.counts, "brightest");
-  const std::uint64_t faintest = total(spots.counts, "faintest");
-  const std::uint64_t threshold = total(spots.counts, "threshold");
   const std::string text =
-      fmt::format("{}: background {}, threshold {}, brightest light {}, faintest {}", spots.name,
-                  background, threshold, brightest, faintest);
-  if (background > kBright) {
-    section.doubt(text,
-                  "the picture is too bright: shorten exposure_us (crepesctl exposure), check "
-                  "the infrared filter");
-  } else if (brightest == 0) {
-    section.doubt(fmt::format("{}: background {}, no light in view", spots.name, background),
-                  "put another robot's board in view, at the longest distance that you need");
-  } else if (total(spots.counts, "spots") > kClutter) {
-    section.doubt(fmt::format("{}, {} lights", text, total(spots.counts, "spots")),
-                  "lamps, windows or mirrors are in view: shorten exposure_us");
-  } else if (brightest < kWhite) {
-    section.doubt(text, "no board is white: lengthen exposure_us, or raise gain");
-  } else if (faintest < threshold + kMargin) {
-    section.doubt(text,
-                  "the faintest light is nearly lost: if it is a board, lengthen exposure_us; "
-                  "if not, shorten it");
-  } else {
+      brightest == 0
+          ? fmt::format("{}: background {}, no light in view", spots.name, background)
+          : fmt::format(
+                "{}: background {}, threshold {}, brightest light {}, faintest {}, {} lights",
+                spots.name, background, total(spots.counts, "threshold"), brightest,
+                total(spots.counts, "faintest"), total(spots.counts, "spots"));
+  const std::string advice = light_advice(spots.counts);
+  if (advice.empty()) {
     section.good(text);
+  } else {
+    section.doubt(text, advice);
   }
 }
 
@@ -291,12 +276,12 @@ void check_link(const client::Status::Neighbor& neighbor, Section& section) {
   const std::string name = name_of_neighbor(neighbor);
   if (!neighbor.reports || neighbor.reports->received == 0) {
     return section.fault(name + ": never heard",
-                         "is its crepesd running, on the same mesh, net.interface and key?");
+                         std::string(advice_for(NoPoseReason::kNeverHeard)));
   }
   if (neighbor.reports->age_s > kSilent) {
     return section.fault(
         fmt::format("{}: silent for {} s", name, fixed(neighbor.reports->age_s, 0)),
-        "out of reach, or its battery or daemon has stopped");
+        std::string(advice_for(NoPoseReason::kSilent)));
   }
   const std::string text =
       fmt::format("{}: {} % lost", name, fixed(100.0 * neighbor.reports->loss, 0));
@@ -315,9 +300,11 @@ void check_mesh(const RobotObservation& seen, Section section) {
     section.doubt("no other robot is a member of the swarm", "add it to swarm.members");
   for (const auto& neighbor : seen.after.neighbors) check_link(neighbor, section);
   std::string refused;
-  for (const auto& [name, value] : seen.after.network) {
+  for (std::size_t i = 0; i < kMeshCounterCount; ++i) {
+    const auto counter = static_cast<MeshCounter>(i);
+    const std::string name(name_of(counter));
     const std::uint64_t more = growth(seen.before.network, seen.after.network, name);
-    if (more > 0 && name.starts_with("refused"))
+    if (more > 0 && is_refusal(counter))
       refused += fmt::format("{}{} {}", refused.empty() ? "" : ", ", name, more);
   }
   if (!refused.empty()) {
@@ -328,7 +315,6 @@ void check_mesh(const RobotObservation& seen, Section section) {
 
 /// What an accelerometer at rest measures.
 void check_gravity(const client::Status& status, Section& section) {
-  constexpr double kGravity = 9.81;   // m/s^2
   constexpr double kAtRest = 0.05;    // rad/s
   constexpr double kTolerance = 0.1;  // m/s^2
   constexpr double kMilli = 1e-3;
@@ -339,7 +325,7 @@ void check_gravity(const client::Status& status, Section& section) {
   const std::string text = fmt::format("gravity measures {} m/s^2", fixed(force, 2));
   if (turn > kAtRest) {
     section.doubt(text + " while the robot turns", "hold it still and check again");
-  } else if (std::abs(force - kGravity) > kTolerance) {
+  } else if (std::abs(force - kNominalGravityMps2) > kTolerance) {
     section.doubt(text, "hold it still and check again; if it stays so: crepesctl calibrate imu");
   } else {
     section.good(text);
@@ -378,7 +364,7 @@ void check_agreement(const RobotObservation& seen, const client::Status::Neighbo
 void check_calibration(const RobotObservation& seen, Section section) {
   const std::string advice = "crepesctl calibrate, and see calibration.md";
   for (const SensorLine& sensor : seen.after.sensors)
-    if (is_uncalibrated(sensor)) section.fault(sensor.name + ": " + sensor.message, advice);
+    if (!sensor.calibrated) section.fault(sensor.name + ": " + sensor.message, advice);
   check_gravity(seen.after, section);
   for (const auto& neighbor : seen.after.neighbors) check_agreement(seen, neighbor, section);
   for (const std::string& fault : seen.after.faults)

@@ -12,6 +12,7 @@
 
 namespace crepes {
 
+/// The result of a check, from good to bad.
 enum class CheckVerdict : std::uint8_t {
   kGood,
   kDoubt,  ///< works, and could be better; or is not known
@@ -20,6 +21,7 @@ enum class CheckVerdict : std::uint8_t {
 
 [[nodiscard]] std::string_view name_of(CheckVerdict verdict);
 
+/// One result of a check.
 struct CheckFinding {
   std::string about;  ///< sensors, rates, clocks, exposure, board, mesh, calibration
   CheckVerdict verdict = CheckVerdict::kGood;

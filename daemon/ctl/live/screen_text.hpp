@@ -19,7 +19,7 @@ struct ScreenFormat {
 /// What a piece of text says besides its words, which say it too.
 enum class Tone : std::uint8_t { kTitle, kDim, kGood, kNotice, kBad };
 
-/// With the color of `tone` if the reader sees colors; they are told apart by the color-blind.
+/// With the color of `tone` if the reader sees colors; the color-blind can distinguish them.
 [[nodiscard]] std::string toned(const std::string& text, Tone tone, const ScreenFormat& format);
 
 /// The columns that a text takes: colors take none, a letter of several bytes (UTF-8) takes one.

@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl sources`.
 struct SourcesOptions {
   DaemonAddress daemon;
   double over_s = 1.0;  ///< the time over which rates are counted

@@ -3,10 +3,14 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <map>
 #include <vector>
 
 #include "daemon/ctl/live/full_status.hpp"
+#include "daemon/ctl/live/light_advice.hpp"
+#include "daemon/ctl/live/pose_advice.hpp"
 #include "daemon/ctl/text_table.hpp"
+#include "estimator/core/constants.hpp"
 
 namespace crepes {
 namespace {
@@ -60,6 +64,32 @@ std::string neighbors_of(const client::Status& status) {
   return text_table(rows);
 }
 
+/// What to do where there is no pose, once for each reason.
+std::string advice_of(const client::Status& status) {
+  std::map<std::string, std::string> neighbors;  // by reason
+  for (const auto& neighbor : status.neighbors) {
+    std::string& names = neighbors[neighbor.reason];
+    names += (names.empty() ? "" : ", ") + neighbor.name;
+  }
+  std::string text;
+  for (const auto& [reason, names] : neighbors) {
+    if (const std::string_view advice = advice_for(reason); !advice.empty())
+      text += fmt::format("{} ({}): {}\n", reason, names, advice);
+  }
+  return text;
+}
+
+/// How to change the cameras' exposure.
+std::string light_of(const client::Status& status) {
+  std::string text;
+  for (const auto& sensor : status.sensors) {
+    if (!sensor.counts.contains("background")) continue;
+    const std::string advice = light_advice(sensor.counts);
+    if (!advice.empty()) text += fmt::format("{}: {}\n", sensor.name, advice);
+  }
+  return text;
+}
+
 /// What the team finds wrong with a robot; on a healthy team this is empty.
 std::string faults_of(const client::Status& status) {
   std::string text;
@@ -69,6 +99,51 @@ std::string faults_of(const client::Status& status) {
       text += fmt::format("{}: {}\n", neighbor.name, fault);
   }
   return text;
+}
+
+/// "0.123 +- 0.010", or as many as there are components; "-" without an estimate.
+std::string text_of(const std::map<std::string, client::Status::Estimate>& estimates,
+                    const std::string& key, int digits, double unit = 1.0) {
+  const auto found = estimates.find(key);
+  if (found == estimates.end()) return "-";
+  const auto numbers = [&](const std::vector<double>& values) {
+    std::string text;
+    for (const double value : values)
+      text += (text.empty() ? "" : " ") + fixed(unit * value, digits);
+    return text;
+  };
+  return numbers(found->second.value) + " +- " + numbers(found->second.sigma);
+}
+
+std::string text_of(const std::map<std::string, client::Status::Residual>& residuals,
+                    const std::string& kind) {
+  const auto found = residuals.find(kind);
+  if (found == residuals.end()) return "-";
+  const auto& [nis, fused, refused] = found->second;
+  return fmt::format("{} ({} / {})", nis ? fixed(*nis, 2) : "-", fused, refused);
+}
+
+/// The residuals of each robot's measurements, and its sensors as the team knows them.
+std::string team_of(const client::Status& status) {
+  if (!status.team || status.team->robots.empty()) return "";
+  Rows residuals{{"team", "trusted", "bearing NIS (fused / refused)", "range NIS", "gyro NIS"}};
+  Rows calibrations{{"team", "camera turned deg", "antenna m", "clock ms", "gyro bias deg/s",
+                     "accelerometer bias m/s2"}};
+  for (const client::Status::TeamRobot& robot : status.team->robots) {
+    const std::string name = robot.name.empty() ? std::to_string(robot.robot) : robot.name;
+    residuals.push_back({name, robot.trusted ? "yes" : "not yet",
+                         text_of(robot.residuals, "bearing"), text_of(robot.residuals, "range"),
+                         text_of(robot.residuals, "gyro")});
+    std::string cameras;
+    for (const client::Status::Camera& camera : robot.cameras)
+      cameras += (cameras.empty() ? "" : ", ") + text_of(camera.estimates, "turned_deg", 2);
+    calibrations.push_back({name, cameras.empty() ? "-" : cameras,
+                            text_of(robot.calibration, "antenna_delay_m", 3),
+                            text_of(robot.calibration, "clock_ms", 1),
+                            text_of(robot.calibration, "gyro_bias_radps", 2, kDegPerRad),
+                            text_of(robot.calibration, "accel_bias_mps2", 3)});
+  }
+  return text_table(residuals) + "\n" + text_table(calibrations) + "\n";
 }
 
 std::string mesh_of(const client::Status& status) {
@@ -111,9 +186,9 @@ std::string totals_of(const client::Status& status) {
 }  // namespace
 
 std::string status_text(const client::Status& status) {
-  return fmt::format("{}\n{}\n{}\n{}{}{}{}", head_of(status), sensors_of(status),
-                     neighbors_of(status), faults_of(status), mesh_of(status), thinned_of(status),
-                     totals_of(status));
+  return fmt::format("{}\n{}\n{}\n{}{}{}{}{}{}{}", head_of(status), sensors_of(status),
+                     neighbors_of(status), advice_of(status), light_of(status), team_of(status),
+                     faults_of(status), mesh_of(status), thinned_of(status), totals_of(status));
 }
 
 Result<std::string> status(const StatusOptions& options) {

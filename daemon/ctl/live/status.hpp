@@ -7,6 +7,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl status`.
 struct StatusOptions {
   DaemonAddress daemon;
   bool json = false;  ///< the daemon's own JSON, as one object

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "daemon/ctl/live/live_screen.hpp"
 #include "daemon/ctl/live/neighbor_view.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/base/monotonic_clock.hpp"
@@ -65,7 +66,9 @@ Result<std::string> wait_for_pose(const WaitposeOptions& options) {
   const MonotonicClock clock;
   const Timestamp end = clock.now() + from_seconds(options.timeout_s);
   Wait wait(options);
+  const KeyReader keys;
   while (clock.now() < end) {
+    if (keys.next() == 'q') return fail(ErrorCode::kNotFound, "stopped: " + wait.why());
     const auto answer = daemon->receive(50ms);
     if (!answer) continue;
     if (const auto found = wait.handle(*answer)) return *found + "\n";

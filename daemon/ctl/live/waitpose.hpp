@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl waitpose`.
 struct WaitposeOptions {
   DaemonAddress daemon;
   RobotId peer{};

@@ -7,6 +7,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl watch`.
 struct WatchOptions {
   DaemonAddress daemon;
   std::optional<double> for_s;  ///< stop after this time; otherwise on a signal or key

@@ -15,6 +15,7 @@ namespace crepes {
 
 class WatchScreen {
  public:
+  /// The column by which neighbors are sorted.
   enum class Order : std::uint8_t { kId, kName, kDistance, kSigma, kAge };
 
   /// `now` is the client's time.

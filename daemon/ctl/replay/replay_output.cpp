@@ -2,8 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "drivers/dataset/pose_file.hpp"
 #include "drivers/dataset/record_file.hpp"
+#include "drivers/dataset/team_record_file.hpp"
 #include "estimator/core/contract.hpp"
 
 namespace crepes {
@@ -12,6 +15,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr Duration kCalibrationPeriod = std::chrono::milliseconds(100);
+
+/// Of an earlier replay.
+void remove_records(const fs::path& stem) {
+  std::error_code status;
+  for (const char* extension : {".innovations.csv", ".calibration.csv"})
+    fs::remove(fs::path(stem) += extension, status);
+}
 
 }  // namespace
 
@@ -31,6 +41,16 @@ Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names, Deta
       if (!files) return tl::unexpected(files.error());
       output.pairs_.emplace(std::pair(observer, neighbor), std::move(*files));
     }
+    const fs::path team = dir / observer_name / kTeamStem;
+    if (detail == Detail::kPoses) {
+      remove_records(team);
+      continue;
+    }
+    if (std::ranges::any_of(output.names_, [](const auto& e) { return e.second == kTeamStem; }))
+      return fail(ErrorCode::kConfig, "a robot named 'team' has the same files as the team");
+    auto files = create_team(team);
+    if (!files) return tl::unexpected(files.error());
+    output.teams_.emplace(observer, std::move(*files));
   }
   return output;
 }
@@ -46,9 +66,7 @@ Result<ReplayOutput::PairFiles> ReplayOutput::create_pair(const fs::path& stem, 
   if (!tum) return tl::unexpected(tum.error());
   PairFiles files{.csv = std::move(*csv), .tum = std::move(*tum), .records = {}};
   if (detail == Detail::kPoses) {
-    std::error_code status;
-    for (const char* extension : {".innovations.csv", ".calibration.csv"})
-      fs::remove(fs::path(stem) += extension, status);
+    remove_records(stem);
     return files;
   }
   auto innovations = create(".innovations.csv", innovation_file_header() + '\n');
@@ -59,6 +77,16 @@ Result<ReplayOutput::PairFiles> ReplayOutput::create_pair(const fs::path& stem, 
                               .calibration = std::move(*calibration),
                               .last_calibration = {}};
   return files;
+}
+
+Result<ReplayOutput::TeamFiles> ReplayOutput::create_team(const fs::path& stem) {
+  auto innovations =
+      PartFile::create(fs::path(stem) += ".innovations.csv", team_innovation_file_header() + '\n');
+  if (!innovations) return tl::unexpected(innovations.error());
+  auto calibration =
+      PartFile::create(fs::path(stem) += ".calibration.csv", team_calibration_file_header() + '\n');
+  if (!calibration) return tl::unexpected(calibration.error());
+  return TeamFiles{.innovations = std::move(*innovations), .calibration = std::move(*calibration)};
 }
 
 ReplayOutput::PairFiles& ReplayOutput::files_of(RobotId observer, RobotId neighbor) {
@@ -94,6 +122,15 @@ void ReplayOutput::write(RobotId observer, const Records& records) {
     append_calibration_row(files->calibration.text(), record);
     files->calibration.flush_if_large();
   }
+  for (const TeamRecord& record : records.team) {
+    const auto files = teams_.find(observer);
+    CREPES_EXPECT(files != teams_.end(), "records for an output that takes poses only");
+    auto& [innovations, calibration] = files->second;
+    append_team_innovation_rows(innovations.text(), record, names_);
+    innovations.flush_if_large();
+    append_team_calibration_rows(calibration.text(), record, names_);
+    calibration.flush_if_large();
+  }
 }
 
 Result<void> ReplayOutput::finish(const ReplayReport& report) {
@@ -103,6 +140,10 @@ Result<void> ReplayOutput::finish(const ReplayReport& report) {
     if (!files.records) continue;
     if (auto done = files.records->innovations.publish(); !done) return done;
     if (auto done = files.records->calibration.publish(); !done) return done;
+  }
+  for (auto& [observer, files] : teams_) {
+    if (auto done = files.innovations.publish(); !done) return done;
+    if (auto done = files.calibration.publish(); !done) return done;
   }
   auto file = PartFile::create(dir_ / "report.json", report_json(report, names_));
   if (!file) return tl::unexpected(file.error());

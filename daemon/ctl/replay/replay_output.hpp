@@ -37,6 +37,7 @@ struct RobotReport {
   std::vector<std::pair<std::string, double>> cpu_s;           ///< by stage
 };
 
+/// The contents of report.json.
 struct ReplayReport {
   std::string scenario;
   std::string profile;
@@ -49,13 +50,14 @@ struct ReplayReport {
 };
 
 /// Writes DIR/<observer>/<neighbor>.csv and .tum during the replay, and DIR/report.json at the end;
-/// with records also <neighbor>.innovations.csv and .calibration.csv. Files have their final names
-/// only after `finish`. Before, they end in ".part", and the results of an earlier replay are
-/// removed.
+/// with records also <neighbor>.innovations.csv and .calibration.csv, and those of the team. Files
+/// have their final names only after `finish`. Before, they end in ".part", and the results of an
+/// earlier replay are removed.
 class ReplayOutput {
  public:
   /// The name of each robot's directory.
   using Names = std::map<RobotId, std::string>;
+  /// Whether the files of records are written besides those of poses.
   enum class Detail { kPoses, kRecords };
 
   [[nodiscard]] static Result<ReplayOutput> create(const std::filesystem::path& dir, Names names,
@@ -74,6 +76,10 @@ class ReplayOutput {
     PartFile calibration;
     std::optional<Timestamp> last_calibration;
   };
+  struct TeamFiles {
+    PartFile innovations;
+    PartFile calibration;
+  };
   struct PairFiles {
     PartFile csv;
     PartFile tum;
@@ -85,11 +91,13 @@ class ReplayOutput {
 
   [[nodiscard]] static Result<PairFiles> create_pair(const std::filesystem::path& stem,
                                                      Detail detail);
+  [[nodiscard]] static Result<TeamFiles> create_team(const std::filesystem::path& stem);
   [[nodiscard]] PairFiles& files_of(RobotId observer, RobotId neighbor);
 
   std::filesystem::path dir_;
   Names names_;
   std::map<std::pair<RobotId, RobotId>, PairFiles> pairs_;
+  std::map<RobotId, TeamFiles> teams_;  ///< by observer; only with records
 };
 
 /// report.json's text.

@@ -6,6 +6,7 @@
 #include "drivers/base/text_file.hpp"
 #include "estimator/core/contract.hpp"
 #include "net/subscription/json_parts.hpp"
+#include "net/subscription/team_json.hpp"
 
 namespace crepes {
 namespace {
@@ -65,6 +66,16 @@ Json pair_json(const RobotReport& robot, const NeighborStatus& neighbor,
   return pair;
 }
 
+/// The robots as this one's team filter knows them at the end.
+Json team_json(const RobotReport& robot, const ReplayOutput::Names& names) {
+  Json team;
+  team["robots"] = Json::array();
+  for (const TeamRobotStatus& one : robot.status.team->robots)
+    team["robots"].push_back(team_robot_json(one, name_in(names, one.calibration.robot),
+                                             robot.robot, TeamDetail::kFull));
+  return team;
+}
+
 Json robot_json(const RobotReport& robot, const ReplayOutput::Names& names) {
   Json json;
   json["name"] = name_in(names, robot.robot);
@@ -75,7 +86,10 @@ Json robot_json(const RobotReport& robot, const ReplayOutput::Names& names) {
   json["refused_samples"] = robot.status.refused_samples;
   json["refused_imu"] = refused_imu_json(robot.status.refused_imu);
   json["unknown_senders"] = robot.status.unknown_senders;
+  json["predicted_ids"] = {{"confirmed", robot.status.predicted_ids.confirmed},
+                           {"unconfirmed", robot.status.predicted_ids.unconfirmed}};
   json["cpu_s"] = object_of(robot.cpu_s);
+  if (robot.status.team) json["team"] = team_json(robot, names);
   return json;
 }
 

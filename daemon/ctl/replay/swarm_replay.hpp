@@ -20,6 +20,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl replay`.
 struct ReplayOptions {
   std::filesystem::path swarm_dir;
   std::filesystem::path out_dir;
@@ -49,6 +50,7 @@ struct Delivery {
 [[nodiscard]] MeshKey replay_swarm_key();
 [[nodiscard]] RobotKey replay_robot_key(RobotId robot);
 
+/// What was replayed.
 struct ReplaySummary {
   std::size_t robots = 0;
   std::uint64_t poses = 0;  ///< rows written

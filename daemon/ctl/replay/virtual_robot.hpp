@@ -35,8 +35,9 @@ using VirtualInput = std::variant<Event, VirtualDatagram, PendingImage, Forward>
 struct Handed {
   std::uint64_t datagrams = 0;
   std::uint64_t reports = 0;   ///< datagrams that gave one
+  std::uint64_t samples = 0;   ///< of its own IMU
   std::uint64_t ranges = 0;    ///< of its own module, to members
-  std::uint64_t bearings = 0;  ///< of its own cameras, to members
+  std::uint64_t bearings = 0;  ///< of its own cameras, to members, read
 };
 
 /// Time of the processor by stage.

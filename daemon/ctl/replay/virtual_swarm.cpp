@@ -100,6 +100,29 @@ void VirtualSwarm::schedule_recording(std::size_t index) {
   std::vector<UwbRange>().swap(recording.ranges);
 }
 
+void VirtualSwarm::append(SwarmDataset later, double from_s) {
+  for (std::size_t i = 0; i < robots_.size(); ++i) {
+    RobotRecording& recording = robots_[i].recording;
+    const auto more = std::ranges::find_if(
+        later.robots, [&](const RobotRecording& r) { return r.robot.id == robots_[i].id(); });
+    if (more == later.robots.end()) continue;
+    const Duration by = recording.robot.clock.local(from_s) - recording.robot.clock.local(0.0);
+    const auto shift = [by](auto& readings) {
+      for (auto& reading : readings) reading.stamp += by;
+    };
+    shift(more->imu);
+    shift(more->ranges);
+    for (CameraRecording& camera : more->cameras) {
+      shift(camera.spots);
+      shift(camera.images);
+    }
+    recording.imu = std::move(more->imu);
+    recording.ranges = std::move(more->ranges);
+    recording.cameras = std::move(more->cameras);
+    schedule_recording(i);
+  }
+}
+
 Result<void> VirtualSwarm::run_until(double true_s) {
   while (!queue_.empty() && queue_.front().true_s < true_s)
     if (auto done = deliver_next(); !done) return done;
@@ -178,6 +201,7 @@ Result<void> VirtualSwarm::deliver(Arrival& arrival) {
 bool VirtualSwarm::prepare(VirtualRobot& robot, double true_s, Event& event) const {
   if (is_own_reading(event)) {
     if (sinks_.on_reading && !sinks_.on_reading(robot.id(), true_s, event)) return false;
+    robot.handed.samples += std::holds_alternative<ImuSample>(event) ? 1 : 0;
     if (const auto* const range = std::get_if<UwbRange>(&event))
       robot.handed.ranges += is_member(robot, range->neighbor) ? 1 : 0;
   } else if (!std::holds_alternative<Tick>(event)) {
@@ -233,7 +257,8 @@ void VirtualSwarm::step(const Arrival& arrival, const Event& event) {
 
 void VirtualSwarm::handle_outputs(const Arrival& arrival, const Outputs& outputs) {
   VirtualRobot& robot = robots_[arrival.robot];
-  robot.handed.bearings += outputs.bearings.size();
+  robot.handed.bearings += static_cast<std::uint64_t>(
+      std::ranges::count(outputs.bearings, Naming::kRead, &Bearing::how));
   for (const NeighborPose& pose : outputs.poses) sinks_.on_pose(robot.id(), pose);
   if (sinks_.on_records) sinks_.on_records(robot.id(), outputs.records);
   if (outputs.report) {

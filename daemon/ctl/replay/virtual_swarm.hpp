@@ -24,6 +24,8 @@ class VirtualSwarm {
   VirtualSwarm(SwarmDataset dataset, const std::optional<SwarmTruth>& truth,
                const ReplayOptions& options, const ReplaySinks& sinks);
 
+  /// Readings of another recording of the same robots, which began at `from_s`.
+  void append(SwarmDataset later, double from_s);
   /// Everything until `true_s`. A picture that cannot be read is an error.
   [[nodiscard]] Result<void> run_until(double true_s);
   /// The whole recording. `on_progress` is called with 0..1 regularly; it may be empty.
@@ -42,6 +44,8 @@ class VirtualSwarm {
   /// A datagram of anybody, on its way.
   void send(double arrives_s, RobotId to, VirtualDatagram datagram);
 
+  /// The robots' clocks once a second, since the last call; `report` has those that are left.
+  [[nodiscard]] std::vector<ClockSample> take_clocks() { return std::exchange(clocks_, {}); }
   [[nodiscard]] ReplayReport report(const ReplayOptions& options) const;
 
  private:

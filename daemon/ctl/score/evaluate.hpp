@@ -9,6 +9,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl evaluate`.
 struct EvaluateOptions {
   std::filesystem::path results;  ///< the output folder of replay
   std::filesystem::path swarm;    ///< the data set

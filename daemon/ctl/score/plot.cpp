@@ -12,6 +12,7 @@
 #include "daemon/ctl/dataset/truth.hpp"
 #include "daemon/ctl/score/plot_pair.hpp"
 #include "daemon/ctl/score/plot_parts.hpp"
+#include "daemon/ctl/score/plot_team.hpp"
 #include "daemon/ctl/score/svg_chart.hpp"
 #include "drivers/dataset/part_file.hpp"
 
@@ -97,7 +98,26 @@ std::string table_row(const std::vector<std::string>& cells, const char* tag,
   return row + "</tr>\n";
 }
 
-std::string page_of(const PlotOptions& options, const std::vector<PairData>& pairs) {
+std::string team_anchor(const TeamData& team) { return team.observer + "-team"; }
+
+/// Of each observer with records, on the time axis of its pairs, which are in order.
+Result<std::vector<TeamData>> load_teams(const PlotOptions& options,
+                                         const std::vector<PairData>& pairs) {
+  std::vector<TeamData> teams;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (i > 0 && pairs[i].observer == pairs[i - 1].observer) continue;
+    auto team = read_team(options.results, pairs[i].observer);
+    if (!team) return tl::unexpected(team.error());
+    if (team->innovations.empty() && team->calibrations.empty()) continue;
+    team->seconds = pairs[i].seconds;
+    team->duration_s = pairs[i].duration_s;
+    teams.push_back(std::move(*team));
+  }
+  return teams;
+}
+
+std::string page_of(const PlotOptions& options, const std::vector<PairData>& pairs,
+                    const std::vector<TeamData>& teams) {
   const std::string title = "CREPES replay " + xml_escaped(options.results.string());
   // The page loads nothing: neither style, nor script, nor picture of anybody else.
   std::string html = fmt::format(
@@ -117,6 +137,10 @@ std::string page_of(const PlotOptions& options, const std::vector<PairData>& pai
     html += fmt::format("<a href='#{}'>{} → {}</a>", xml_escaped(anchor(pair)),
                         xml_escaped(pair.observer), xml_escaped(pair.neighbor));
   }
+  for (const TeamData& team : teams) {
+    html += fmt::format("<a href='#{}'>the team of {}</a>", xml_escaped(team_anchor(team)),
+                        xml_escaped(team.observer));
+  }
   html += fmt::format("</nav>\n{}<div class='wide'><table>", kPlotReading) +
           table_row(summary_header(), "th");
   for (const PairData& pair : pairs) html += table_row(summary_row(pair), "td", anchor(pair));
@@ -124,6 +148,11 @@ std::string page_of(const PlotOptions& options, const std::vector<PairData>& pai
   for (const PairData& pair : pairs) {
     html += fmt::format("<h2 id='{}'>{} as seen by {}</h2>\n{}", xml_escaped(anchor(pair)),
                         xml_escaped(pair.neighbor), xml_escaped(pair.observer), pair_charts(pair));
+  }
+  for (const TeamData& team : teams) {
+    html +=
+        fmt::format("<h2 id='{}'>The team as {} estimates it</h2>\n{}",
+                    xml_escaped(team_anchor(team)), xml_escaped(team.observer), team_charts(team));
   }
   return fmt::format("{}<script>{}</script></body></html>\n", html, kPlotScript);
 }
@@ -151,7 +180,9 @@ Result<fs::path> plot(const PlotOptions& options) {
     pairs.push_back(std::move(*pair));
   }
   fs::path out = options.out.empty() ? options.results / "plot.html" : options.out;
-  auto page = PartFile::create(out, page_of(options, pairs));
+  const auto teams = load_teams(options, pairs);
+  if (!teams) return tl::unexpected(teams.error());
+  auto page = PartFile::create(out, page_of(options, pairs, *teams));
   if (!page) return tl::unexpected(page.error());
   if (auto done = page->publish(); !done) return tl::unexpected(done.error());
   return out;

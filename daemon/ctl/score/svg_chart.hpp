@@ -30,11 +30,13 @@ using Series = std::vector<ChartPoint>;
 /// may be variables of the page's style sheet.
 class SvgChart {
  public:
+  /// The texts of a chart.
   struct Labels {
     std::string title;
     std::string x;
     std::string y;
   };
+  /// Of a chart [px].
   struct Size {
     int width = 520;
     int height = 190;

@@ -14,6 +14,7 @@
 
 namespace crepes {
 
+/// A pair of robots and its score.
 struct ScoredPair {
   SwarmRobot observer;
   SwarmRobot neighbor;

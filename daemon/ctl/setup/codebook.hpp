@@ -9,6 +9,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl codebook`.
 struct CodebookOptions {
   std::size_t ids = 64;
   CodebookRules rules{};

@@ -14,6 +14,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl devices`.
 struct DevicesOptions {
   std::filesystem::path dev = "/dev";     ///< the folder of serial ports and video devices
   IioPaths iio{};                         ///< where the kernel shows its IMUs
@@ -21,6 +22,7 @@ struct DevicesOptions {
   bool json = false;
 };
 
+/// A serial port, and the protocol of its device.
 struct SerialDevice {
   std::string port;
   int baud = 0;
@@ -28,11 +30,13 @@ struct SerialDevice {
   std::string fault;  ///< why it could not be read
 };
 
+/// A camera that is connected.
 struct CameraDevice {
   std::string driver;  ///< as in the configuration
   FoundCamera found;
 };
 
+/// All devices that were found.
 struct ConnectedDevices {
   std::vector<CameraDevice> cameras;
   std::vector<SerialDevice> serial;  ///< by port

@@ -70,7 +70,8 @@ Json json_of(const ImportedCalibration& calibration) {
 std::vector<ConfigFault> faults_here(const std::string& sections) {
   std::vector<ConfigFault> faults = check_config_text(sections, "as imported").faults;
   std::erase_if(faults, [](const ConfigFault& fault) {
-    return !fault.key.starts_with("cameras[") && !fault.key.starts_with("imu.");
+    const bool is_section = fault.key == "cameras";  // not imported, so not missing here
+    return is_section || (!is_in(fault, &Config::cameras) && !is_in(fault, &Config::imu));
   });
   return faults;
 }
@@ -89,12 +90,7 @@ Result<std::string> import_calibration(const std::vector<std::filesystem::path>&
   }
   const std::string sections = calibration_text(all);
   if (faults.empty()) faults = faults_here(sections);
-  if (!faults.empty()) {
-    std::string message;
-    for (const ConfigFault& fault : faults)
-      message += (message.empty() ? "" : "\n") + to_string(fault);
-    return fail(ErrorCode::kConfig, std::move(message));
-  }
+  if (!faults.empty()) return fail(ErrorCode::kConfig, to_string(faults));
   if (json) return json_line(json_of(all));
   return fmt::format("# Imported by crepesctl import-calibration from {}\n{}", names, sections);
 }

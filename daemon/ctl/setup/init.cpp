@@ -311,8 +311,8 @@ std::string next_steps(const RobotPlan& plan, const InitOptions& options) {
       "  2. crepesctl led --port /dev/ttyUSB0 set --id {1} --library {0}/swarm.yaml\n"
       "  3. crepesctl keygen {0}/mesh.key {0}/robot.key     (a key for the swarm's radio)\n"
       "  4. systemctl start crepesd; crepesctl check\n"
-      "  5. crepesctl record DIR; crepesctl calibrate camera DIR/r{1} --out "
-      "{0}/camchain-imucam.yaml\n"
+      "  5. crepesctl calibrate camera RECORDING --live --out {0}/camchain-imucam.yaml\n"
+      "     (another robot's board at rest in view, this robot turned by hand)\n"
       "  6. systemctl restart crepesd; crepesctl check\n",
       dir, plan.id.value);
 }

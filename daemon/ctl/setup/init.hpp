@@ -39,6 +39,7 @@ struct InitOptions {
   bool json = false;
 };
 
+/// What was written, and what remains to be done.
 struct InitReport {
   std::string text;                   ///< for standard output
   std::vector<ConfigFault> faults;    ///< of the result, as --check-config finds them

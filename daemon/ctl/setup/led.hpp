@@ -11,6 +11,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl led`.
 struct LedOptions {
   std::string port;
   int id = 0;

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "config/writing/config_writer.hpp"
-#include "estimator/calibration/camera_start.hpp"
+#include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {

@@ -24,6 +24,7 @@ inline constexpr std::array kLooks{
 /// up or down, forward.
 [[nodiscard]] Eigen::Matrix3d R_camera_body(Look look);
 
+/// The camera of a new robot.
 struct PlannedCamera {
   std::string driver = "none";
   std::string device;  ///< empty: the only one
@@ -33,6 +34,7 @@ struct PlannedCamera {
   Look look = Look::kForward;
 };
 
+/// A serial sensor of a new robot.
 struct PlannedSerial {
   std::string port;
   int baud = 0;  ///< 0: the default

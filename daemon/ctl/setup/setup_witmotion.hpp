@@ -8,6 +8,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl setup-witmotion`.
 struct WitMotionSetup {
   std::string port;
   int baud = 115200;

@@ -16,6 +16,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl spots`.
 struct SpotsOptions {
   std::filesystem::path source;  ///< a robot's folder, a folder of pictures or a picture
   std::filesystem::path config;  ///< crepesd.yaml of the robot
@@ -59,12 +60,14 @@ struct PictureFindings {
   std::vector<RobotSighting> robots;
 };
 
+/// How often one robot was seen.
 struct RobotSummary {
   std::string name;
   std::uint64_t pictures = 0;
   double first_s = 0.0;  ///< after the first picture
 };
 
+/// What was found in all pictures.
 struct SpotsSummary {
   std::uint64_t pictures = 0;
   std::uint64_t refused = 0;

@@ -11,6 +11,7 @@
 
 namespace crepes {
 
+/// The addresses, names and rights of a page.
 struct AccessPolicy {
   std::string token;               ///< required for data; empty: none is required
   std::vector<std::string> names;  ///< of this machine, in lower case

@@ -28,7 +28,7 @@ Result<std::optional<Number>> number_in(const std::map<std::string, std::string>
 
 Result<void> reload(pid_t daemon) {
   if (::kill(daemon, SIGHUP) == 0) return {};
-  return fail(ErrorCode::kIo, fmt::format("the daemon cannot be told to reload: {}",
+  return fail(ErrorCode::kIo, fmt::format("the daemon cannot be asked to reload: {}",
                                           std::generic_category().message(errno)));
 }
 
@@ -57,15 +57,10 @@ Result<void> change_camera(const CameraFeed& feed, const std::filesystem::path& 
   if (!exposure_us) return tl::unexpected(exposure_us.error());
   if (!gain) return tl::unexpected(gain.error());
   if (!threshold) return tl::unexpected(threshold.error());
-  if (*exposure_us || *gain) {
-    auto lights = CameraLights::load(file, config->cameras[camera].calibration.name);
-    if (!lights) return tl::unexpected(lights.error());
-    auto changed = lights->change({.exposure_us = *exposure_us, .gain = *gain});
-    if (!changed) return changed;
-  }
-  if (*threshold) {
-    if (auto changed = change_threshold(file, **threshold); !changed) return changed;
-  }
+  auto lights = CameraLights::load(file, config->cameras[camera].calibration.name);
+  if (!lights) return tl::unexpected(lights.error());
+  auto changed = lights->change({.exposure_us = *exposure_us, .gain = *gain}, *threshold);
+  if (!changed) return changed;
   return reload(*daemon);
 }
 

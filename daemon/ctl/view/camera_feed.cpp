@@ -7,6 +7,7 @@
 #include <chrono>
 
 #include "config/reading/config_file.hpp"
+#include "daemon/ctl/calibrate/coverage_file.hpp"
 #include "daemon/ctl/view/camera_picture.hpp"
 #include "daemon/ctl/view/view_json.hpp"
 #include "daemon/recording/recipient.hpp"
@@ -20,6 +21,7 @@ using namespace std::chrono_literals;
 constexpr Duration kPeriod = 200ms;  // five pictures a second
 constexpr Duration kRetry = 1s;
 constexpr Duration kPatience = 2s;
+constexpr Duration kCoveragePeriod = 1s;
 constexpr int kMaxReads = 32;  // of 64 kB a turn
 
 constexpr const char* kElsewhere =
@@ -38,13 +40,17 @@ std::map<std::uint8_t, std::string> CameraFeed::exchange(Timestamp now,
   }
   connect(now);
   if (daemon_) {
-    ask(now, wanted);
+    request_picture(now, wanted);
     if (const auto received = receive(now, poses, events); !received)
       hang_up(received.error().message, now);
   }
-  if (std::string state = greeting(); state != told_) {
-    told_ = std::move(state);
-    for (const std::uint8_t camera : wanted) events[camera].insert(0, told_);
+  if (now >= next_coverage_) {
+    next_coverage_ = now + kCoveragePeriod;
+    coverage_ = read_coverage(socket_);
+  }
+  if (std::string state = greeting(); state != sent_state_) {
+    sent_state_ = std::move(state);
+    for (const std::uint8_t camera : wanted) events[camera].insert(0, sent_state_);
   }
   return events;
 }
@@ -70,7 +76,7 @@ void CameraFeed::hang_up(std::string reason, Timestamp now) {
 }
 
 /// The camera whose turn it is, if no answer is pending.
-void CameraFeed::ask(Timestamp now, const std::vector<std::uint8_t>& wanted) {
+void CameraFeed::request_picture(Timestamp now, const std::vector<std::uint8_t>& wanted) {
   if (asked_) {
     if (now - asked_->at > kPatience) reason_ = "the camera delivers no pictures: see Health";
     return;
@@ -92,13 +98,13 @@ Result<void> CameraFeed::receive(Timestamp now, const PoseHistory& poses,
     if (!*goes_on) return fail(ErrorCode::kIo, "the daemon hung up");
     const auto block = daemon_->next();
     if (!block) return tl::unexpected(block.error());
-    if (*block) take(**block, now, poses, events);
+    if (*block) handle_block(**block, now, poses, events);
   }
   return {};
 }
 
-void CameraFeed::take(const Block& block, Timestamp now, const PoseHistory& poses,
-                      std::map<std::uint8_t, std::string>& events) {
+void CameraFeed::handle_block(const Block& block, Timestamp now, const PoseHistory& poses,
+                              std::map<std::uint8_t, std::string>& events) {
   if (block.kind == "refused") return hang_up(block.content, now);
   if (block.kind == "config") {
     CheckedConfig checked = check_config_text(block.content, "the daemon's configuration");
@@ -106,14 +112,16 @@ void CameraFeed::take(const Block& block, Timestamp now, const PoseHistory& pose
     config_ = std::move(checked.config);
   }
   if (block.kind != "look" || !config_ || !asked_) return;
-  const auto picture = picture_json(block.content, *config_, poses);
+  const auto picture = picture_json(block.content, asked_->camera, *config_, poses);
   reason_ = picture ? "" : picture.error().message;
   if (picture) events[asked_->camera] += stream_event("picture", *picture);
   asked_.reset();
 }
 
 std::string CameraFeed::greeting() const {
-  return stream_event("camera", cameras_json(config_ ? *config_ : Config{}, can_control_, reason_));
+  return stream_event("camera",
+                      cameras_json(config_ ? *config_ : Config{}, can_control_, reason_)) +
+         stream_event("coverage", coverage_.value_or("{}"));
 }
 
 std::optional<pid_t> CameraFeed::daemon_pid() const {

@@ -40,9 +40,9 @@ class CameraFeed {
  private:
   void connect(Timestamp now);
   void hang_up(std::string reason, Timestamp now);
-  void ask(Timestamp now, const std::vector<std::uint8_t>& wanted);
-  void take(const Block& block, Timestamp now, const PoseHistory& poses,
-            std::map<std::uint8_t, std::string>& events);
+  void request_picture(Timestamp now, const std::vector<std::uint8_t>& wanted);
+  void handle_block(const Block& block, Timestamp now, const PoseHistory& poses,
+                    std::map<std::uint8_t, std::string>& events);
   [[nodiscard]] Result<void> receive(Timestamp now, const PoseHistory& poses,
                                      std::map<std::uint8_t, std::string>& events);
 
@@ -58,7 +58,9 @@ class CameraFeed {
   };
   std::optional<Request> asked_;
   std::map<std::uint8_t, Timestamp> last_asked_;
-  std::string told_;
+  std::optional<std::string> coverage_;  ///< of a calibration that runs
+  Timestamp next_coverage_{};
+  std::string sent_state_;
 };
 
 }  // namespace crepes

@@ -68,16 +68,15 @@ Json predicted_places(const Config& config, const CameraModel& model,
   return rows;
 }
 
-Result<std::string> with_picture(Json head, const std::string& grey, const Config& config,
-                                 const PoseHistory& poses) {
+Result<std::string> with_picture(Json head, const std::string& grey, std::size_t index,
+                                 const Config& config, const PoseHistory& poses) {
   const int width = head.at("width").get<int>();
   const int height = head.at("height").get<int>();
-  const auto index = head.at("camera").get<std::size_t>();
   std::int64_t t_ns = 0;
   if (!parse_number(head.at("t_ns").get<std::string>(), t_ns).empty() || width <= 0 ||
       height <= 0 ||
       grey.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height) ||
-      index >= config.cameras.size())
+      head.at("camera").get<std::size_t>() != index || index >= config.cameras.size())
     return tl::unexpected(no_picture());
   const CameraCalibration& camera = config.cameras[index].calibration;
   const auto model = CameraModel::from(camera);
@@ -92,12 +91,13 @@ Result<std::string> with_picture(Json head, const std::string& grey, const Confi
 
 }  // namespace
 
-Result<std::string> picture_json(const std::string& look, const Config& config,
+Result<std::string> picture_json(const std::string& look, std::size_t camera, const Config& config,
                                  const PoseHistory& poses) {
   const std::size_t end = look.find('\n');
   if (end == std::string::npos) return tl::unexpected(no_picture());
   try {
-    return with_picture(Json::parse(look.substr(0, end)), look.substr(end + 1), config, poses);
+    return with_picture(Json::parse(look.substr(0, end)), look.substr(end + 1), camera, config,
+                        poses);
   } catch (const nlohmann::json::exception&) {
     return tl::unexpected(no_picture());
   }

@@ -18,6 +18,7 @@ struct HttpRequest {
   std::string authorization{};
 };
 
+/// The status, type and content of an answer.
 struct HttpReply {
   int status = 200;
   std::string type = "text/plain; charset=utf-8";

@@ -18,7 +18,6 @@ constexpr std::size_t kMaxConnections = 64;
 // Connections, those that make room for them, the listening socket, the library's own.
 constexpr unsigned kMaxDescriptors = 2 * kMaxConnections + 32;
 constexpr unsigned short kMaxHeader = 4096;  // NOLINT(google-runtime-int): the library's type
-constexpr unsigned kRequestSeconds = 5;
 constexpr int kStallSeconds = 30;
 constexpr std::size_t kMaxPiece = 16384;  ///< bytes written at once
 constexpr std::size_t kMaxBacklog = 262144;
@@ -98,8 +97,16 @@ struct HttpServer::State {
     std::string text;
     std::size_t sent = 0;
     std::optional<std::size_t> topic;
+    HttpRequest request;     ///< of a stream
+    bool is_behind = false;  ///< it has missed something
 
     [[nodiscard]] std::size_t left() const { return text.size() - sent; }
+  };
+
+  /// A connection without a reply on its way.
+  struct Waiting {
+    lws* connection = nullptr;
+    lws_usec_t until = 0;
   };
 
   /// First, so that the library's timer leads back to the state.
@@ -114,9 +121,11 @@ struct HttpServer::State {
   lws_vhost* vhost = nullptr;
   std::map<lws*, Reply> replies;
   std::map<lws*, HttpReply> deferred;  ///< to requests that announce a body
-  std::vector<lws*> waiting;           ///< connections without a reply on its way, the oldest first
-  std::size_t connections = 0;
+  std::vector<Waiting> waiting;        ///< the oldest first
+  std::vector<lws*> closing;           ///< the library closes them later in its turn
+  std::size_t connections = 0;         ///< without those
   lws_usec_t period_us = 0;
+  lws_usec_t request_us = 0;
   std::function<bool()> on_tick;
   bool is_done = false;
   std::string address;
@@ -136,27 +145,51 @@ struct HttpServer::State {
                       std::size_t length);
   static void on_timer(lws_sorted_usec_list_t* entry);
 
+  /// The library's own timeouts begin anew with each byte.
+  void await_request(lws* connection);
+  void end_wait(lws* connection);
+  void close_longest_waiting();
+  void close_overdue();
   /// A connection that asks for nothing makes room for one that may; false if all are in use.
   bool make_room();
   /// These return nonzero where the library must close the connection.
   int begin_reply(lws* connection, std::string path);
   int send_deferred(lws* connection);
-  int send_reply(lws* connection, HttpReply reply);
+  int send_reply(lws* connection, HttpReply reply, HttpRequest request);
   int continue_reply(lws* connection);
 };
+
+void HttpServer::State::await_request(lws* connection) {
+  waiting.push_back({connection, lws_now_usecs() + request_us});
+}
+
+void HttpServer::State::end_wait(lws* connection) {
+  std::erase_if(waiting, [&](const Waiting& each) { return each.connection == connection; });
+}
+
+void HttpServer::State::close_longest_waiting() {
+  lws_set_timeout(waiting.front().connection, PENDING_TIMEOUT_USER_OK, LWS_TO_KILL_ASYNC);
+  closing.push_back(waiting.front().connection);
+  waiting.erase(waiting.begin());
+  --connections;
+}
+
+void HttpServer::State::close_overdue() {
+  while (!waiting.empty() && waiting.front().until < lws_now_usecs()) close_longest_waiting();
+}
 
 bool HttpServer::State::make_room() {
   if (connections < kMaxConnections) return true;
   if (waiting.empty()) return false;
-  lws_set_timeout(waiting.front(), PENDING_TIMEOUT_USER_OK, LWS_TO_KILL_ASYNC);
-  waiting.erase(waiting.begin());
+  close_longest_waiting();
   return true;
 }
 
 int HttpServer::State::begin_reply(lws* connection, std::string path) {
-  HttpReply reply = answer(request_of(connection, std::move(path)));
+  HttpRequest request = request_of(connection, std::move(path));
+  HttpReply reply = answer(request);
   const bool announces_body = lws_hdr_total_length(connection, WSI_TOKEN_HTTP_CONTENT_LENGTH) > 0;
-  if (!announces_body) return send_reply(connection, std::move(reply));
+  if (!announces_body) return send_reply(connection, std::move(reply), std::move(request));
   deferred[connection] = std::move(reply);
   return 0;
 }
@@ -164,13 +197,16 @@ int HttpServer::State::begin_reply(lws* connection, std::string path) {
 /// The library reads a body first, also an empty one.
 int HttpServer::State::send_deferred(lws* connection) {
   auto found = deferred.extract(connection);
-  return found.empty() ? -1 : send_reply(connection, std::move(found.mapped()));
+  return found.empty() ? -1 : send_reply(connection, std::move(found.mapped()), {});
 }
 
-int HttpServer::State::send_reply(lws* connection, HttpReply reply) {
+int HttpServer::State::send_reply(lws* connection, HttpReply reply, HttpRequest request) {
   if (!write_head(connection, reply)) return -1;
-  std::erase(waiting, connection);
-  replies[connection] = {.text = std::move(reply.body), .sent = 0, .topic = reply.topic};
+  end_wait(connection);
+  replies[connection] = {.text = std::move(reply.body),
+                         .sent = 0,
+                         .topic = reply.topic,
+                         .request = std::move(request)};
   lws_set_timeout(connection, PENDING_TIMEOUT_HTTP_CONTENT, kStallSeconds);
   lws_callback_on_writable(connection);
   return 0;
@@ -191,7 +227,7 @@ int HttpServer::State::continue_reply(lws* connection) {
   lws_set_timeout(connection, PENDING_TIMEOUT_HTTP_CONTENT, kStallSeconds);
   if (is_last) {
     replies.erase(found);
-    waiting.push_back(connection);
+    await_request(connection);
     return lws_http_transaction_completed(connection) != 0 ? -1 : 0;
   }
   reply.sent += size;
@@ -215,13 +251,14 @@ int HttpServer::State::on_event(lws* connection, lws_callback_reasons reason, vo
       return state->make_room() ? 0 : 1;
     case LWS_CALLBACK_WSI_CREATE:
       ++state->connections;
-      state->waiting.push_back(connection);
+      state->await_request(connection);
       return 0;
     case LWS_CALLBACK_WSI_DESTROY:
       state->replies.erase(connection);
       state->deferred.erase(connection);
-      std::erase(state->waiting, connection);
-      if (state->connections > 0) --state->connections;
+      state->end_wait(connection);
+      if (std::erase(state->closing, connection) == 0 && state->connections > 0)
+        --state->connections;
       return 0;
     case LWS_CALLBACK_HTTP:
       return state->begin_reply(connection, std::string(static_cast<const char*>(in), length));
@@ -240,6 +277,7 @@ int HttpServer::State::on_event(lws* connection, lws_callback_reasons reason, vo
 
 void HttpServer::State::on_timer(lws_sorted_usec_list_t* entry) {
   State* const state = lws_container_of(entry, Timer, entry)->state;
+  state->close_overdue();
   state->is_done = !state->on_tick();
   lws_sul_schedule(state->context, 0, entry, &on_timer, state->period_us);
 }
@@ -256,6 +294,8 @@ Result<HttpServer> HttpServer::open(const HttpSettings& settings, Answer answer)
   state->answer = std::move(answer);
   state->address = settings.address;
   state->name = settings.name;
+  state->request_us =
+      std::chrono::duration_cast<std::chrono::microseconds>(settings.request_time).count();
   state->protocols[0].name = "http-only";
   state->protocols[0].callback = &State::on_event;
   lws_context_creation_info info{};
@@ -265,11 +305,11 @@ Result<HttpServer> HttpServer::open(const HttpSettings& settings, Answer answer)
   info.port = settings.port;
   info.iface = state->address.c_str();
   info.server_string = state->name.c_str();
-  info.timeout_secs = kRequestSeconds;
-  info.timeout_secs_ah_idle = kRequestSeconds;
-  info.keepalive_timeout = static_cast<int>(kRequestSeconds);
+  info.timeout_secs = kStallSeconds;
+  info.timeout_secs_ah_idle = kStallSeconds;
+  info.keepalive_timeout = kStallSeconds;
   info.max_http_header_data = kMaxHeader;
-  info.max_http_header_pool = kMaxConnections;
+  info.max_http_header_pool = kMaxDescriptors;  // also for those that are being closed
   info.fd_limit_per_thread = kMaxDescriptors;
   state->context = lws_create_context(&info);
   if (state->context == nullptr) return fail(ErrorCode::kIo, "libwebsockets: cannot be started");
@@ -305,7 +345,10 @@ std::size_t HttpServer::readers(std::size_t topic) const {
 
 void HttpServer::publish(std::size_t topic, const std::string& text) {
   for (auto& [connection, reply] : state_->replies) {
-    if (!reply.topic || *reply.topic != topic || reply.left() + text.size() > kMaxBacklog) continue;
+    if (!reply.topic || *reply.topic != topic) continue;
+    reply.is_behind = reply.is_behind || reply.left() + text.size() > kMaxBacklog;
+    if (reply.is_behind && reply.left() > 0) continue;
+    if (std::exchange(reply.is_behind, false)) reply.text = state_->answer(reply.request).body;
     reply.text += text;
     lws_callback_on_writable(connection);
   }

@@ -12,16 +12,18 @@
 
 namespace crepes {
 
+/// Where the server listens, and its limits.
 struct HttpSettings {
-  std::string address = "127.0.0.1";  ///< numeric, IPv4 or IPv6
-  std::uint16_t port = 8080;          ///< 0: a free one
-  std::string name;                   ///< of the Server header
+  std::string address = "127.0.0.1";                ///< numeric, IPv4 or IPv6
+  std::uint16_t port = 8080;                        ///< 0: a free one
+  std::string name;                                 ///< of the Server header
+  Duration request_time = std::chrono::seconds{5};  ///< in which a request must be complete
 };
 
 /// At most 64 connections. For a further one, the oldest without a reply on its way is closed; if
-/// there is none, the further one is. A request must be complete within five
-/// seconds and 4 kB; a reader that takes nothing for half a minute is closed. Every reply forbids
-/// the browser all foreign content (Content-Security-Policy).
+/// there is none, the further one is. A request must be complete within `request_time`, however
+/// its bytes trickle in, and 4 kB; a reader that takes nothing for half a minute is closed. Every
+/// reply forbids the browser all foreign content (Content-Security-Policy).
 class HttpServer {
  public:
   using Answer = std::function<HttpReply(const HttpRequest&)>;
@@ -41,7 +43,8 @@ class HttpServer {
 
   /// Streams that are open on this topic.
   [[nodiscard]] std::size_t readers(std::size_t topic) const;
-  /// Sends `text` to them. A reader that is far behind misses it.
+  /// Sends `text` to them. A reader that is far behind misses it; when it has taken what waits for
+  /// it, its request is answered anew, so it misses no state.
   void publish(std::size_t topic, const std::string& text);
 
  private:

@@ -7,14 +7,20 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int kMaxPerTurn = 1000;  ///< messages; a flood must not keep the pages waiting
+constexpr double kRarePeriod = 2.0;  ///< s; for what hardly changes
+constexpr int kMaxPerTurn = 1000;    ///< messages; a flood must not keep the pages waiting
 
 client::Requests requests_for(LiveFeed::Interest interest, const std::vector<RobotId>& neighbors) {
   if (interest == LiveFeed::Interest::kNone) return {.watch = false};
   if (interest == LiveFeed::Interest::kName) return {.watch = false, .polls = {{}}};
-  client::Requests requests{
-      .polls = {{.period_s = 0.5}, {.about = "sensors"}, {.about = "network"}}};
-  for (const RobotId neighbor : neighbors) requests.polls.push_back({.peer = neighbor.value});
+  client::Requests requests{.polls = {{.period_s = 0.5},
+                                      {.about = "sensors"},
+                                      {.about = "network"},
+                                      {.about = "team", .period_s = kRarePeriod}}};
+  for (const RobotId neighbor : neighbors) {
+    requests.polls.push_back({.peer = neighbor.value});
+    requests.polls.push_back({.peer = neighbor.value, .about = "pair", .period_s = kRarePeriod});
+  }
   return requests;
 }
 

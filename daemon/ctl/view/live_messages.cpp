@@ -34,8 +34,11 @@ std::string frame_event(const std::map<RobotId, NeighborPose>& poses) {
                       fmt::format(R"({{"t":{:.3f}{},"rows":{{{}}}}})", newest_s, up, rows));
 }
 
-/// A STATUS is about all, about the sensors, about the network, or about one neighbor.
+/// A STATUS is about all, about a part, or about one neighbor.
 std::string kind_of(const Json& status) {
+  if (status.contains("team")) return "team";
+  if (const auto pair = status.find("pair"); pair != status.end())
+    return "pair " + dump(pair->value("peer", Json()));
   const bool has_sensors = status.contains("sensors");
   if (!status.contains("neighbors")) return has_sensors ? "sensors" : "network";
   const Json& neighbors = status["neighbors"];
@@ -82,8 +85,8 @@ std::string LiveMessages::link_event(bool is_silent) const {
 
 std::string LiveMessages::drain(Timestamp now) {
   std::string events;
-  if (told_silent_ != is_silent(now)) events += link_event(is_silent(now));
-  told_silent_ = is_silent(now);
+  if (reported_silent_ != is_silent(now)) events += link_event(is_silent(now));
+  reported_silent_ = is_silent(now);
   events += std::exchange(new_statuses_, {});
   return events + frame_event(std::exchange(new_poses_, {}));
 }

@@ -50,7 +50,7 @@ class LiveMessages {
   std::string new_statuses_;                     ///< as events
   std::map<std::string, std::string> statuses_;  ///< the newest of each kind, as events
   std::optional<Timestamp> last_message_;
-  std::optional<bool> told_silent_;
+  std::optional<bool> reported_silent_;
   std::optional<ViewedRobot> robot_;
   std::vector<RobotId> neighbors_;
 };

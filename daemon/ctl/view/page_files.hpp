@@ -5,6 +5,7 @@
 
 namespace crepes {
 
+/// A file of the page, compiled into the program.
 struct PageFile {
   std::string_view path;  ///< as a browser asks for it
   std::string_view type;

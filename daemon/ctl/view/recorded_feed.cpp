@@ -67,10 +67,38 @@ std::string record_rows(const std::vector<Record>& records, const Row& row) {
 
 std::string innovation_row(double t_s, const MeasurementRecord& record) {
   const Fusion& fusion = record.fusion;
-  if (fusion.dimension == 0 || !std::isfinite(fusion.nis)) return {};
-  return fmt::format("[{:.3f},{},{},{:.3g}]", t_s, static_cast<int>(record.kind),
-                     static_cast<int>(fusion.verdict),
-                     fusion.nis / static_cast<double>(fusion.dimension));
+  const double nis = fusion.nis / static_cast<double>(fusion.dimension);
+  std::string text = fmt::format("[{:.3f},{},{},{}", t_s, static_cast<int>(record.kind),
+                                 static_cast<int>(fusion.verdict),
+                                 std::isfinite(nis) ? fmt::format("{:.3g}", nis) : "null");
+  for (std::size_t i = 0; i < reading_size(record.kind); ++i) {
+    if (!std::isfinite(record.reading.at(i))) return {};
+    text += fmt::format(",{:.4f}", record.reading.at(i));
+  }
+  return text + "]";
+}
+
+/// Seconds and gated measurements a second, one row a second.
+template <class Seconds>
+std::string gated_rows(const std::vector<MeasurementRecord>& records, const Seconds& seconds) {
+  std::map<std::int64_t, int> gated;  // by whole second
+  for (const MeasurementRecord& record : records)
+    gated[std::llround(std::floor(seconds(record.stamp)))] +=
+        record.fusion.verdict == Verdict::kGated ? 1 : 0;
+  std::vector<std::string> rows;
+  for (const auto& [second, count] : gated) rows.push_back(fmt::format("[{},{}]", second, count));
+  return joined(rows);
+}
+
+/// The ages that the daemon would have said: since the newest measurement that was used.
+void fill_in_ages(PairFiles& files) {
+  auto record = files.measurements.begin();
+  std::optional<Timestamp> newest;
+  for (NeighborPose& pose : files.poses) {
+    for (; record != files.measurements.end() && record->stamp <= pose.stamp; ++record)
+      if (record->fusion.verdict == Verdict::kFused) newest = record->stamp;
+    if (newest) pose.age_s = to_seconds(pose.stamp - *newest);
+  }
 }
 
 std::string calibration_row(double t_s, const CalibrationRecord& record) {
@@ -92,19 +120,33 @@ std::string truth_rows(double duration_s, const Row& row) {
   return joined(rows);
 }
 
-/// What the cameras of each robot see.
-Result<std::map<std::string, std::string>> cameras_of(const fs::path& swarm,
-                                                      const SwarmManifest& manifest) {
-  std::map<std::string, std::string> cameras;
-  for (const SwarmRobot& robot : manifest.robots) {
-    const auto config = load_config(swarm / robot.dir / "crepesd.yaml");
-    if (!config) return tl::unexpected(config.error());
-    std::vector<std::string> fields;
-    for (const CameraConfig& camera : config->cameras)
-      fields.push_back(field_of_view_json(camera.calibration));
-    cameras[robot.name] = joined(fields);
+std::string cameras_of(const Config& config) {
+  std::vector<std::string> fields;
+  for (const CameraConfig& camera : config.cameras)
+    fields.push_back(field_of_view_json(camera.calibration));
+  return joined(fields);
+}
+
+/// `led` and `uwb` of a robot; zero where its place is not known.
+std::string mounting_json(const Config* config, RobotId robot) {
+  MemberConfig member;
+  if (config != nullptr) {
+    const auto found = std::ranges::find(config->swarm.members, robot, &MemberConfig::id);
+    if (found != config->swarm.members.end()) member = *found;
   }
-  return cameras;
+  return fmt::format(R"({{"led":{},"uwb":{}}})", vector_row(member.p_body_led),
+                     vector_row(member.p_body_uwb));
+}
+
+Result<std::map<std::string, Config>> configs_of(const fs::path& swarm,
+                                                 const SwarmManifest& manifest) {
+  std::map<std::string, Config> configs;
+  for (const SwarmRobot& robot : manifest.robots) {
+    auto config = load_config(swarm / robot.dir / "crepesd.yaml");
+    if (!config) return tl::unexpected(config.error());
+    configs[robot.name] = std::move(*config);
+  }
+  return configs;
 }
 
 }  // namespace
@@ -132,9 +174,9 @@ Result<RecordedFeed> RecordedFeed::open(const fs::path& results, const fs::path&
   if (!manifest) return tl::unexpected(manifest.error());
   auto truth = SwarmTruth::load(swarm, *manifest);
   if (!truth) return tl::unexpected(truth.error());
-  auto cameras = cameras_of(swarm, *manifest);
-  if (!cameras) return tl::unexpected(cameras.error());
-  feed.recording_ = Recording{std::move(*manifest), std::move(*truth), std::move(*cameras)};
+  auto configs = configs_of(swarm, *manifest);
+  if (!configs) return tl::unexpected(configs.error());
+  feed.recording_ = Recording{std::move(*manifest), std::move(*truth), std::move(*configs)};
   for (const PairName& pair : feed.pairs_) {
     for (const std::string& name : {pair.observer, pair.neighbor}) {
       if (feed.robot_named(name) != nullptr) continue;
@@ -158,6 +200,8 @@ Result<std::string> RecordedFeed::json_of(const std::string& observer) const {
     if (pair.observer != observer) continue;
     auto files = read_pair(results_, pair);
     if (!files) return tl::unexpected(files.error());
+    std::ranges::stable_sort(files->measurements, {}, &MeasurementRecord::stamp);
+    fill_in_ages(*files);
     neighbors.push_back({pair.neighbor, std::move(*files)});
   }
   Timestamp start = Timestamp::max();
@@ -167,6 +211,7 @@ Result<std::string> RecordedFeed::json_of(const std::string& observer) const {
   const auto seconds = [&](Timestamp t) {
     return B != nullptr ? B->clock.true_s(t) : to_seconds(t - start);
   };
+  const Config* const config = B != nullptr ? &recording_->configs.at(B->name) : nullptr;
   const double duration_s = recording_ ? recording_->manifest.duration_s : -1.0;
   const std::string up = truth_rows(duration_s, [&](double t) -> std::string {
     const auto T_W_B = recording_->truth.pose(B->id, t);
@@ -190,12 +235,16 @@ Result<std::string> RecordedFeed::json_of(const std::string& observer) const {
           return calibration_row(seconds(record.stamp), record);
         });
     parts.push_back(fmt::format(
-        R"({{"name":{},"rows":{},"truth":{},"innovations":{},"calibrations":{}}})",
-        dump(OrderedJson(name)), rows_of(files.poses, seconds), truth, innovations, calibrations));
+        R"({{"name":{},"mounting":{},"rows":{},"truth":{},"innovations":{},"calibrations":{},)"
+        R"("gated":{}}})",
+        dump(OrderedJson(name)), mounting_json(config, N != nullptr ? N->id : RobotId{}),
+        rows_of(files.poses, seconds), truth, innovations, calibrations,
+        gated_rows(files.measurements, seconds)));
   }
-  return fmt::format(R"({{"has_truth":{},"up":{},"cameras":{},"neighbors":{}}})",
+  return fmt::format(R"({{"has_truth":{},"up":{},"mounting":{},"cameras":{},"neighbors":{}}})",
                      recording_.has_value(), up,
-                     B != nullptr ? recording_->cameras.at(B->name) : "[]", joined(parts));
+                     mounting_json(config, B != nullptr ? B->id : RobotId{}),
+                     config != nullptr ? cameras_of(*config) : "[]", joined(parts));
 }
 
 }  // namespace crepes

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "config/schema/config.hpp"
 #include "daemon/ctl/dataset/replay_pairs.hpp"
 #include "daemon/ctl/dataset/swarm_manifest.hpp"
 #include "daemon/ctl/dataset/truth.hpp"
@@ -25,18 +26,20 @@ class RecordedFeed {
 
   /// All that this observer saw, as one JSON object: `has_truth`, `up` (rows of t, x, y, z of the
   /// vector against gravity in its body; from the truth, empty without it), `cameras` (see
-  /// `field_of_view_json`; from the data set's configuration), and `neighbors` with
-  /// `name`, `rows` (see `pose_row`), `truth` (see `truth_row`), and after `replay
-  /// --debug-innovations` `innovations` (t, kind, verdict, NIS by degree of freedom) and
-  /// `calibrations` (t, then the values of CalibrationRecord). Times are true time if there is
-  /// truth, otherwise seconds since the observer's first row. At most 25 rows a second.
+  /// `field_of_view_json`), `mounting` (`led`, `uwb` in its body), both from the data set's
+  /// configuration, and `neighbors` with `name`, `mounting`, `rows` (see `pose_row`), `truth` (see
+  /// `truth_row`), and after `replay --debug-innovations` `innovations` (t, kind, verdict, NIS by
+  /// degree of freedom or null, then what was measured, see `SensorReading`), `gated` (t,
+  /// measurements a second) and `calibrations` (t, then the values of CalibrationRecord). Times are
+  /// true time if there is truth, otherwise seconds since the observer's first row. At most 25 rows
+  /// a second.
   [[nodiscard]] Result<std::string> json_of(const std::string& observer) const;
 
  private:
   struct Recording {
     SwarmManifest manifest;
     SwarmTruth truth;
-    std::map<std::string, std::string> cameras;  ///< of each robot, as a list of JSON
+    std::map<std::string, Config> configs;  ///< of each robot
   };
 
   [[nodiscard]] const SwarmRobot* robot_named(const std::string& name) const;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <sstream>
 
+#include "daemon/ctl/live/pose_advice.hpp"
 #include "daemon/ctl/view/camera_control.hpp"
 #include "daemon/ctl/view/listen_address.hpp"
 #include "daemon/ctl/view/page_files.hpp"
@@ -50,6 +51,16 @@ std::optional<std::size_t> index_in(const std::map<std::string, std::string>& pa
   return index;
 }
 
+/// What to do where there is no pose, by reason.
+Json advice_json() {
+  Json advice = Json::object();
+  for (int i = 1; i <= static_cast<int>(NoPoseReason::kUncertain); ++i) {
+    const auto reason = static_cast<NoPoseReason>(i);
+    advice[std::string(name_of(reason))] = advice_for(reason);
+  }
+  return {{"advice", std::move(advice)}};
+}
+
 HttpReply reply_to(const Result<void>& done) {
   if (done) return {.body = "done\n"};
   return {.status = done.error().code == ErrorCode::kUsage ? kForbidden : kBroken,
@@ -74,8 +85,8 @@ std::size_t Site::robot_count() const {
   return live != nullptr ? live->size() : std::get<RecordedFeed>(source_).observers().size();
 }
 
-std::string Site::robots_json() const {
-  Json json{{"release", kVersion}, {"live", std::holds_alternative<Live>(source_)}};
+std::string Site::robots_json(Json json) const {
+  json.update({{"release", kVersion}, {"live", std::holds_alternative<Live>(source_)}});
   json["robots"] = Json::array();
   if (const auto* live = std::get_if<Live>(&source_)) {
     for (std::size_t i = 0; i < live->size(); ++i) {
@@ -96,7 +107,7 @@ std::string Site::robots_json() const {
 HttpReply Site::answer(const HttpRequest& request, Timestamp now) const {
   if (const PageFile* file = page_file(request.path))
     return {.type = std::string(file->type), .body = std::string(file->text)};
-  if (request.path == "/robots") return {.type = kJson, .body = robots_json()};
+  if (request.path == "/robots") return {.type = kJson, .body = robots_json(advice_json())};
   const auto parameters = parameters_of(request.query);
   const auto robot = index_in(parameters, "robot", robot_count());
   if (!robot) return not_found();
@@ -116,7 +127,7 @@ HttpReply Site::live_answer(const std::string& path, std::size_t robot,
   if (path == "/events") {
     const LiveMessages& messages = std::get<Live>(source_)[robot].messages();
     return {.type = kStream,
-            .body = stream_event("robots", robots_json()) + messages.greeting(now),
+            .body = stream_event("robots", robots_json(Json::object())) + messages.greeting(now),
             .topic = robot};
   }
   const auto camera = index_in(parameters, "camera", CameraFeed::kMaxCameras);
@@ -158,9 +169,9 @@ void Site::advance(HttpServer& server, Timestamp now) {
   }
   advance_cameras(server, now);
   std::string common;
-  if (std::string robots = robots_json(); robots != told_robots_) {
+  if (std::string robots = robots_json(Json::object()); robots != sent_robots_) {
     common += stream_event("robots", robots);
-    told_robots_ = std::move(robots);
+    sent_robots_ = std::move(robots);
   }
   if (now >= next_heartbeat_) {
     common += ": still here\n\n";

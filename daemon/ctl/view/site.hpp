@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <variant>
 #include <vector>
@@ -43,14 +44,15 @@ class Site {
                                       const Parameters& parameters, Timestamp now) const;
   [[nodiscard]] std::size_t camera_topic(std::size_t robot, std::size_t camera) const;
   void advance_cameras(HttpServer& server, Timestamp now);
-  [[nodiscard]] std::string robots_json() const;
+  /// Adds the robots to `json`, what else the page must know.
+  [[nodiscard]] std::string robots_json(nlohmann::ordered_json json) const;
   [[nodiscard]] std::size_t robot_count() const;
 
   std::variant<Live, RecordedFeed> source_;
   std::vector<DaemonAddress> daemons_;  ///< of the live feeds
   std::vector<CameraFeed> cameras_;     ///< of the live feeds
   std::filesystem::path config_;
-  std::string told_robots_;
+  std::string sent_robots_;
   Timestamp next_heartbeat_{};
 };
 

@@ -102,9 +102,13 @@ Result<std::optional<ChildProcess>> open_browser(const ViewOptions& options,
   if (!options.open) return std::nullopt;
   if (!policy.token.empty())
     return fail(ErrorCode::kUsage, "--open works on loopback without a token only");
-  return ChildProcess::start("/usr/bin/xdg-open", {url}, "/dev/null")
+  return ChildProcess::start("/usr/bin/env", {"xdg-open", url}, "/dev/null")
       .map([](ChildProcess&& browser) { return std::optional(std::move(browser)); })
-      .map_error([](Error e) { return std::move(e).with_context("--open (package xdg-utils)"); });
+      .map_error([](Error e) { return std::move(e).with_context("--open"); });
+}
+
+bool is_missing(std::optional<ChildProcess>& browser) {
+  return browser && browser->exit_reason() == "exit code 127";  // as env(1) says it
 }
 
 }  // namespace
@@ -128,15 +132,18 @@ Result<void> view(const ViewOptions& options) {
       });
   if (!server) return tl::unexpected(server.error());
   const std::string url = url_of(*listen, server->port(), policy);
-  const auto browser = open_browser(options, policy, url);
+  auto browser = open_browser(options, policy, url);
   if (!browser) return tl::unexpected(browser.error());
   if (options.on_ready) {
-    if (auto told = options.on_ready(url); !told) return told;
+    if (auto announced = options.on_ready(url); !announced) return announced;
   }
+  const KeyReader keys;
   server->serve(kTick, [&] {
     site->advance(*server, clock.now());
-    return !stop.requested();
+    return !stop.requested() && keys.next() != 'q' && !is_missing(*browser);
   });
+  if (is_missing(*browser))
+    return fail(ErrorCode::kNotFound, "--open: xdg-open is not installed (package xdg-utils)");
   return {};
 }
 

@@ -10,6 +10,7 @@
 
 namespace crepes {
 
+/// Options of `crepesctl view`.
 struct ViewOptions {
   std::string listen = "127.0.0.1:8080";
   DaemonAddress daemon;
@@ -24,7 +25,8 @@ struct ViewOptions {
   std::function<Result<void>(const std::string& url)> on_ready{};  ///< called once, when listening
 };
 
-/// Serves the page until a signal arrives. The daemon may start, stop and start again meanwhile.
+/// Serves the page until a signal arrives or q is typed. The daemon may start, stop and start again
+/// meanwhile.
 [[nodiscard]] Result<void> view(const ViewOptions& options);
 
 }  // namespace crepes

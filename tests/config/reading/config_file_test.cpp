@@ -69,12 +69,12 @@ TEST(ConfigFile, SuggestsTheRightKeyForAMisspeltOne) {
             "f:11: uwb.niose_m: unknown key; did you mean noise_m?");
 }
 
-TEST(ConfigFile, TellsAMisspeltRequiredKeyOnce) {
+TEST(ConfigFile, ReportsAMisspeltRequiredKeyOnce) {
   EXPECT_EQ(faults_of(replaced("intrinsics", "intrinsic")),
             "f:8: cameras[0].intrinsic: unknown key; did you mean intrinsics?");
 }
 
-TEST(ConfigFile, TellsAnUnknownKeyThatIsLikeNoOther) {
+TEST(ConfigFile, ReportsAnUnknownKeyThatIsLikeNoOther) {
   EXPECT_EQ(faults_of(replaced("uwb: {noise_m: 0.05}", "telemetry: 5")),
             "f:11: telemetry: unknown key");
 }
@@ -348,6 +348,8 @@ TEST(ConfigFile, RefusesNumbersThatCannotBeMeant) {
             "f:11: imu.accelerometer.bias");
   EXPECT_EQ(with("uwb: {", "imu: {port: /dev/ttyUSB0}\nuwb: {port: /dev/ttyUSB0, "),
             "f:12: uwb.port");
+  EXPECT_EQ(with("duty: 0.3", "duty: 0.3, p_body_uwb: [0, 0, 60]"),
+            "f:5: swarm.members[1].p_body_uwb");
   EXPECT_EQ(with("uwb:", "net: {interface: " + std::string(5000, 'x') + "}\nuwb:"),
             "f:11: net.interface");
   EXPECT_EQ(with("uwb:", "recording: {socket: /" + std::string(200, 'x') + "}\nuwb:"),
@@ -385,6 +387,9 @@ TEST(ConfigFile, WarnsOfWhatCanHardlyBeMeant) {
       warnings_of(and_in("resolution:", "driver: folder\n    folder: /nowhere\n    resolution:")),
       "10 cameras[0].folder\n");
   EXPECT_EQ(warnings_of(and_in("{noise_m: 0.05}", "{noise_m: 0.05}") + "#"), "");
+  std::string elsewhere = and_in("id: 1", "id: 1");
+  elsewhere.replace(elsewhere.find("interface: lo"), 13, "interface: nowhere9");
+  EXPECT_EQ(warnings_of(elsewhere), "12 net.key_file\n12 net.interface\n");
 }
 
 TEST(ConfigFile, PrintsEachFaultInOneLineWhateverTheFileContains) {
@@ -404,7 +409,7 @@ TEST(ConfigFile, RefusesAPipeAtOnce) {
   EXPECT_EQ(load_config("/dev/zero").error().message, "/dev/zero: is not a file");
 }
 
-TEST(ConfigFile, TellsAllFaultsAtOnceInOrderOfLines) {
+TEST(ConfigFile, ReportsAllFaultsAtOnceInOrderOfLines) {
   std::string text = replaced("{id: 1}", "{idd: 1}");
   text.replace(text.find("duty: 0.3"), 9, "duty: 3.0");
   text.replace(text.find("0.05"), 4, "[]");
@@ -533,6 +538,17 @@ std::vector<fs::path> yaml_files_below(const fs::path& folder) {
   }
   std::ranges::sort(files);
   return files;
+}
+
+TEST(ConfigFile, FaultsKnowTheirSection) {
+  const auto in = [](const std::string& key) { return ConfigFault{"f", 1, key, "is wrong"}; };
+
+  EXPECT_TRUE(is_in(in("swarm"), &Config::swarm));
+  EXPECT_TRUE(is_in(in("swarm.members[0].id"), &Config::swarm));
+  EXPECT_TRUE(is_in(in("cameras[1].driver"), &Config::cameras));
+  EXPECT_FALSE(is_in(in("swarming.members"), &Config::swarm)) << "a key that is misspelled";
+  EXPECT_FALSE(is_in(in("imu.device"), &Config::uwb));
+  EXPECT_FALSE(is_in(in(""), &Config::robot)) << "the whole file";
 }
 
 TEST(ConfigFile, EveryFileInConfigLoads) {

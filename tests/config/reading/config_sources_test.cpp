@@ -2,6 +2,9 @@
 #include "config/reading/config_sources.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 
 #include <filesystem>
 #include <fstream>
@@ -13,6 +16,7 @@
 #include "config/reading/config_file.hpp"
 #include "config/schema/mesh_slice.hpp"
 #include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/unique_fd.hpp"
 #include "tests/support/places.hpp"
 
 namespace crepes {
@@ -99,6 +103,23 @@ TEST_F(ConfigSources, LaysFragmentsOverTheFileInTheOrderOfTheirNames) {
   EXPECT_EQ(config.uwb.noise.noise_m, 0.2);
   EXPECT_EQ(config.uwb.device.port, "/dev/uwb");
   EXPECT_EQ(config.log.level, LogLevel::kDebug);
+}
+
+TEST_F(ConfigSources, RefusesAFragmentThatIsNoFileAtOnce) {
+  write("crepesd.yaml", kBase);
+  write("crepesd.d/10-noise.yaml", "uwb: {noise_m: 0.1}\n");
+  ASSERT_EQ(::mkfifo(path("crepesd.d/20-pipe.yaml").c_str(), 0600), 0);
+  EXPECT_EQ(faults(), "crepesd.d/20-pipe.yaml: is not a file");
+
+  fs::remove(path("crepesd.d/20-pipe.yaml"));
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string name = path("crepesd.d/20-socket.yaml");
+  ASSERT_LT(name.size(), sizeof(address.sun_path));
+  name.copy(address.sun_path, name.size());
+  const UniqueFd socket{::socket(AF_UNIX, SOCK_DGRAM, 0)};
+  ASSERT_EQ(::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  EXPECT_EQ(faults(), "crepesd.d/20-socket.yaml: is not a file");
 }
 
 TEST_F(ConfigSources, MergesCamerasByNameAndMembersById) {
@@ -190,7 +211,7 @@ TEST_F(ConfigSources, RefusesToAddMembersToThoseThatAllRobotsShare) {
   EXPECT_EQ(faults(), "crepesd.d/a.yaml:3: swarm.members: swarm.yaml has no member 3");
 }
 
-TEST_F(ConfigSources, TellsWhatIsWrongWithAMembersFileOnce) {
+TEST_F(ConfigSources, ReportsWhatIsWrongWithAMembersFileOnce) {
   const auto faults_with = [this](const std::string& members) {
     write("swarm.yaml", members);
     write("crepesd.yaml",
@@ -220,7 +241,7 @@ TEST_F(ConfigSources, FindsTheKeyBesideTheFileThatNamesIt) {
   EXPECT_TRUE(fs::equivalent(load().net.key_file, path("mesh.key")));
 }
 
-TEST_F(ConfigSources, TellsWhatIsWrongWithTheKey) {
+TEST_F(ConfigSources, ReportsWhatIsWrongWithTheKey) {
   write("crepesd.yaml", kBase);
   write("crepesd.d/20-key.yaml", "net:\n  key_file: mesh.key\n");
 
@@ -376,7 +397,7 @@ TEST_F(CalibrationReference, ReadsBasaltsFileForCameraAndImu) {
   EXPECT_EQ(config.imu.noise.accelerometer_noise_density, 0.016);
 }
 
-TEST_F(CalibrationReference, TellsWhatIsWrongWithItOnce) {
+TEST_F(CalibrationReference, ReportsWhatIsWrongWithItOnce) {
   write_camera("    calibration: imu.yaml\n");
   EXPECT_EQ(faults(),
             "crepesd.yaml:8: cameras[0].calibration: has no camera \"cam0\"; see "

@@ -233,7 +233,7 @@ std::pair<Timestamp, std::string> first_fault(const std::string& fault) {
   return {clock.now(), message};
 }
 
-TEST(SensorStage, TellsAFaultAsSoonAsItLooks) {
+TEST(SensorStage, ReportsAFaultAsSoonAsItLooks) {
   const auto [when, message] = first_fault("wrong device");
 
   EXPECT_EQ(message, "wrong device");
@@ -262,7 +262,7 @@ TEST(SensorStage, LooksOftenForADeviceThatIsNotThere) {
   EXPECT_LT(clock.now() - begin, 6s);  // with waits that double it were 11 s
 }
 
-TEST(SensorStage, TellsASilentDeviceWithinTwoSeconds) {
+TEST(SensorStage, ReportsASilentDeviceWithinTwoSeconds) {
   const auto [when, message] = first_fault("");
 
   EXPECT_EQ(message, "silent");

@@ -18,7 +18,7 @@ TEST(TriadPairing, InterpolatesAccelerationsAtTheTimesOfRates) {
   pairing.add_acceleration(at(20ms, 30.0));
   for (const Duration time : {2ms, 10ms, 15ms, 20ms}) pairing.add_rate(at(time, 1.0));
 
-  const auto samples = pairing.take();
+  const auto samples = pairing.drain();
 
   ASSERT_EQ(samples.size(), 4U);
   EXPECT_NEAR(samples[0].accel_mps2.x(), 2.0, 1e-12);
@@ -33,11 +33,11 @@ TEST(TriadPairing, WaitsForTheNextAcceleration) {
   TriadPairing pairing(20ms);
   pairing.add_acceleration(at(0ms, 0.0));
   pairing.add_rate(at(5ms, 1.0));
-  EXPECT_TRUE(pairing.take().empty());
+  EXPECT_TRUE(pairing.drain().empty());
 
   pairing.add_acceleration(at(10ms, 10.0));
 
-  EXPECT_EQ(pairing.take().size(), 1U);
+  EXPECT_EQ(pairing.drain().size(), 1U);
 }
 
 TEST(TriadPairing, CountsRatesThatFallIntoAGap) {
@@ -47,7 +47,7 @@ TEST(TriadPairing, CountsRatesThatFallIntoAGap) {
   pairing.add_acceleration(at(40ms, 0.0));
   for (const Duration time : {10ms, 35ms}) pairing.add_rate(at(time, 1.0));
 
-  EXPECT_EQ(pairing.take().size(), 1U);
+  EXPECT_EQ(pairing.drain().size(), 1U);
   EXPECT_EQ(pairing.unpaired(), 1U);
 }
 
@@ -57,7 +57,7 @@ TEST(TriadPairing, DoesNotCountRatesBeforeTheFirstAcceleration) {
   pairing.add_acceleration(at(10ms, 0.0));
   pairing.add_acceleration(at(20ms, 0.0));
 
-  EXPECT_EQ(pairing.take().size(), 1U);
+  EXPECT_EQ(pairing.drain().size(), 1U);
   EXPECT_EQ(pairing.unpaired(), 0U);
 }
 
@@ -66,7 +66,7 @@ TEST(TriadPairing, StandsEqualStamps) {
   for (int i = 0; i < 3; ++i) pairing.add_acceleration(at(10ms, 7.0));
   pairing.add_rate(at(10ms, 1.0));
 
-  const auto samples = pairing.take();
+  const auto samples = pairing.drain();
 
   ASSERT_EQ(samples.size(), 1U);
   EXPECT_EQ(samples[0].accel_mps2.x(), 7.0);
@@ -76,7 +76,7 @@ TEST(TriadPairing, GivesUpOnASilentAccelerometer) {
   TriadPairing pairing(20ms);
   for (int i = 0; i < 1000; ++i) {
     pairing.add_rate(at(i * 5ms, 1.0));
-    EXPECT_TRUE(pairing.take().empty());
+    EXPECT_TRUE(pairing.drain().empty());
   }
   EXPECT_EQ(pairing.unpaired(), 1000U - 256U);
 }

@@ -171,6 +171,13 @@ TEST(So3, TangentBasisCompletesADirectionToARightHandedFrame) {
   }
 }
 
+TEST(So3, AngleBetweenIsExactNearZeroAndNearPi) {
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX();
+  for (const double angle : {1e-12, 1.0, kPi - 1e-12})
+    EXPECT_NEAR(angle_between(x, 3.0 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0)),
+                angle, 1e-15);
+}
+
 TEST(So3, TangentBasisHoldsAtBothPoles) {
   for (const double z : {1.0, -1.0}) {
     const Eigen::Vector3d u(0.0, 0.0, z);

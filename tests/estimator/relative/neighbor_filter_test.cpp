@@ -171,7 +171,7 @@ TEST(PaperFilter, IsAtLeastAsAccurateAsTheRawPosesItIsFed) {
     noise.gyro_density = 0.01;
     const auto regular = [&](Timestamp t) {
       RawPose z = first_raw_pose(pair, t);
-      z.covariance.diagonal().array() += 1e-6;  // the two positions tell one distance
+      z.covariance.diagonal().array() += 1e-6;  // the two positions determine one distance
       return z;
     };
     PaperFilter filter(Timestamp{50ms}, regular(Timestamp{50ms}), noise);

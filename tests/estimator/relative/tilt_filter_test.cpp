@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "estimator/core/constants.hpp"
+#include "estimator/core/so3.hpp"
 #include "tests/support/random_geometry.hpp"
 
 namespace crepes {
@@ -13,10 +14,6 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::RandomGeometry;
-
-double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 TEST(TiltFilter, FindsGravityOnARobotThatStandsStillWithBiasedSensors) {
   RandomGeometry random(1);
@@ -29,8 +26,8 @@ TEST(TiltFilter, FindsGravityOnARobotThatStandsStillWithBiasedSensors) {
   }
 
   ASSERT_TRUE(filter.tilt());
-  EXPECT_LT(angle_between(filter.tilt()->up_B, up_B), 0.3 * kRadPerDeg);
-  EXPECT_LT(filter.tilt()->sigma_rad, 1.0 * kRadPerDeg);
+  EXPECT_LT(angle_between(filter.tilt()->up_B, up_B), radians(0.3));
+  EXPECT_LT(filter.tilt()->sigma_rad, radians(1.0));
   EXPECT_EQ(filter.tilt()->stamp, Timestamp{29990ms});
 }
 
@@ -58,8 +55,8 @@ TEST(TiltFilter, CarriesTheAttitudeWhereAMultirotorsAccelerometerAlwaysShowsItsO
     ++count;
   }
 
-  EXPECT_GT(std::sqrt(squared_by_force / count), 5.0 * kRadPerDeg);
-  EXPECT_LT(std::sqrt(squared / count), 4.0 * kRadPerDeg);
+  EXPECT_GT(std::sqrt(squared_by_force / count), radians(5.0));
+  EXPECT_LT(std::sqrt(squared / count), radians(4.0));
   EXPECT_LT(squared, squared_by_force / 4.0);
 }
 
@@ -115,7 +112,7 @@ TEST(TiltFilter, AFreeFallTeachesItNothing) {
     filter.add({Timestamp{1s + i * 10ms}, Eigen::Vector3d::Zero(), {0.3, 0.0, 0.0}});
   }
 
-  EXPECT_LT(angle_between(filter.tilt()->up_B, Eigen::Vector3d::UnitZ()), 0.1 * kRadPerDeg);
+  EXPECT_LT(angle_between(filter.tilt()->up_B, Eigen::Vector3d::UnitZ()), radians(0.1));
   EXPECT_GT(filter.tilt()->sigma_rad, settled().tilt()->sigma_rad);
 }
 

@@ -113,6 +113,23 @@ TEST(EstimatorFaults, ANeighborThatPassesFromCameraToCameraIsKept) {
   EXPECT_LT(passing.during.worst_rad, 0.03);
 }
 
+TEST(EstimatorFaults, ATiltOfTheFutureIsForgottenInTheNextPause) {
+  using namespace std::chrono;
+  for (const Duration ahead : {Duration{90ms}, Duration{400ms}, Duration{hours{5} + minutes{54}}}) {
+    EstimatorPair pair(1);
+    pair.run_for(kWarmUp);
+    ASSERT_NE(pair.latest(), nullptr);
+    pair.run_for(EstimatorPair::kTick,
+                 {.peer_report = [ahead](Report& report) { report.tilt.stamp += ahead; }});
+    pair.run_for(3s, {.in_view = false, .peer_is_on = false});
+    pair.run_for(3s);
+
+    EXPECT_NE(pair.status().reason, NoPoseReason::kTiltUnknown);
+    ASSERT_NE(pair.latest(), nullptr) << name_of(pair.status().reason);
+    EXPECT_LT(pair.latest()->error.head<3>().norm(), 0.3);
+  }
+}
+
 /// The same numbers again and again, with stamps that go on.
 auto frozen() {
   return [held = std::optional<ImuSample>()](const ImuSample& sample) mutable {
@@ -146,15 +163,16 @@ void expect_unknown_for(NoPoseReason reason, const Fault& fault) {
   EXPECT_LE(trials.after.dishonest_share(), 0.01);
 }
 
-TEST(EstimatorFaults, AnImuThatHangsTakesThePoseAwayAndIsTold) {
+TEST(EstimatorFaults, AnImuThatHangsTakesThePoseAwayAndIsReported) {
   expect_unknown_for(NoPoseReason::kNoOwnImu, [] { return Conditions{.own_imu = frozen()}; });
 }
 
-TEST(EstimatorFaults, APeersImuThatHangsTakesThePoseAwayAndIsTold) {
+TEST(EstimatorFaults, APeersImuThatHangsTakesThePoseAwayAndIsReported) {
   expect_unknown_for(NoPoseReason::kNoPeerImu, [] { return Conditions{.peer_imu = frozen()}; });
 }
 
-/// Three quarters of a second of an accelerometer that reads the end of its range: no pose, told.
+/// Three quarters of a second of an accelerometer that reads the end of its range: no pose, and a
+/// reason.
 template <bool kOwn>
 void saturate(EstimatorPair& pair, std::uint64_t seed) {
   Conditions with;
@@ -166,7 +184,7 @@ void saturate(EstimatorPair& pair, std::uint64_t seed) {
   EXPECT_EQ(pair.status().reason, kOwn ? NoPoseReason::kNoOwnImu : NoPoseReason::kNoPeerImu);
 }
 
-TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsTold) {
+TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsReported) {
   EXPECT_LE(Trials(saturate<true>).slowest_return, 500ms);
   EXPECT_LE(Trials(saturate<false>).slowest_return, 500ms);
 }

@@ -37,7 +37,7 @@ TEST(EstimatorReconfigure, GoesOnWithWhatItKnowsAndTrustsTheImuLess) {
   EXPECT_GT(sigma_m(reloaded), 1.3 * sigma_m(as_before));
 }
 
-TEST(EstimatorReconfigure, GatesAsItIsToldFromNowOn) {
+TEST(EstimatorReconfigure, GatesAsConfiguredFromNowOn) {
   const auto refused = [](const EstimatorPair& pair) {
     return pair.count(MeasurementKind::kBearing, Verdict::kGated) +
            pair.count(MeasurementKind::kPeerBearing, Verdict::kGated);

@@ -152,7 +152,7 @@ TEST(Estimator, PublishesTheDirectionOfUpWithEachPose) {
   EXPECT_LT((*poses.back().up_B - tilt.up_B).norm(), 0.05);
 }
 
-TEST(Estimator, TellsOfEveryMeasurementIfAskedAndGivesTheSamePoses) {
+TEST(Estimator, RecordsEveryMeasurementIfAskedAndGivesTheSamePoses) {
   const std::vector<Event> events = two_seconds();
   Estimator silent(two_robots());
   Estimator open(two_robots());
@@ -171,16 +171,17 @@ TEST(Estimator, TellsOfEveryMeasurementIfAskedAndGivesTheSamePoses) {
 
   expect_same_to_the_bit(poses, poses_of(silent, events));
   const NeighborStatus status = open.status().neighbors.at(0);
-  std::array<VerdictCounts, kMeasurementKindCount> told{};
+  std::array<VerdictCounts, kMeasurementKindCount> reported{};
   for (const MeasurementRecord& one : records.measurements) {
     EXPECT_EQ(one.neighbor, kOther);
-    ++told.at(static_cast<std::size_t>(one.kind)).at(static_cast<std::size_t>(one.fusion.verdict));
+    ++reported.at(static_cast<std::size_t>(one.kind))
+          .at(static_cast<std::size_t>(one.fusion.verdict));
     if (one.kind == MeasurementKind::kRange && one.fusion.verdict == Verdict::kFused) {
       EXPECT_EQ(one.fusion.dimension, 1U);
       EXPECT_GT(one.fusion.sigma[0], 0.0);
     }
   }
-  EXPECT_EQ(told, status.measurements);
+  EXPECT_EQ(reported, status.measurements);
   ASSERT_FALSE(records.calibrations.empty());
   // The first belief is the prior.
   EXPECT_NEAR(records.calibrations.front().sigma[0], ImuNoise{}.gyroscope_bias_sigma, 1e-3);

@@ -43,12 +43,12 @@ class Dazzled {
       const MutualSighting z = pair_.sighting(now_);
       self_.tilt = Tilt{now_, z.B.up, 0.1};
       const Frame own = frame(kOther, pair_.bearing(now_), z.B.up, MeasurementKind::kBearing);
-      for (const Bearing& bearing : own.bearings) neighbor_.add_bearing(bearing);
+      for (const Bearing& bearing : own.bearings) neighbor_.add(bearing);
       const Frame peers =
           frame(kSelf, pair_.peer_bearing(now_), z.N.up, MeasurementKind::kPeerBearing);
       report_.bearings.insert(report_.bearings.end(), peers.bearings.begin(), peers.bearings.end());
       if (frames_ % 4 == 0) {
-        neighbor_.add_range({now_, kOther, pair_.range(now_).range_m, -80.0, -79.0});
+        neighbor_.add(UwbRange{now_, kOther, pair_.range(now_).range_m, -80.0, -79.0});
         send_report(z.N.up);
         neighbor_.tick(now_, self_);
       }

@@ -14,6 +14,13 @@ constexpr RobotId kSelf{1};
 constexpr RobotId kB{2};
 constexpr RobotId kN{3};
 
+SwarmConfig swarm_of(const std::vector<RobotId>& ids) {
+  SwarmConfig swarm;
+  for (const RobotId id : ids) swarm.members.emplace_back().id = id;
+  return swarm;
+}
+const SwarmConfig kSwarm = swarm_of({kSelf, kB, kN});
+
 /// Robots 2 and 3 are a pair whose IMUs are without fault; 1 only listens.
 SimulatedPair exact_pair() {
   SimulatedPair pair(1, {.gyro = 0.0, .accel = 0.0, .priors = {}});
@@ -42,7 +49,7 @@ TEST(GraphProblemBuilder, CarriesAnEstimateToAnotherInstantByTheImus) {
   for (const Duration ahead : {Duration{200ms}, Duration{-200ms}}) {
     const Timestamp stamp = Timestamp{1s} + ahead;
     GraphProblemBuilder builder;
-    builder.add_report(report_of(pair, Timestamp{1s}));
+    builder.add_report(report_of(pair, Timestamp{1s}), kSwarm);
 
     const GraphProblem problem = builder.build(stamp, kSelf, {}, imus_of(pair));
 
@@ -62,11 +69,11 @@ TEST(GraphProblemBuilder, CarriesAnEstimateToAnotherInstantByTheImus) {
 TEST(GraphProblemBuilder, KeepsTheNewestEstimateOfAPairHoweverTheyArrive) {
   const SimulatedPair pair = exact_pair();
   GraphProblemBuilder builder;
-  builder.add_report(report_of(pair, Timestamp{1s}));
+  builder.add_report(report_of(pair, Timestamp{1s}), kSwarm);
   Report stale = report_of(pair, Timestamp{900ms});
   stale.estimates[0].T_B_N.pose.p.x() += 100.0;
 
-  builder.add_report(stale);
+  builder.add_report(stale, kSwarm);
 
   const GraphProblem problem = builder.build(Timestamp{1s}, kSelf, {}, imus_of(pair));
   ASSERT_EQ(problem.edges.size(), 1U);
@@ -76,7 +83,7 @@ TEST(GraphProblemBuilder, KeepsTheNewestEstimateOfAPairHoweverTheyArrive) {
 TEST(GraphProblemBuilder, LeavesOutWhatIsOldOrCannotBeCarried) {
   const SimulatedPair pair = exact_pair();
   GraphProblemBuilder builder;
-  builder.add_report(report_of(pair, Timestamp{1s}));
+  builder.add_report(report_of(pair, Timestamp{1s}), kSwarm);
 
   EXPECT_TRUE(builder.build(Timestamp{1600ms}, kSelf, {}, imus_of(pair)).edges.empty());
   const auto no_imu = [](RobotId) -> const ImuHistory* { return nullptr; };
@@ -89,7 +96,16 @@ TEST(GraphProblemBuilder, RefusesARobotsEstimateOfItself) {
   report.estimates[0].neighbor = kB;
   GraphProblemBuilder builder;
 
-  builder.add_report(report);
+  builder.add_report(report, kSwarm);
+
+  EXPECT_TRUE(builder.build(Timestamp{1s}, kSelf, {}, imus_of(pair)).edges.empty());
+}
+
+TEST(GraphProblemBuilder, KeepsNoEstimateOfARobotThatIsNoMember) {
+  const SimulatedPair pair = exact_pair();
+  GraphProblemBuilder builder;
+
+  builder.add_report(report_of(pair, Timestamp{1s}), swarm_of({kSelf, kB}));
 
   EXPECT_TRUE(builder.build(Timestamp{1s}, kSelf, {}, imus_of(pair)).edges.empty());
 }

@@ -36,7 +36,7 @@ struct Ingredients {
   bool peer_bearings = true;
   bool ranges = true;
   int second_camera = -1;       ///< sees it as well: 0 at the same instants, 1 between them
-  Duration imu_memory = 160ms;  ///< how much of the past a report tells
+  Duration imu_memory = 160ms;  ///< how much of the past a report contains
   double heading_rad = 0.0;  ///< own bearings turned so far about the vertical: a mirror in a wall
 };
 
@@ -60,9 +60,9 @@ class View {
       const auto step = now_.time_since_epoch() / 10ms;
       if (with.own_imu && !pair_.imu_B.empty()) self_.imu.push(pair_.imu_B.newest());
       if (with.own_tilt) self_.tilt = tilt(true, now_);
-      if (with.bearings && step % 2 == 0) neighbor_.add_bearing(own_bearing(with.heading_rad));
-      if (step % 2 == with.second_camera) neighbor_.add_bearing(second_bearing());
-      if (with.ranges && step % 4 == 1) neighbor_.add_range(range());
+      if (with.bearings && step % 2 == 0) neighbor_.add(own_bearing(with.heading_rad));
+      if (step % 2 == with.second_camera) neighbor_.add(second_bearing());
+      if (with.ranges && step % 4 == 1) neighbor_.add(range());
       if (with.reports && step % 2 == 1) neighbor_.add_report(report(with), self_);
       neighbor_.tick(now_, self_);
     }
@@ -283,10 +283,10 @@ TEST(Neighbor, RefusesRangesThatNoModuleCanMeanAndCountsThem) {
   const auto gated = view.count(MeasurementKind::kRange, Verdict::kGated);
   const double nan = std::numeric_limits<double>::quiet_NaN();
 
-  view.neighbor().add_range({Timestamp{1s}, kOther, nan, -80.0, -79.0});
-  view.neighbor().add_range({Timestamp{1s}, kOther, -1.0, -80.0, -79.0});
-  view.neighbor().add_range({Timestamp{1s}, kOther, 1e6, -80.0, -79.0});
-  view.neighbor().add_range({Timestamp{1s}, kOther, 3.0, -95.0, -79.0});  // no line of sight
+  view.neighbor().add(UwbRange{Timestamp{1s}, kOther, nan, -80.0, -79.0});
+  view.neighbor().add(UwbRange{Timestamp{1s}, kOther, -1.0, -80.0, -79.0});
+  view.neighbor().add(UwbRange{Timestamp{1s}, kOther, 1e6, -80.0, -79.0});
+  view.neighbor().add(UwbRange{Timestamp{1s}, kOther, 3.0, -95.0, -79.0});  // no line of sight
 
   EXPECT_EQ(view.count(MeasurementKind::kRange, Verdict::kGated), gated + 4);
 }
@@ -296,7 +296,7 @@ TEST(Neighbor, BelievesNoRangeWhileManyComeLateAlthoughItIsSeen) {
   view.run_until(Timestamp{1s});
   const auto gated = view.count(MeasurementKind::kRange, Verdict::kGated);
   const auto add = [&](Duration t, double first_path_dbm) {
-    view.neighbor().add_range({Timestamp{1s} + t, kOther, 3.0, first_path_dbm, -79.0});
+    view.neighbor().add(UwbRange{Timestamp{1s} + t, kOther, 3.0, first_path_dbm, -79.0});
   };
 
   for (int i = 1; i <= 8; ++i) add(i * 20ms, -95.0);
@@ -348,7 +348,7 @@ TEST(Neighbor, CountsWhatComesTooLate) {
   View view;
   view.run_until(Timestamp{2s});
 
-  view.neighbor().add_range({Timestamp{1500ms}, kOther, 3.0, -80.0, -79.0});
+  view.neighbor().add(UwbRange{Timestamp{1500ms}, kOther, 3.0, -80.0, -79.0});
 
   EXPECT_EQ(view.count(MeasurementKind::kRange, Verdict::kLate), 1U);
 }
@@ -361,7 +361,7 @@ TEST(Neighbor, IsReachedByTheGraphWhenItIsNotSeen) {
   pose.neighbor = kOther;
   pose.T_B_N = {{{4.0, 1.0, 0.0}, Eigen::Quaterniond::Identity()}, 0.01 * Matrix6d::Identity()};
 
-  view.neighbor().add_graph_pose(Timestamp{1s}, pose);
+  view.neighbor().add(StampedGraphPose{Timestamp{1s}, pose});
   view.run_until(Timestamp{1100ms}, unseen);
 
   ASSERT_TRUE(view.neighbor().output().pose());

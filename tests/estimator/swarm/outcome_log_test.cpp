@@ -27,5 +27,24 @@ TEST(OutcomeLog, AveragesTheResidualsOfRangesOnly) {
   EXPECT_NEAR(status.range_residual_m.value(), -0.1, 1e-4);
 }
 
+TEST(OutcomeLog, KeepsTheNewestReadingOfEachKindAndOfAlternativesTheFusedOne) {
+  OutcomeLog log(RobotId{2});
+  const Timestamp t{Duration{100}};
+  const Fusion gated{.verdict = Verdict::kGated};
+  log.add(t, MeasurementKind::kBearing, gated, {1.0, 0.0, 0.0});
+  log.add(t, MeasurementKind::kBearing, residual(0.1, 2), {0.0, 1.0, 0.0});
+  log.add(t, MeasurementKind::kBearing, gated, {0.0, 0.0, 1.0});
+  log.add(t - Duration{1}, MeasurementKind::kBearing, gated, {-1.0, 0.0, 0.0});
+  NeighborStatus status;
+
+  log.write_to(status);
+
+  const auto& newest = status.newest[static_cast<std::size_t>(MeasurementKind::kBearing)];
+  EXPECT_EQ(newest.value().stamp, t);
+  EXPECT_EQ(newest.value().verdict, Verdict::kFused);
+  EXPECT_EQ(newest.value().reading, (SensorReading{0.0, 1.0, 0.0}));
+  EXPECT_FALSE(status.newest[static_cast<std::size_t>(MeasurementKind::kRange)]);
+}
+
 }  // namespace
 }  // namespace crepes

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "estimator/core/so3.hpp"
 #include "tests/support/random_geometry.hpp"
 
@@ -71,7 +73,11 @@ struct Scene {
     };
     const RobotTrajectory first = path(0);
     const RobotTrajectory second = path(1);
-    return f(TeamPair{robots[0], robots[1], members[0], members[1], first, second});
+    // The instant is the beginning, so that it has the belief's motions.
+    InstantStates states;
+    states.of_belief.resize(kRangeBias + 1);
+    std::iota(states.of_belief.begin(), states.of_belief.end(), 0);
+    return f(TeamPair{robots[0], robots[1], members[0], members[1], first, second, states});
   }
 
   std::array<TeamRobot, 2> robots;

@@ -70,9 +70,9 @@ TEST(TeamUpdate, IsThatOfTheInformationFilter) {
     const Eigen::MatrixXd expected = (P.inverse() + all.H.transpose() * W * all.H).eval().inverse();
     const Eigen::VectorXd expected_dx = expected * all.H.transpose() * W * (all.r + all.H * dx);
 
-    const TeamUpdate update(rows, P);
+    const TeamUpdate update(rows, dx, P, P);
     ASSERT_TRUE(update.is_valid());
-    EXPECT_LT((update.correction(rows, dx) - expected_dx).norm(), 1e-8 * expected_dx.norm());
+    EXPECT_LT((update.correction() - expected_dx).norm(), 1e-8 * expected_dx.norm());
     update.correct(std::vector<bool>(kStates, true), P);
     EXPECT_LT((P - expected).norm(), 1e-8 * expected.norm());
     EXPECT_EQ(P, P.transpose().eval());
@@ -98,10 +98,46 @@ TEST(TeamUpdate, StatesThatAreNotCorrectedCountAllTheSame) {
     const Eigen::MatrixXd rest = Eigen::MatrixXd::Identity(kStates, kStates) - K * all.H;
     const Eigen::MatrixXd expected =
         rest * P * rest.transpose() + K * all.variance.asDiagonal() * K.transpose();
-    TeamUpdate(rows, P).correct(corrected, P);
+    TeamUpdate(rows, Eigen::VectorXd::Zero(kStates), P, P).correct(corrected, P);
     EXPECT_LT((P - expected).norm(), 1e-8 * expected.norm());
     for (int i = 0; i < kStates; i += 3) EXPECT_EQ(P(i, i), before(i, i));
     EXPECT_EQ(Eigen::LLT<Eigen::MatrixXd>(P).info(), Eigen::Success);
+  }
+}
+
+// Ten times as many readings as they depend on states, of which two are redundant, and states that
+// they depend on through others.
+TEST(TeamUpdate, ManyReadingsOfFewStatesCorrectAllStates) {
+  constexpr int kSeen = 6;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    RandomGeometry random(seed);
+    Eigen::MatrixXd P = random_covariance(random);
+    Eigen::MatrixXd B(kSeen, kStates);
+    for (double& b : B.reshaped()) b = random.normal(1.0);
+    std::vector<TeamRow> rows = random_rows(random, 40);
+    Dense all = dense(rows);
+    all.H.resize(all.r.size(), kStates);
+    Eigen::Index k = 0;
+    for (TeamRow& row : rows) {
+      row.size = kSeen;
+      Eigen::Matrix<double, 2, kSeen> H = row.H.leftCols<kSeen>();
+      H.col(4) = H.col(0) + H.col(1);
+      H.col(5) = H.col(2) - H.col(3);
+      for (int a = 0; a < kSeen; ++a) row.columns.at(std::size_t(a)) = a;
+      row.H.leftCols<kSeen>() = H;
+      all.H.middleRows(k, row.dimension) = H.topRows(row.dimension) * B;
+      k += row.dimension;
+    }
+    const Eigen::MatrixXd W = all.variance.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd expected = (P.inverse() + all.H.transpose() * W * all.H).eval().inverse();
+    const Eigen::VectorXd expected_dx = expected * all.H.transpose() * W * all.r;
+
+    const Eigen::MatrixXd of_all = P * B.transpose();
+    const TeamUpdate update(rows, Eigen::VectorXd::Zero(kSeen), B * of_all, of_all);
+    ASSERT_TRUE(update.is_valid());
+    EXPECT_LT((update.correction() - expected_dx).norm(), 1e-7 * expected_dx.norm());
+    update.correct(std::vector<bool>(kStates, true), P);
+    EXPECT_LT((P - expected).norm(), 1e-7 * expected.norm());
   }
 }
 

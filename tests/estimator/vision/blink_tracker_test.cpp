@@ -77,7 +77,17 @@ class BlinkTrackerTest : public testing::Test {
         }
     std::shuffle(frame.spots.begin(), frame.spots.end(), random_);
     frame_ = frame;
-    return is_lost ? std::vector<Bearing>{} : tracker_.step(frame);
+    return is_lost ? std::vector<Bearing>{} : tracker_.step(frame, expected_);
+  }
+
+  /// Its robot's pose says where the board is, within 1 cm.
+  ExpectedBoard pose_of(std::size_t board, double v_y_mps = 0.0) const {
+    const double t = to_seconds(now_.time_since_epoch()) - 100.0;
+    return {.robot = RobotId{static_cast<std::uint16_t>(board + 1)},
+            .stamp = now_,
+            .p_B_M = q_W_B_.conjugate() * boards_[board].p_W(t),
+            .v_B_M = q_W_B_.conjugate() * Eigen::Vector3d(0.0, v_y_mps, 0.0),
+            .covariance_m2 = 1e-4 * Eigen::Matrix3d::Identity()};
   }
 
   /// Angle between a bearing and the board it names [rad].
@@ -92,6 +102,7 @@ class BlinkTrackerTest : public testing::Test {
   IdLibrary library_ = *IdLibrary::from(swarm());
   BlinkTracker tracker_{camera_, model_, VisionConfig{}, library_};
   std::vector<Board> boards_;
+  std::vector<ExpectedBoard> expected_;
   double yaw_rate_radps_ = 0.0;
   Eigen::Quaterniond q_W_B_ = Eigen::Quaterniond::Identity();
   Timestamp now_{100s};
@@ -137,7 +148,7 @@ TEST_F(BlinkTrackerTest, KeepsItsBoardsWhileItTurnsFiveHundredDegreesASecond) {
   EXPECT_GT(right, 100);
 }
 
-TEST_F(BlinkTrackerTest, TellsCrossingBoardsApart) {
+TEST_F(BlinkTrackerTest, DistinguishesCrossingBoards) {
   boards_ = {{0, [](double t) { return Eigen::Vector3d(5.0, -2.0 + 0.8 * t, 0.0); }},
              {1, [](double t) { return Eigen::Vector3d(5.0, 2.0 - 0.8 * t, 0.02); }}};
   int right = 0;
@@ -170,6 +181,100 @@ TEST_F(BlinkTrackerTest, KeepsIdsWhileFramesAreLost) {
 
   EXPECT_GE(static_cast<double>(named), 0.9 * static_cast<double>(lit));
   EXPECT_EQ(tracker_.status().lost_ids, 0U);
+}
+
+TEST_F(BlinkTrackerTest, NamesABoardInItsFirstFrameAfterAGapThatTheGyroCarries) {
+  for (const Duration gap : {400ms, 490ms}) {
+    tracker_ = BlinkTracker(camera_, model_, VisionConfig{}, library_);
+    yaw_rate_radps_ = 0.05;
+    const double begin = to_seconds(now_.time_since_epoch()) - 100.0;
+    const auto shown = [=](double t, double phase, const Eigen::Vector3d& p) {
+      const double within = std::fmod(t - begin + phase, 1.2);
+      return t - begin > 1.0 && within < to_seconds(gap) ? Eigen::Vector3d(-5.0, 0.0, 0.0) : p;
+    };
+    boards_ = {{0,
+                [=](double t) {
+                  return shown(t, 0.0, {5.0, 0.2 * (t - begin), 0.3});
+                }},
+               {1, [=](double t) {
+                  return shown(t, 0.5, {5.0, 2.0 + 0.2 * (t - begin), 0.3});
+                }}};
+    std::size_t lit = 0;
+    std::size_t predicted = 0;
+    std::size_t read = 0;
+    std::size_t confirmed = 0;
+    for (int i = 0; i < 1200; ++i) {
+      const auto bearings = step();
+      if (i < 200) continue;
+      lit += frame_.spots.size();
+      confirmed += tracker_.confirmed().size();
+      for (const Bearing& bearing : bearings) {
+        ASSERT_LT(error_of(bearing, bearing.neighbor.value - 1U), 0.005) << "frame " << i;
+        ++(bearing.how == Naming::kRead ? read : predicted);
+      }
+    }
+    EXPECT_GE(static_cast<double>(read + predicted), 0.97 * static_cast<double>(lit));
+    EXPECT_GT(predicted, 20U) << "they are marked";
+    EXPECT_LT(predicted, lit / 4);
+    EXPECT_NEAR(static_cast<double>(confirmed), static_cast<double>(predicted), 15.0);
+    EXPECT_EQ(tracker_.status().lost_ids, 0U);
+    EXPECT_EQ(tracker_.status().predicted_ids.unconfirmed, 0U);
+  }
+}
+
+/// Board 1 flies 3 m while it is hidden for four seconds: the gyro does not know.
+Eigen::Vector3d hidden_for_four_seconds(double t) {
+  return t > 1.0 && t < 5.0 ? Eigen::Vector3d(-5.0, 0.0, 0.0)
+                            : Eigen::Vector3d(5.0, t < 1.0 ? -1.5 : 1.5, 0.0);
+}
+
+TEST_F(BlinkTrackerTest, NamesABoardWhereAPoseExpectsIt) {
+  for (const bool has_pose : {true, false}) {
+    now_ = Timestamp{100s};
+    tracker_ = BlinkTracker(camera_, model_, VisionConfig{}, library_);
+    boards_ = {{0, hidden_for_four_seconds}};
+    int to_name = 0;  // frames with light
+    bool was_predicted = false;
+    while (now_ < Timestamp{106s}) {
+      expected_.clear();
+      if (has_pose && now_ > Timestamp{105s}) expected_ = {pose_of(0)};
+      const auto bearings = step();
+      if (now_ < Timestamp{105s}) continue;
+      if (bearings.empty() && !frame_.spots.empty()) ++to_name;
+      if (bearings.empty()) continue;
+      was_predicted = bearings[0].how == Naming::kPredicted;
+      break;
+    }
+    EXPECT_EQ(was_predicted, has_pose);
+    EXPECT_LE(to_name, has_pose ? 0 : 60);
+    EXPECT_GE(to_name, has_pose ? 0 : 10);
+  }
+}
+
+TEST_F(BlinkTrackerTest, DoesNotNameALightWhereThePoseExpectsNone) {
+  const auto predicted_of = [&](std::vector<Board> boards, const Eigen::Vector3d& pose_off) {
+    now_ = Timestamp{100s};
+    tracker_ = BlinkTracker(camera_, model_, VisionConfig{}, library_);
+    boards_ = std::move(boards);
+    std::size_t predicted = 0;
+    while (now_ < Timestamp{107s}) {
+      expected_ = {pose_of(0)};
+      expected_[0].p_B_M =
+          Eigen::Vector3d(5.0, now_ < Timestamp{101s} ? -1.5 : 1.5, 0.0) + pose_off;
+      for (const Bearing& bearing : step()) predicted += bearing.how == Naming::kPredicted ? 1 : 0;
+    }
+    return predicted;
+  };
+  const Board board{0, hidden_for_four_seconds};
+  const Board lamp{3, [](double t) {  // from second 2 on
+                     return Eigen::Vector3d(t < 2.0 ? -5.0 : 5.0, 1.55, 0.02);
+                   }};
+
+  EXPECT_GT(predicted_of({board}, Eigen::Vector3d::Zero()), 5U);
+  EXPECT_EQ(predicted_of({board}, {0.0, 0.3, 0.0}), 0U) << "far from its gate";
+  EXPECT_LT(predicted_of({board, lamp}, Eigen::Vector3d::Zero()), 40U)
+      << "a lamp is named until the board would be dark, and the board beside it is not";
+  EXPECT_GE(tracker_.status().predicted_ids.unconfirmed, 1U);
 }
 
 TEST_F(BlinkTrackerTest, DoesNotTakeALightBesideTheExpectedPlaceForTheBoardThatWasHidden) {
@@ -301,15 +406,15 @@ TEST_F(BlinkTrackerTest, RefusesAndCountsWhatMakesNoSense) {
 }
 
 /// A board that shines always but in one slot, seen by a camera that turns to and fro by up to 2.6
-/// rad/s; rows are exposed one after the other, or all at once if `row_us` is 0. `told_us` is what
-/// the tracker believes. The error of its bearings [px], root mean square.
-double error_of_a_turning_camera(double row_us, double told_us, std::uint32_t seed) {
+/// rad/s. Rows are exposed one after the other, or all at once if `row_us` is 0. `configured_us` is
+/// the tracker's setting. Returns the root mean square error of the bearings [px].
+double error_of_a_turning_camera(double row_us, double configured_us, std::uint32_t seed) {
   constexpr double kTurn = 2.6;
   constexpr double kPace = 4.0;  // rad/s
   constexpr double kNoise = 0.03;
   CameraCalibration config = BlinkTrackerTest::camera();
   config.T_cam_imu.p.setZero();
-  config.rolling_shutter_us_per_row = told_us;
+  config.rolling_shutter_us_per_row = configured_us;
   const CameraModel model = *CameraModel::from(config);
   const IdLibrary library = *IdLibrary::from(BlinkTrackerTest::swarm());
   BlinkTracker tracker(config, model, VisionConfig{}, library);
@@ -355,7 +460,7 @@ TEST(BlinkTracker, TurnsWhatARollingShutterSawToTheStampOfTheFrame) {
 
     EXPECT_LT(error_of_a_turning_camera(4.4, 4.4, seed), 1.1 * global) << "seed " << seed;
     EXPECT_LT(error_of_a_turning_camera(-4.4, -4.4, seed), 1.1 * global) << "bottom row first";
-    EXPECT_GT(error_of_a_turning_camera(4.4, 0.0, seed), 5.0 * global) << "nobody told it";
+    EXPECT_GT(error_of_a_turning_camera(4.4, 0.0, seed), 5.0 * global) << "it is not configured";
     EXPECT_GT(error_of_a_turning_camera(4.4, -4.4, seed), 10.0 * global) << "the wrong way round";
   }
 }

@@ -28,17 +28,17 @@ TEST(HiddenLights, AreExpectedWhereTheGyroAndTheirOwnMotionCarryThem) {
   HiddenLight light = marked(light_at({1.0, 0.0, 0.0}), 7.0);
   light.rate_B = {0.0, 0.0, 0.2};
   lights.add(light, unused);
-  lights.turn(Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ())));
+  lights.rotate_frame(Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ())));
   const Eigen::Vector3d carried(std::cos(1.0), std::sin(1.0), 0.2);
 
-  EXPECT_FALSE(lights.take(Eigen::Vector3d::UnitX(), kHidden + 1s));
-  EXPECT_FALSE(lights.take({std::cos(1.0), std::sin(1.0), -0.2}, kHidden + 1s))
+  EXPECT_FALSE(lights.extract_match(Eigen::Vector3d::UnitX(), kHidden + 1s));
+  EXPECT_FALSE(lights.extract_match({std::cos(1.0), std::sin(1.0), -0.2}, kHidden + 1s))
       << "against its way";
-  const auto taken = lights.take(carried.normalized(), kHidden + 1s);
+  const auto taken = lights.extract_match(carried.normalized(), kHidden + 1s);
 
   ASSERT_TRUE(taken);
   EXPECT_EQ(taken->evidence.doubt, 7.0);
-  EXPECT_FALSE(lights.take(carried.normalized(), kHidden + 1s)) << "it is hidden no more";
+  EXPECT_FALSE(lights.extract_match(carried.normalized(), kHidden + 1s)) << "it is hidden no more";
 }
 
 TEST(HiddenLights, AreStrangersTheMoreTheLongerAndFartherAway) {
@@ -46,7 +46,8 @@ TEST(HiddenLights, AreStrangersTheMoreTheLongerAndFartherAway) {
     std::vector<BlinkEvidence> unused;
     HiddenLights lights;
     lights.add(light_at({1.0, 0.0, 0.0}), unused);
-    return lights.take(Eigen::Vector3d(1.0, off, 0.0).normalized(), kHidden + after)->stranger;
+    return lights.extract_match(Eigen::Vector3d(1.0, off, 0.0).normalized(), kHidden + after)
+        ->stranger;
   };
 
   EXPECT_GE(stranger(0.0, 100ms), 1e-3) << "whatever hides one may show another";
@@ -61,8 +62,9 @@ TEST(HiddenLights, AreNotContinuedWhereTwoAreExpectedAlike) {
   lights.add(marked(light_at({1.0, 0.05, 0.0}), 1.0), unused);
   lights.add(marked(light_at({1.0, -0.05, 0.0}), 2.0), unused);
 
-  EXPECT_FALSE(lights.take(Eigen::Vector3d::UnitX(), kHidden + 1s)) << "it may be either";
-  const auto nearer = lights.take(Eigen::Vector3d(1.0, 0.15, 0.0).normalized(), kHidden + 1s);
+  EXPECT_FALSE(lights.extract_match(Eigen::Vector3d::UnitX(), kHidden + 1s)) << "it may be either";
+  const auto nearer =
+      lights.extract_match(Eigen::Vector3d(1.0, 0.15, 0.0).normalized(), kHidden + 1s);
 
   ASSERT_TRUE(nearer);
   EXPECT_EQ(nearer->evidence.doubt, 1.0);
@@ -82,7 +84,7 @@ TEST(HiddenLights, AreForgottenAfterAWhileAndBounded) {
 
   EXPECT_EQ(unused.size(), HiddenLights::kCapacity + 1);
   EXPECT_EQ(unused.front().doubt, 0.0) << "nothing is left of it";
-  EXPECT_FALSE(lights.take(Eigen::Vector3d::UnitX(), kHidden + 1h));
+  EXPECT_FALSE(lights.extract_match(Eigen::Vector3d::UnitX(), kHidden + 1h));
 }
 
 }  // namespace

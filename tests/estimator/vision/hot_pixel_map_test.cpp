@@ -103,12 +103,12 @@ TEST(HotPixelMap, LetsABoardPassOverAHotPixel) {
 TEST(HotPixelMap, BeginsAnewWithPicturesOfAnotherSize) {
   HotPixelMap map;
   const std::vector<std::uint8_t> white(100 * 100, 255);
-  map.look({white.data(), 100, 100, 100}, 200);
+  map.add_frame({white.data(), 100, 100, 100}, 200);
   map.suspect(90, 90);
-  for (int i = 0; i <= HotPixelMap::kKnown; ++i) map.look({white.data(), 100, 100, 100}, 200);
+  for (int i = 0; i <= HotPixelMap::kKnown; ++i) map.add_frame({white.data(), 100, 100, 100}, 200);
   ASSERT_EQ(map.known().size(), 1U);
 
-  map.look({white.data(), 50, 50, 50}, 200);
+  map.add_frame({white.data(), 50, 50, 50}, 200);
 
   EXPECT_TRUE(map.known().empty());
 }

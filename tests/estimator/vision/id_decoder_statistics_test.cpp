@@ -168,7 +168,7 @@ TEST_F(IdDecoderStatistics, NamesAReturningBoardSoonerAndStillNobodyElse) {
           continue;
         }
         decoder.observe_lit(evidence, Timestamp{t}, known);
-        decoder.learn(evidence, Timestamp{t}, known);
+        decoder.update_phase(evidence, Timestamp{t}, known);
         const auto id = decoder.id_of(evidence);
         if (id && !found) found = {*id, 1e3 * to_seconds(t - from)};
       }

@@ -100,8 +100,8 @@ TEST(IdDecoder, NamesEveryBoardAtEveryPhaseAndRateAndNeverAnother) {
     if (id != RobotId{1} && rate_hz >= 160.0) delays_ms.push_back(to_seconds(*seen.first_id) * 1e3);
   }
   std::sort(delays_ms.begin(), delays_ms.end());
-  // One pattern is 180 ms. Board 1 blinks so rarely that it takes more to tell it from a lamp, and
-  // slower cameras see some slots only once.
+  // One pattern is 180 ms. Board 1 blinks so rarely that it takes more to distinguish it from a
+  // lamp, and slower cameras see some slots only once.
   EXPECT_LT(delays_ms[delays_ms.size() / 2], 200.0);
   EXPECT_LT(delays_ms[delays_ms.size() * 99 / 100], 360.0);
 }
@@ -152,7 +152,7 @@ TEST(IdDecoder, TakesNoLampForARobot) {
   }
 }
 
-TEST(IdDecoder, TellsDutiesApart) {
+TEST(IdDecoder, DistinguishesDuties) {
   SwarmConfig swarm = four();
   swarm.members.pop_back();
   double duty = 0.2;

@@ -88,7 +88,7 @@ class FromAngleAndExposure : public testing::TestWithParam<std::tuple<double, do
 TEST_P(FromAngleAndExposure, ARingIsOneSpotWithinATenthOfAPixelToTenMeters) {
   const auto [tilt_deg, exposure] = GetParam();
 
-  const double rms = sweep_rms(kToTenMeters, tilt_deg * kRadPerDeg, {.exposure = exposure});
+  const double rms = sweep_rms(kToTenMeters, radians(tilt_deg), {.exposure = exposure});
 
   RecordProperty("rms_px", std::to_string(rms));
   EXPECT_LT(rms, 0.1);
@@ -100,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(SpotDetector, FromAngleAndExposure,
 
 TEST(SpotDetector, FindsABoardAt27MetersWithinAQuarterOfAPixel) {
   for (const double tilt_deg : {0.0, 30.0, 45.0}) {
-    const Accuracy far = accuracy(27.0, tilt_deg * kRadPerDeg, {});
+    const Accuracy far = accuracy(27.0, radians(tilt_deg), {});
 
     EXPECT_EQ(far.missed, 0) << tilt_deg;
     EXPECT_LT(far.rms, 0.25) << tilt_deg;
@@ -147,9 +147,9 @@ TEST(SpotDetector, CentersARingOfWhichLedsAreHiddenWhereTheyAreApart) {
 }
 
 TEST(SpotDetector, CentersHalfARingThatIsTurnedAway) {
-  // Three points do not tell perspective, which is worth R^2/d^2 at the lens: 0.5 px at 0.7 m.
+  // Three points do not determine perspective, which is worth R^2/d^2 at the lens: 0.5 px at 0.7 m.
   for (const double range : {0.7, 0.9, 1.1}) {
-    const Accuracy at = accuracy(range, 40.0 * kRadPerDeg, {}, {.hidden = 0b000111U});
+    const Accuracy at = accuracy(range, radians(40.0), {}, {.hidden = 0b000111U});
 
     EXPECT_EQ(at.missed, 0) << range;
     EXPECT_LT(at.rms, 0.6) << range;
@@ -271,7 +271,7 @@ TEST(SpotDetector, TakesTheGrainOfAGlowForNoSpots) {
   EXPECT_LT(off(found.spots[0], board), 0.3);
 }
 
-TEST(SpotDetector, TellsHowLongASpotIs) {
+TEST(SpotDetector, MeasuresHowLongASpotIs) {
   RingScene scene(small_fisheye(), {}, 3);
   for (int i = 0; i < 20; ++i) scene.add_point({100.0 + i, 100.0 + i}, 300.0);
   scene.add_point({250.0, 200.0}, 3000.0);

@@ -1,5 +1,7 @@
 /// fuzz_corpus unpack TARGET DIR: seeds and kept inputs as libFuzzer wants them, a file each.
 /// fuzz_corpus pack TARGET DIR: keeps the files in DIR, but for long ones.
+/// fuzz_corpus run TARGET FILE: runs the inputs of a file, one a line in hexadecimal, in order.
+/// fuzz_corpus list: the names of all targets.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -39,10 +41,20 @@ void pack(const FuzzTarget& target, const fs::path& directory) {
 
 int main(int count, char** arguments) {
   const std::vector<std::string> words(arguments, arguments + count);
-  if (words.size() != 4 || (words[1] != "pack" && words[1] != "unpack")) {
-    std::cerr << "usage: fuzz_corpus pack|unpack TARGET DIR\n";
+  const std::string command = count > 1 ? words[1] : "";
+  if (count == 2 && command == "list") {
+    for (const crepes::FuzzTarget& target : crepes::fuzz_targets())
+      std::cout << target.name << '\n';
+  } else if (count == 4 && command == "pack") {
+    crepes::pack(crepes::fuzz_target(words[2]), words[3]);
+  } else if (count == 4 && command == "unpack") {
+    crepes::unpack(crepes::fuzz_target(words[2]), words[3]);
+  } else if (count == 4 && command == "run") {
+    for (const auto& input : crepes::read_hex_lines(words[3]))
+      crepes::fuzz_target(words[2]).run(input);
+  } else {
+    std::cerr << "usage: fuzz_corpus list | pack|unpack TARGET DIR | run TARGET FILE\n";
     return 2;
   }
-  (words[1] == "pack" ? crepes::pack : crepes::unpack)(crepes::fuzz_target(words[2]), words[3]);
   return 0;
 }

@@ -89,7 +89,7 @@ TEST(ClientMessages, ReadAllAboutOneNeighbor) {
   NeighborStatus neighbor;
   neighbor.neighbor = RobotId{2};
   neighbor.measurements[0][0] = 17;
-  neighbor.newest[0] = Timestamp{99s};
+  neighbor.newest[0] = NewestReading{.stamp = Timestamp{99s}};
   status.estimator.neighbors = {neighbor};
   status.traffic = {{.peer = RobotId{2}, .received = 70, .lost = 3, .restarts = 1, .age_s = 0.02}};
 

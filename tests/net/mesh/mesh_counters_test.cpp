@@ -49,5 +49,12 @@ TEST(MeshCounters, AddUpWhatWasRefusedForItsSealOrItsSignature) {
   EXPECT_EQ(name_of(counter_of(UnsealError::kNotAuthentic)), "refused_seal_broken");
 }
 
+TEST(MeshCounters, RefusalsAreThoseThatAreCalledSo) {
+  for (std::size_t i = 0; i < kMeshCounterCount; ++i) {
+    const auto counter = static_cast<MeshCounter>(i);
+    EXPECT_EQ(is_refusal(counter), name_of(counter).starts_with("refused")) << name_of(counter);
+  }
+}
+
 }  // namespace
 }  // namespace crepes

@@ -134,6 +134,15 @@ TEST(MeshHops, WhatIsNotForwardedIsNotCountedAsLost) {
   }
 }
 
+TEST(MeshHops, WhatNeighborsForwardOfOursIsOnTheAirToo) {
+  Robots robots(3, in_a_line);
+  robots.run(8.0);
+
+  const MeshCounters& counters = robots.links[0].counters();
+  EXPECT_GT(counters[MeshCounter::kReceivedAgain], 15U) << "four a second, by the middle";
+  EXPECT_LE(counters[MeshCounter::kReceivedAgain], robots.total(MeshCounter::kForwarded));
+}
+
 TEST(MeshHops, NothingIsForwardedWhereAllHearAll) {
   Robots robots(6, all_hear_all);
 

@@ -1,6 +1,7 @@
 #include "net/mesh/mesh_relay.hpp"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <chrono>
 #include <vector>
@@ -28,7 +29,7 @@ DatagramId datagram(std::uint32_t sequence = 6) { return {kSender, 77, sequence}
 /// Hears `heard` directly, at kNow.
 MeshRelay relay_that_hears(const std::vector<RobotId>& heard) {
   MeshRelay relay(kSelf);
-  for (const RobotId robot : heard) relay.note_heard(robot, address_of(robot), kNow);
+  for (const RobotId robot : heard) relay.record_heard(robot, address_of(robot), kNow);
   return relay;
 }
 
@@ -36,26 +37,26 @@ TEST(MeshRelay, IsNeededByARobotThatDoesNotHearWhatItsNeighborHears) {
   MeshRelay relay = relay_that_hears({kSender});
   EXPECT_FALSE(relay.is_needed(kNow));
 
-  relay.note_hears(kSender, kSelf, kNow);
+  relay.record_hears(kSender, kSelf, kNow);
   EXPECT_FALSE(relay.is_needed(kNow)) << "we hear ourselves";
-  relay.note_hears(kSender, kFar, kNow);
+  relay.record_hears(kSender, kFar, kNow);
   EXPECT_TRUE(relay.is_needed(kNow));
 
-  relay.note_heard(kFar, address_of(kFar), kNow);
+  relay.record_heard(kFar, address_of(kFar), kNow);
   EXPECT_FALSE(relay.is_needed(kNow));
 }
 
 TEST(MeshRelay, IsNotNeededForLongOnceNobodyHearsTheFarRobot) {
   MeshRelay relay = relay_that_hears({kSender});
-  relay.note_hears(kSender, kFar, kNow);
-  relay.note_heard(kSender, address_of(kSender), kNow + seconds{3});
+  relay.record_hears(kSender, kFar, kNow);
+  relay.record_heard(kSender, address_of(kSender), kNow + seconds{3});
 
   EXPECT_FALSE(relay.is_needed(kNow + seconds{3}));
 }
 
 TEST(MeshRelay, ForwardsOnceWhatANeighborDoesNotHear) {
   MeshRelay relay = relay_that_hears({kSender, kFar});
-  relay.note_hears(kFar, kSelf, kNow);
+  relay.record_hears(kFar, kSelf, kNow);
 
   relay.offer(datagram(), kBytes, address_of(kSender), kNow);
 
@@ -68,7 +69,7 @@ TEST(MeshRelay, ForwardsOnceWhatANeighborDoesNotHear) {
 
 TEST(MeshRelay, ForwardsNothingWhereEverybodyHearsTheSender) {
   MeshRelay relay = relay_that_hears({kSender, kFar});
-  relay.note_hears(kFar, kSender, kNow);
+  relay.record_hears(kFar, kSender, kNow);
 
   relay.offer(datagram(), kBytes, address_of(kSender), kNow);
 
@@ -77,21 +78,21 @@ TEST(MeshRelay, ForwardsNothingWhereEverybodyHearsTheSender) {
 
 TEST(MeshRelay, LeavesItToOneWhoHasReachedTheSameNeighbors) {
   MeshRelay relay = relay_that_hears({kSender, kFar, kOther});
-  relay.note_hears(kOther, kSender, kNow);
-  relay.note_hears(kFar, kOther, kNow);
+  relay.record_hears(kOther, kSender, kNow);
+  relay.record_hears(kFar, kOther, kNow);
 
   relay.offer(datagram(6), kBytes, address_of(kSender), kNow);
-  EXPECT_TRUE(relay.note_copy(datagram(6), address_of(kOther)));
+  EXPECT_TRUE(relay.record_copy(datagram(6), address_of(kOther)));
   EXPECT_TRUE(relay.take_due(kLater).empty());
 
   relay.offer(datagram(12), kBytes, address_of(kSender), kNow);
-  EXPECT_TRUE(relay.note_copy(datagram(12), address_of(kSender))) << "the sender's own, again";
+  EXPECT_TRUE(relay.record_copy(datagram(12), address_of(kSender))) << "the sender's own, again";
   EXPECT_EQ(relay.take_due(kLater).size(), 1U);
 }
 
 TEST(MeshRelay, KnowsWhoForwardedTheFirstCopy) {
   MeshRelay relay = relay_that_hears({kFar, kOther});
-  relay.note_hears(kFar, kOther, kNow);
+  relay.record_hears(kFar, kOther, kNow);
 
   relay.offer(datagram(), kBytes, address_of(kOther), kNow);
 
@@ -100,7 +101,7 @@ TEST(MeshRelay, KnowsWhoForwardedTheFirstCopy) {
 
 TEST(MeshRelay, CountsOnlyCopiesOfWhatWasOffered) {
   MeshRelay relay = relay_that_hears({kSender});
-  EXPECT_FALSE(relay.note_copy(datagram(), address_of(kSender)));
+  EXPECT_FALSE(relay.record_copy(datagram(), address_of(kSender)));
 }
 
 TEST(MeshRelay, ForwardsAFewDatagramsASecondOfOneSender) {
@@ -113,6 +114,33 @@ TEST(MeshRelay, ForwardsAFewDatagramsASecondOfOneSender) {
   }
   EXPECT_GT(forwarded, 5U);
   EXPECT_LT(forwarded, 20U);
+}
+
+/// What is on the heap.
+std::int64_t heap_bytes() {
+  const struct mallinfo2 heap = ::mallinfo2();
+  return static_cast<std::int64_t>(heap.uordblks + heap.hblkhd);
+}
+
+TEST(MeshRelay, StoresNoMoreForAFloodOfCopies) {
+  MeshRelay relay = relay_that_hears({kSender, kFar, kOther});
+  relay.offer(datagram(), kBytes, address_of(kSender), kNow);
+  const std::int64_t before = heap_bytes();
+
+  for (int i = 0; i < 100'000; ++i) ASSERT_TRUE(relay.record_copy(datagram(), address_of(kOther)));
+
+  EXPECT_LT(heap_bytes() - before, 1'000);
+}
+
+TEST(MeshRelay, StoresNoMoreForAFloodOfDatagrams) {
+  MeshRelay relay = relay_that_hears({kSender, kFar});
+  const std::vector<std::uint8_t> longest(1400);
+  const std::int64_t before = heap_bytes();
+
+  for (std::uint32_t i = 0; i < 10'000; ++i)
+    relay.offer(datagram(i), longest, address_of(kSender), kNow);
+
+  EXPECT_LT(heap_bytes() - before, 256 * 1'600);
 }
 
 TEST(MeshRelay, MarksAboutFourDatagramsASecond) {

@@ -347,6 +347,31 @@ TEST(PeerLink, IsNotMisledByAReplayedSession) {
   EXPECT_NEAR(mesh.one.clocks().at(0).offset_s, 3600.0, 1e-3);
 }
 
+TEST(PeerLink, RemembersTheLatestSixteenSessionsOfAPeer) {
+  Mesh mesh;
+  std::vector<std::deque<std::vector<std::uint8_t>>> sessions;
+  double now_s = 101.0;
+  for (int restarts = 0; restarts < 20; ++restarts) {
+    mesh.run_until(now_s += 1.2);
+    sessions.push_back(std::exchange(mesh.sent_by_two, {}));
+    mesh.two = PeerLink(RobotId{2}, {RobotId{1}, RobotId{2}});
+  }
+  mesh.run_until(now_s += 1.2);
+  ASSERT_EQ(mesh.one.traffic(Timestamp{}).at(0).restarts, 20U);
+  const auto refused_of = [&](std::size_t session) {
+    const std::uint64_t before = mesh.count_of_one("refused_old_session");
+    mesh.to_replay = sessions.at(session);
+    mesh.received.clear();
+    mesh.run_until(now_s += 0.5);
+    EXPECT_GT(mesh.received.size(), 20U);  // the peer's own datagrams
+    return mesh.count_of_one("refused_old_session") - before;
+  };
+
+  EXPECT_EQ(refused_of(4), sessions[4].size());
+  EXPECT_EQ(refused_of(3), 0U);  // forgotten: as one that never echoes us
+  EXPECT_EQ(mesh.one.traffic(Timestamp{}).at(0).restarts, 20U);
+}
+
 TEST(PeerLink, KnowsAPeerAgainWhenASecondRobotWithItsIdHasLeft) {
   Mesh mesh;
   mesh.run_until(103.0);

@@ -93,6 +93,10 @@ TEST(SubscriptionJson, ReadsAPollOfEverythingOfOneNeighborOrOfAPart) {
   EXPECT_EQ(poll_of(R"({"class":"POLL","peer":3})").peer, RobotId{3});
   EXPECT_EQ(poll_of(R"({"class":"POLL","about":"sensors"})").about, StatusPart::kSensors);
   EXPECT_EQ(poll_of(R"({"class":"POLL","about":"network"})").about, StatusPart::kNetwork);
+  EXPECT_EQ(poll_of(R"({"class":"POLL","about":"team"})").about, StatusPart::kTeam);
+  EXPECT_FALSE(poll_of(R"({"class":"POLL","about":"team"})").peer.has_value());
+  EXPECT_EQ(poll_of(R"({"class":"POLL","about":"team","peer":1})").peer, RobotId{1});
+  EXPECT_EQ(poll_of(R"({"class":"POLL","about":"pair","peer":3})").about, StatusPart::kPair);
 }
 
 TEST(SubscriptionJson, ReadsTheCookieOfAnyRequest) {
@@ -118,6 +122,7 @@ TEST(SubscriptionJson, NamesTheErrorInARequest) {
   EXPECT_NE(message_of(R"({"class":"WATCH","cookie":7})").find("cookie"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"POLL","peer":"r2"})").find("peer"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"POLL","about":"love"})").find("about"), std::string::npos);
+  EXPECT_NE(message_of(R"({"class":"POLL","about":"pair"})").find("peer"), std::string::npos);
 }
 
 TEST(SubscriptionJson, RefusesHugeAndDeepRequestsUnparsed) {
@@ -265,6 +270,38 @@ TEST(SubscriptionJson, ReportsOneNeighborInFull) {
   EXPECT_EQ(json["neighbors"][0]["range_residual_m"], -0.03);
   EXPECT_EQ(json["clocks"][0]["sigma_s"], 1.5e-5);
   EXPECT_FALSE(peer_status_json(status, RobotId{1}).has_value());
+}
+
+TEST(SubscriptionJson, ReportsWhatWasMeasuredAsItCame) {
+  SystemStatus status;
+  status.stamp = Timestamp{std::chrono::seconds{100}};
+  NeighborStatus neighbor;
+  neighbor.neighbor = RobotId{2};
+  neighbor.mounting = {.p_B_M = {0.05, 0.0, 0.01},
+                       .p_B_U = {-0.04, 0.02, 0.1},
+                       .p_N_M = {0.0, 0.0, 0.3},
+                       .p_N_Q = {0.0, 0.0, 0.2}};
+  const auto put = [&](MeasurementKind kind, Verdict verdict, const SensorReading& reading) {
+    neighbor.newest.at(static_cast<std::size_t>(kind)) =
+        NewestReading{status.stamp, verdict, reading};
+  };
+  put(MeasurementKind::kBearing, Verdict::kFused, {0.6, -0.8, 0.0, 0.06, 0.0, 0.01});
+  put(MeasurementKind::kPeerBearing, Verdict::kGated, {0.0, 1.0, 0.0, 0.1, 0.2, 0.3});
+  put(MeasurementKind::kRange, Verdict::kFused, {3.21});
+  put(MeasurementKind::kPeerRange, Verdict::kFused, {kNan});
+  status.estimator.neighbors = {neighbor};
+
+  const Json json = Json::parse(peer_status_json(status, RobotId{2}).value());
+  const Json& measured = json["neighbors"][0]["measured"];
+
+  EXPECT_EQ(measured["bearing"],
+            Json::parse(R"({"u":[0.6,-0.8,0.0],"from":[0.06,0.0,0.01],"to":[0.0,0.0,0.3]})"));
+  EXPECT_EQ(
+      measured["peer_bearing"],
+      Json::parse(R"({"u":[0.0,1.0,0.0],"from":[0.1,0.2,0.3],"to":[0.05,0.0,0.01],"gated":true})"));
+  EXPECT_EQ(measured["range"],
+            Json::parse(R"({"m":3.21,"from":[-0.04,0.02,0.1],"to":[0.0,0.0,0.2]})"));
+  EXPECT_FALSE(measured.contains("peer_range"));
 }
 
 TEST(SubscriptionJson, ReportsRefusedInertialSamplesByReason) {

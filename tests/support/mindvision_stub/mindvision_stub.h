@@ -1,4 +1,4 @@
-/* What a test tells the stand-in for MindVision's library to do, through its own exports. */
+/* What a test makes the stand-in for MindVision's library do, through its own exports. */
 #ifndef CREPES_MINDVISION_STUB_H
 #define CREPES_MINDVISION_STUB_H
 

@@ -6,6 +6,8 @@ import { listen, post } from "./stream.js";
 const SATURATED = 250; // of 255; the picture comes as a JPEG
 const MARK = { saturated: [255, 122, 61], lit: [86, 180, 233] };
 const RATE_SECONDS = 3;
+const UNKNOWN = 6; // the color of a robot that is no neighbor: grey
+const [COVERED, MISSING] = ["#3fcf9f", "#f0e442"];
 const SLIDERS = {
   exposure_us: { from: (us) => Math.log10(us), to: (x) => Math.round(10 ** x), text: (us) => `${us} µs`, of: ({ light }) => light.exposure_us },
   gain: { from: Number, to: Number, text: (gain) => fixed(gain, 1), of: ({ light }) => light.gain },
@@ -25,13 +27,14 @@ export class CameraPanel {
   constructor(store) {
     this.store = store;
     this.isShown = false;
-    this.isLearning = false; // what the cameras see
+    this.isLoading = false; // what the cameras see
     this.canvas = byId("camera-canvas");
     this.sheet = element("canvas"); // the picture alone, pixel by pixel
     this.camera = 0;
     this.robot = 0;
     this.state = { cameras: [], control: false, threshold: 0 };
     this.picture = null; // the numbers of the shown one
+    this.coverage = null; // of a calibration that runs
     this.times = [];
     this.stop = null;
     this.listen();
@@ -40,32 +43,34 @@ export class CameraPanel {
   reset(store) {
     this.store = store;
     this.close();
-    this.isLearning = false;
+    this.isLoading = false;
     this.camera = 0;
     this.picture = null;
+    this.setCoverage({});
   }
 
   /** Asks for pictures only while they are seen. */
   show(isShown, robot) {
     this.isShown = isShown;
-    const isWanted = (isShown || this.isLearning) && this.store.isLive && !document.hidden;
+    const isWanted = (isShown || this.isLoading) && this.store.isLive && !document.hidden;
     if (this.stop && (!isWanted || robot !== this.robot)) this.close();
     this.robot = robot;
     if (isWanted && !this.stop) this.open();
   }
 
   /** What the cameras see, for the scene: the daemon says it with its first picture. */
-  learn(robot) {
-    this.isLearning = this.store.isLive && this.store.cameras.length === 0;
+  loadCameras(robot) {
+    this.isLoading = this.store.isLive && this.store.cameras.length === 0;
     this.show(this.isShown, robot);
   }
 
   open() {
-    this.note("waiting for a picture");
+    this.setNote("waiting for a picture");
     this.stop = listen(`/camera?robot=${this.robot}&camera=${this.camera}`, (name, data) => {
       if (name === "camera") this.setState(data);
       if (name === "picture") this.setPicture(data);
-    }, (error) => this.note(error.message));
+      if (name === "coverage") this.setCoverage(data);
+    }, (error) => this.setNote(error.message));
   }
 
   close() {
@@ -74,7 +79,7 @@ export class CameraPanel {
     this.times = [];
   }
 
-  note(text) {
+  setNote(text) {
     setText(byId("camera-note"), text);
   }
 
@@ -86,14 +91,47 @@ export class CameraPanel {
       select.replaceChildren(...names.map((name, i) => element("option", { value: String(i) }, name)));
       select.value = String(this.camera);
     }
-    this.note(state.reason || "");
+    this.setNote(state.reason || "");
     if (state.cameras.length > 0) this.store.cameras = state.cameras.map(({ field }) => field).filter(Boolean);
     this.store.changed();
-    if (this.isLearning && this.store.cameras.length > 0) {
-      this.isLearning = false;
+    if (this.isLoading && this.store.cameras.length > 0) {
+      this.isLoading = false;
       this.show(this.isShown, this.robot);
     }
     this.showLight();
+  }
+
+  /** Of a calibration that runs, of the first camera; else without cells. */
+  setCoverage(coverage) {
+    this.coverage = this.camera === 0 && coverage.cells ? coverage : null;
+    byId("camera-coverage").hidden = this.coverage === null;
+    if (this.coverage) {
+      const { share, picture, seen_s: seconds, boards, missing } = this.coverage;
+      byId("coverage-bar").value = share;
+      setText(byId("coverage-numbers"), `${fixed(100 * share, 0)} % of what a calibration needs: ${fixed(100 * picture, 0)} % of the picture, ` +
+        `boards in view for ${fixed(seconds, 0)} s (${boards.join(", ") || "none"})`);
+      const list = byId("coverage-missing");
+      if ([...list.children].map(({ textContent }) => textContent).join() !== missing.join()) list.replaceChildren(...missing.map((text) => element("li", {}, text)));
+    }
+    this.draw();
+  }
+
+  /** Cells in which boards were seen, and those that still lack them. */
+  drawCoverage(pen) {
+    const { cells } = this.coverage;
+    const [width, height] = [this.canvas.clientWidth / cells[0].length, this.canvas.clientHeight / cells.length];
+    cells.forEach((line, row) => [...line].forEach((cell, column) => {
+      if (cell === " ") return;
+      const box = [column * width + 1, row * height + 1, width - 2, height - 2];
+      pen.globalAlpha = cell === "#" ? 0.25 : 0.8;
+      pen.fillStyle = pen.strokeStyle = cell === "#" ? COVERED : MISSING;
+      pen.lineWidth = 1;
+      pen.setLineDash([2, 3]);
+      if (cell === "#") pen.fillRect(...box);
+      else pen.strokeRect(...box);
+    }));
+    pen.globalAlpha = 1;
+    pen.setLineDash([]);
   }
 
   /** What is in force, unless a slider is being moved. */
@@ -173,6 +211,7 @@ export class CameraPanel {
     pen.drawImage(this.sheet, 0, 0, this.canvas.width, this.canvas.height);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.perPixel = this.canvas.clientWidth / (width * scale); // of the screen to one of the camera
+    if (this.coverage) this.drawCoverage(pen);
     this.drawFindings(pen);
     this.describe();
   }
@@ -211,7 +250,7 @@ export class CameraPanel {
   }
 
   colorOf(id, color) {
-    return color(`robot-${(this.store.neighbors.get(String(id))?.index ?? 7) % 8}`);
+    return color(`robot-${(this.store.neighbors.get(String(id))?.index ?? UNKNOWN) % 8}`);
   }
 
   ring(pen, uv, radius, color, dash = [], width = 1) {

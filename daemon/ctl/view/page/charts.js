@@ -1,14 +1,15 @@
 // Charts over time with one cursor, and what is shown of them as CSV or PNG.
 
 import { anglesOf, angleBetween, levelOf, norm, product, rotationOf, sub, times } from "./geometry.js";
-import { degrees, element, fit, fixed, save, setText, style } from "./dom.js";
-import { AGE, SIGMA, SIGMA_ROTATION, T, indexAt, positionOf, quaternionOf } from "./store.js";
+import { colorOf, dashOf, degrees, element, fit, fixed, save, saveCanvases, setText, style } from "./dom.js";
+import { AGE, SIGMA, SIGMA_ROTATION, T, indexAt, poseBetween, positionOf, quaternionOf } from "./store.js";
 
 const LEFT = 46; // px, for the numbers
 const BOTTOM = 16;
 const GAP_SECONDS = 0.5; // a line is interrupted where poses are missing for longer
 const MIN_WINDOW = 0.5; // s
 const LIVE_WINDOW = 30; // s
+const KEY_STEP = 0.01; // of the shown span
 const IDENTITY = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
 /** Position and rotation in the level frame of the row's time. */
@@ -37,30 +38,21 @@ const SIGMA_PANELS = [
   { title: "sigma of the position", unit: "cm", fromZero: true, lines: [{ label: "σ", value: (row) => 100 * row[SIGMA] }] },
   { title: "sigma of the orientation", unit: "deg", fromZero: true, lines: [{ label: "σ", value: (row) => degrees(row[SIGMA_ROTATION]) }] },
 ];
-// Not in the files of a replay.
-const LIVE_PANELS = [
+// In a replay they need --debug-innovations.
+const MEASUREMENT_PANELS = [
   { title: "age of the newest measurement", unit: "s", fromZero: true, lines: [{ label: "age", value: (row) => row[AGE] }] },
   { title: "gated measurements", unit: "1/s", fromZero: true, rows: "gated", lines: [{ label: "gated", value: (row) => row[1] }] },
 ];
 
 /** The truth at a row's time. Thinned rows of both lie at most 25 ms apart, so the truth is interpolated. */
-function truthNear(neighbor, t) {
-  const i = indexAt(neighbor.truth, t);
-  const [a, b] = [neighbor.truth[i], neighbor.truth[i + 1]];
-  if (!a || !b || b[T] - a[T] > GAP_SECONDS) return null;
-  const s = (t - a[T]) / (b[T] - a[T]);
-  const sign = a.slice(4, 8).reduce((sum, x, k) => sum + x * b[4 + k], 0) < 0 ? -1 : 1;
-  const mixed = a.map((x, k) => x + s * ((k >= 4 ? sign * b[k] : b[k]) - x));
-  const length = Math.hypot(...mixed.slice(4, 8));
-  return mixed.map((x, k) => (k >= 4 ? x / length : x));
-}
+const truthNear = (neighbor, t) => poseBetween(neighbor.truth, t, 1);
 
 const ERROR_PANELS = [
   { title: "error of the position", unit: "cm", fromZero: true, lines: [
-    { label: "error", value: (row, store, neighbor) => { const truth = truthNear(neighbor, row[T]); return truth ? 100 * norm(sub(positionOf(row), truth.slice(1, 4))) : NaN; } },
+    { label: "error", value: (row, store, neighbor) => { const truth = truthNear(neighbor, row[T]); return truth ? 100 * norm(sub(positionOf(row), truth.p)) : NaN; } },
     { label: "3 σ", dash: [3, 3], value: (row) => 300 * row[SIGMA] }] },
   { title: "error of the orientation", unit: "deg", fromZero: true, lines: [
-    { label: "error", value: (row, store, neighbor) => { const truth = truthNear(neighbor, row[T]); return truth ? degrees(angleBetween(rotationOf(quaternionOf(row)), rotationOf(truth.slice(4, 8)))) : NaN; } },
+    { label: "error", value: (row, store, neighbor) => { const truth = truthNear(neighbor, row[T]); return truth ? degrees(angleBetween(rotationOf(quaternionOf(row)), rotationOf(truth.q))) : NaN; } },
     { label: "3 σ", dash: [3, 3], value: (row) => 3 * degrees(row[SIGMA_ROTATION]) }] },
 ];
 
@@ -70,31 +62,38 @@ const nisPanel = (title, kinds) => ({
   lines: [["fused", (verdict) => verdict === 0], ["not fused", (verdict) => verdict !== 0]].map(([label, has]) => ({
     label, value: (row) => (kinds.includes(row[1]) && has(row[2]) ? row[3] : NaN) })),
 });
-// And rows of t and the 19 values of CalibrationRecord.
+// Live, the means of the newest measurements, by kind.
+const LIVE_NIS_PANEL = {
+  title: "NIS by degree of freedom", unit: "1", fromZero: true, rows: "nis", bound: 1,
+  lines: [["bearing", []], ["its bearing", [7, 3]], ["range", [2, 3]], ["its range", [9, 3, 2, 3]]].map(([label, dash], i) => ({ label, dash, value: (row) => row[1 + i] })),
+};
+// Rows of t and the 19 values of CalibrationRecord.
 const biasPanel = (title, unit, first, scale = 1) => ({
   title, unit, rows: "calibrations",
   lines: ["x", "y", "z"].map((label, i) => ({ label, dash: [[], [7, 3], [2, 3]][i], value: (row) => scale * row[1 + first + i] })),
 });
-const RECORD_PANELS = [
-  nisPanel("bearings", [0, 1]),
-  nisPanel("ranges", [2, 3]),
+const NIS_PANELS = [nisPanel("bearings", [0, 1]), nisPanel("ranges", [2, 3])];
+const BIAS_PANELS = [
   biasPanel("gyro bias of the observer", "deg/s", 0, degrees(1)),
   biasPanel("gyro bias of the neighbor", "deg/s", 6, degrees(1)),
   biasPanel("accelerometer bias of the observer", "m/s²", 3),
   biasPanel("accelerometer bias of the neighbor", "m/s²", 9),
   { title: "range bias", unit: "cm", rows: "calibrations", lines: [{ label: "bias", value: (row) => 100 * row[13] }] },
+  biasPanel("misalignment of the observer's camera", "deg", 13, degrees(1)),
+  biasPanel("misalignment of the neighbor's camera", "deg", 16, degrees(1)),
 ];
 
 /** All neighbors at a glance, or one in all its parts. */
 function panelsFor(store, isOne) {
   const errors = store.hasTruth ? ERROR_PANELS : [];
-  const live = store.isLive ? LIVE_PANELS : [];
   const where = isOne
     ? [{ title: "position in the level frame", unit: "m", lines: [axis("x", [], 0), axis("y", [7, 3], 1), axis("z", [2, 3], 2)] },
        { title: "attitude", unit: "deg", lines: [angle("roll", [], 0), angle("pitch", [7, 3], 1), angle("yaw", [2, 3], 2)] }]
     : [{ title: "distance", unit: "m", lines: [{ label: "", value: (row) => norm(positionOf(row)) }] }];
-  const hasRecords = [...store.neighbors.values()].some(({ innovations }) => innovations?.length);
-  return [...where, ...errors, ...SIGMA_PANELS, ...live, ...(isOne && hasRecords ? RECORD_PANELS : [])];
+  const hasRecords = store.isLive || [...store.neighbors.values()].some(({ innovations }) => innovations?.length);
+  const measured = hasRecords ? MEASUREMENT_PANELS : [];
+  const records = hasRecords && isOne ? [...(store.isLive ? [LIVE_NIS_PANEL] : NIS_PANELS), ...BIAS_PANELS] : [];
+  return [...where, ...errors, ...SIGMA_PANELS, ...measured, ...records];
 }
 
 /** A step of 1, 2 or 5 times a power of ten, about four to the span. */
@@ -189,15 +188,38 @@ export class Charts {
       if (grabbed && !grabbed.moved && x(event) > LEFT) this.onSeek(this.timeAt(canvas, x(event)));
       grabbed = null;
     });
-    canvas.addEventListener("pointerleave", () => {
-      this.hover = null;
-      this.onChange();
-    });
+    canvas.addEventListener("pointerleave", () => this.point(null));
     canvas.addEventListener("dblclick", () => this.showAll());
+    canvas.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey || !this.press(event.key)) return;
+      event.preventDefault();
+      event.stopPropagation();
+    });
+    canvas.addEventListener("blur", () => this.point(null));
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.zoom(Math.exp(0.002 * event.deltaY), this.timeAt(canvas, x(event)));
     }, { passive: false });
+  }
+
+  /** The instant to which a mouse or keys point; null: none. */
+  point(t) {
+    this.hover = t;
+    this.onChange();
+  }
+
+  /** False for a key without a meaning. */
+  press(key) {
+    const now = this.store.now(performance.now() / 1000);
+    const [from, to] = this.span(now);
+    const at = this.hover ?? Math.min(to, Math.max(from, now));
+    const step = { ArrowLeft: -KEY_STEP, ArrowRight: KEY_STEP, PageUp: -10 * KEY_STEP, PageDown: 10 * KEY_STEP }[key];
+    if (step) this.point(Math.min(to, Math.max(from, at + step * (to - from))));
+    else if (key === "+" || key === "-") this.zoom(key === "+" ? 0.6 : 1.6, at);
+    else if (key === "Enter") this.onSeek(at);
+    else if (key === "Escape") this.point(null);
+    else return false;
+    return true;
   }
 
   neighbors() {
@@ -212,10 +234,12 @@ export class Charts {
       const rows = panel.rows ? neighbor[panel.rows] || [] : neighbor.rows;
       const within = (list) => list.slice(Math.max(0, indexAt(list, from)), indexAt(list, to) + 2);
       panel.lines.forEach((line, i) => {
-        const color = this.focus === "all" ? style(`--robot-${neighbor.index % 8}`) : style(`--robot-${i}`);
+        const isAll = this.focus === "all";
+        const color = colorOf(isAll ? neighbor : { index: i });
+        const dash = isAll && !line.dash ? dashOf(neighbor) : line.dash || [];
         const label = this.focus === "all" ? `${neighbor.name} ${line.label}`.trim() : line.label;
         const points = within(rows).map((row) => [row[T], line.value(row, this.store, neighbor)]);
-        lines.push({ neighbor, label, color, dash: line.dash || [], jump: line.jump, width: 1.5, points, isGapped: !panel.rows, isPoints: panel.isPoints });
+        lines.push({ neighbor, label, color, dash, jump: line.jump, width: 1.5, points, isGapped: !panel.rows, isPoints: panel.isPoints });
         if (line.truth && neighbor.truth.length) {
           lines.push({ neighbor, label: `${line.label} truth`, color: style("--soft"), dash: line.dash || [], jump: line.jump, width: 1, isGapped: true,
                        points: within(neighbor.truth).map((row) => [row[T], line.truth(row, this.store)]) });
@@ -365,23 +389,7 @@ export class Charts {
 
   /** The charts below each other, as they are on the screen. */
   savePng() {
-    const ratio = window.devicePixelRatio || 1;
-    const sheet = element("canvas");
     const shown = this.figures.filter(({ canvas }) => canvas.width > 0);
-    const title = Math.round(22 * ratio);
-    sheet.width = Math.max(...shown.map(({ canvas }) => canvas.width));
-    sheet.height = shown.reduce((sum, { canvas }) => sum + canvas.height + title, 0);
-    const pen = sheet.getContext("2d");
-    pen.fillStyle = style("--back");
-    pen.fillRect(0, 0, sheet.width, sheet.height);
-    pen.fillStyle = style("--text");
-    pen.font = `${13 * ratio}px system-ui, sans-serif`;
-    let y = 0;
-    for (const { canvas, caption } of shown) {
-      pen.fillText([...caption.children].map(({ textContent }) => textContent).join("   "), 4 * ratio, y + 16 * ratio);
-      pen.drawImage(canvas, 0, y + title);
-      y += canvas.height + title;
-    }
-    sheet.toBlob((blob) => save("crepes.png", blob));
+    return saveCanvases("crepes.png", shown.map(({ canvas, caption }) => ({ canvas, caption: [...caption.children].map(({ textContent }) => textContent).join("   ") })));
   }
 }

@@ -31,9 +31,43 @@ export function save(name, blob) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
+const styles = new Map(); // of the theme that is shown
+
 /** The value of a custom property of the style sheet. */
 export function style(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  if (!styles.has(name)) styles.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return styles.get(name);
+}
+
+/** Another theme is shown from now on. */
+export const forgetStyles = () => styles.clear();
+
+const COLORS = 8;
+const DASHES = [[], [8, 3], [2, 3]];
+
+/** A robot's color. After the last one they begin anew, with another dash. */
+export const colorOf = ({ index }) => style(`--robot-${index % COLORS}`);
+export const dashOf = ({ index }) => DASHES[Math.floor(index / COLORS) % DASHES.length];
+
+/** Saves canvases below each other, each with a caption above it, on the page's background. */
+export function saveCanvases(name, parts) {
+  const ratio = window.devicePixelRatio || 1;
+  const title = Math.round(22 * ratio);
+  const sheet = element("canvas");
+  sheet.width = Math.max(...parts.map(({ canvas }) => canvas.width));
+  sheet.height = parts.reduce((sum, { canvas }) => sum + canvas.height + title, 0);
+  const pen = sheet.getContext("2d");
+  pen.fillStyle = style("--back");
+  pen.fillRect(0, 0, sheet.width, sheet.height);
+  pen.fillStyle = style("--text");
+  pen.font = `${13 * ratio}px system-ui, sans-serif`;
+  let y = 0;
+  for (const { canvas, caption } of parts) {
+    pen.fillText(caption, 4 * ratio, y + 16 * ratio);
+    pen.drawImage(canvas, 0, y + title);
+    y += canvas.height + title;
+  }
+  return new Promise((done) => sheet.toBlob((blob) => { save(name, blob); done(blob); }));
 }
 
 /** Fits a canvas to its box; true if it is to be drawn anew. */

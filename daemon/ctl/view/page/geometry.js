@@ -55,6 +55,19 @@ export function angleBetween(A, B) {
   return Math.acos(Math.max(-1, Math.min(1, (trace - 1) / 2)));
 }
 
+/** Azimuth, from x towards y, and elevation of a direction [rad]. */
+export const headingOf = (v) => [Math.atan2(v[1], v[0]), Math.atan2(v[2], Math.hypot(v[0], v[1]))];
+
+/** The angle between two directions [rad]. */
+export const angleOf = (a, b) => Math.atan2(norm(cross(a, b)), dot(a, b));
+
+/** The unit direction that differs from `now` by the azimuth and elevation by which `measured` differed from `expected`. */
+export function carried(measured, expected, now) {
+  const [m, e, n] = [measured, expected, now].map(headingOf);
+  const [azimuth, elevation] = [n[0] + m[0] - e[0], n[1] + m[1] - e[1]];
+  return [Math.cos(azimuth) * Math.cos(elevation), Math.sin(azimuth) * Math.cos(elevation), Math.sin(elevation)];
+}
+
 /** A perspective camera that orbits `target`. Its axes are x right, y down, z forward. */
 export class Camera {
   constructor() {

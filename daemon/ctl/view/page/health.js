@@ -4,23 +4,8 @@ import { degrees, element, fit, fixed, length, setText, style } from "./dom.js";
 import { norm } from "./geometry.js";
 import { AGE, FRESH_SECONDS, MODE, MODES, SIGMA, SIGMA_ROTATION, T, indexAt, positionOf } from "./store.js";
 
-// What to do where there is no pose; at length in config/docs/troubleshooting.md.
-const ADVICE = {
-  "never heard": "Check the mesh, net.interface, a firewall on UDP 47474, and whether its crepesd runs.",
-  "silent": "Out of reach, or its battery or daemon has stopped.",
-  "clock offset unknown": "Wait two seconds. If it stays, packets arrive in one direction only.",
-  "own IMU silent": "See the IMU's tile below.",
-  "peer IMU silent": "Its IMU is silent or faulty: check there.",
-  "tilt unknown": "Hold still for a second. Wrong axes in imu.T_body_imu also cause it.",
-  "not seen": "Is it in view? Are its LEDs on? Check exposure_us and vision.threshold.",
-  "does not see us": "It reports no bearing of our board. Check our LEDs, and its camera.",
-  "no range": "No UWB distance between the two. Check the modules' ids and channel.",
-  "near the vertical": "Almost straight above or below: yaw is not observable. Move aside.",
-  "too close": "Move more than half a meter apart.",
-  "contested": "Bearings do not agree. Look for reflections and for lamps that blink.",
-  "uncertain": "Known worse than 1 m or 20 deg: too few measurements, see the links.",
-};
 const SPARK_SECONDS = 30;
+const BAD_NIS = 2; // mean by degree of freedom; 1 for an honest filter
 
 const totals = (object) => Object.entries(object || {}).map(([name, count]) => `${name.replaceAll("_", " ")} ${count}`).join(", ");
 
@@ -72,20 +57,32 @@ const lossOf = (about) => about?.reports?.loss > 0 ? `, ${fixed(100 * about.repo
 const verdicts = (neighbor, kind, verdict) => neighbor.measurements?.[kind]?.[verdict] || 0;
 const allOf = (neighbor, verdict) => Object.values(neighbor.measurements || {}).reduce((sum, kind) => sum + (kind[verdict] || 0), 0);
 
+/** Writes cells as [text, isBad]; nodes stay while the number of rows does. */
+function fillTable(table, head, rows) {
+  if (table.rows.length !== rows.length + 1) {
+    table.replaceChildren(element("thead", {}, element("tr", {}, ...head.map((text) => element("th", { scope: "col" }, text)))),
+      element("tbody", {}, ...rows.map((cells) => element("tr", {}, ...cells.map((_, j) => element(j === 0 ? "th" : "td", j === 0 ? { scope: "row" } : {}))))));
+  }
+  rows.forEach((cells, i) => cells.forEach(([text, isBad = false], j) => {
+    setText(table.rows[i + 1].cells[j], text);
+    table.rows[i + 1].cells[j].classList.toggle("bad", isBad);
+  }));
+}
+
 /** Rate and age of a kind of measurement; an old one is marked. */
 const measuredCells = (rate, ageMs) => [[fixed(rate, 1)], [fixed(ageMs, 0), ageMs > 1000 * FRESH_SECONDS]];
 
-/** Measurements per second between two looks at the totals. */
+/** Measurements per second between two reports of the totals. */
 export class Rates {
   constructor() {
-    this.looks = new Map();
+    this.last = new Map();
   }
 
   /** Called after each STATUS; `seconds` is the wall's time. Adds rows to the store for charts and sparklines. */
-  look(store, seconds) {
+  addStatus(store, seconds) {
     for (const neighbor of store.status.neighbors || []) {
       const key = String(neighbor.peer);
-      const last = this.looks.get(key);
+      const last = this.last.get(key);
       if (last && seconds - last.seconds < 0.9) continue;
       const now = { seconds, counts: structuredClone(neighbor.measurements || {}), gated: allOf(neighbor, "gated") };
       const known = store.neighbor(key, neighbor.name);
@@ -94,7 +91,7 @@ export class Rates {
         known.gated = [...(known.gated || []).slice(-400), [t, Math.max(0, (now.gated - last.gated) / (seconds - last.seconds))]];
         known.rates = Object.fromEntries(Object.keys(now.counts).map((kind) => [kind, (verdicts(neighbor, kind, "fused") - (last.counts[kind]?.fused || 0)) / (seconds - last.seconds)]));
       }
-      this.looks.set(key, now);
+      this.last.set(key, now);
     }
     for (const sensor of store.status.sensors || []) {
       const rows = (store.sensorRates ||= new Map()).get(sensor.name) || [];
@@ -107,13 +104,14 @@ export class Rates {
 export class Health {
   constructor(nodes, store) {
     this.nodes = nodes;
+    this.advice = {}; // by reason, what to do where there is no pose
     this.reset(store);
   }
 
   reset(store) {
     this.store = store;
     this.shownEvents = null;
-    for (const list of [this.nodes.neighbors, this.nodes.sensors, this.nodes.links, this.nodes.events]) list.replaceChildren();
+    for (const list of [this.nodes.neighbors, this.nodes.sensors, this.nodes.links, this.nodes.team, this.nodes.events]) list.replaceChildren();
   }
 
   draw(t, wallSeconds) {
@@ -121,6 +119,7 @@ export class Health {
     if (!this.store.isLive) return;
     this.drawSensors(wallSeconds);
     this.drawLinks(t);
+    this.drawTeam();
     this.drawEvents();
     const { status } = this.store;
     const share = status.uptime_s > 0 ? (100 * status.cpu_s) / status.uptime_s : NaN;
@@ -139,7 +138,7 @@ export class Health {
         name: neighbor.name,
         state: row ? MODES[row[MODE]] : reason,
         isBad: !row || faults !== "",
-        advice: faults || (row ? "" : ADVICE[reason] || ""),
+        advice: faults || (row ? "" : this.advice[reason] || ""),
         numbers: row ? `${length(norm(positionOf(row)))} away, σ ${length(row[SIGMA])}, ${fixed(degrees(row[SIGMA_ROTATION]), 2)} deg${this.store.isLive ? `, measured ${fixed(1000 * row[AGE], 0)} ms ago${lossOf(about)}` : ""}` : "",
         spark: { points: rows.map((each) => [each[T], each[SIGMA]]), from, to: t },
       });
@@ -186,15 +185,20 @@ export class Health {
         [fixed(100 * neighbor.airtime, 2)],
       ];
     });
-    const table = this.nodes.links;
-    if (table.rows.length !== rows.length + 1) {
-      table.replaceChildren(element("thead", {}, element("tr", {}, ...head.map((text) => element("th", { scope: "col" }, text)))),
-        element("tbody", {}, ...rows.map((cells) => element("tr", {}, ...cells.map((_, j) => element(j === 0 ? "th" : "td", j === 0 ? { scope: "row" } : {}))))));
-    }
-    rows.forEach((cells, i) => cells.forEach(([text, isBad = false], j) => {
-      setText(table.rows[i + 1].cells[j], text);
-      table.rows[i + 1].cells[j].classList.toggle("bad", isBad);
-    }));
+    fillTable(this.nodes.links, head, rows);
+  }
+
+  /** What the team's filter finds of each robot, this one among them. */
+  drawTeam() {
+    const { robots = [], age_s: age } = this.store.status.team || {};
+    this.nodes.team.closest("[data-team]").hidden = robots.length === 0;
+    fillTable(this.nodes.team, ["robot", "trusted", "NIS of bearings", "of ranges", "of the gyro", "what contradicts the team"], robots.map(({ robot, name, trusted, nis = {}, faults = [] }) => [
+      [name || String(robot)],
+      [trusted ? "yes" : "no", !trusted],
+      ...["bearing", "range", "gyro"].map((kind) => [fixed(nis[kind], 2), nis[kind] > BAD_NIS]),
+      [faults.join("; "), faults.length > 0],
+    ]));
+    setText(this.nodes.teamAge, age > 1 ? `${fixed(age, 1)} s ago` : "");
   }
 
   drawEvents() {

@@ -2,8 +2,9 @@
 
 import { CameraPanel } from "./camera.js";
 import { Charts } from "./charts.js";
-import { byId, element, fixed, setText } from "./dom.js";
+import { byId, element, fixed, forgetStyles, setText } from "./dom.js";
 import { Health, Rates } from "./health.js";
+import { RobotStops } from "./robots.js";
 import { Scene } from "./scene.js";
 import { Store } from "./store.js";
 import { listen, load } from "./stream.js";
@@ -25,8 +26,9 @@ let mustDraw = true;
 
 const scene = new Scene(byId("scene-canvas"), store);
 const charts = new Charts(byId("charts"), store);
-const health = new Health({ neighbors: byId("neighbors"), sensors: byId("sensors"), links: byId("links"), events: byId("events"), load: byId("load") }, store);
+const health = new Health({ neighbors: byId("neighbors"), sensors: byId("sensors"), links: byId("links"), team: byId("team"), teamAge: byId("team-age"), events: byId("events"), load: byId("load") }, store);
 const camera = new CameraPanel(store);
+const stops = new RobotStops(byId("scene-robots"), (robot) => select(robot));
 const redraw = () => { mustDraw = true; };
 
 // ---- the source -------------------------------------------------------------------------------
@@ -40,6 +42,7 @@ function showLink() {
 
 function setSource(about) {
   source = about;
+  if (source.advice) health.advice = source.advice;
   const labels = source.robots.map(({ name, place }, i) => name || place || `robot ${i + 1}`);
   const select = byId("robot");
   const shown = [...select.options].map(({ text }) => text);
@@ -66,7 +69,7 @@ function onEvent(name, data) {
   if (name === "link") store.setLink(data);
   if (name === "status") {
     store.addStatus(data);
-    rates.look(store, wall());
+    rates.addStatus(store, wall());
   }
   if (name !== "frame") showLink();
 }
@@ -85,7 +88,7 @@ async function show(index) {
   for (const node of document.querySelectorAll("[data-live]")) node.hidden = !source.live;
   if (!source.live && document.body.dataset.panel === "camera") showPanel("scene");
   showCamera();
-  if (scene.settings.cameras) camera.learn(robot);
+  if (scene.settings.cameras) camera.loadCameras(robot);
   byId("speed-label").hidden = source.live;
   redraw();
   if (source.live) {
@@ -163,7 +166,7 @@ function drawTransport(t) {
 function noteOf(t) {
   if (!store.link.ok) return store.link.reason;
   if (store.neighbors.size === 0) return "no neighbors yet";
-  if (scene.settings.cameras && camera.isLearning && camera.state.reason) return `What the cameras see is not known: ${camera.state.reason}`;
+  if (scene.settings.cameras && camera.isLoading && camera.state.reason) return `What the cameras see is not known: ${camera.state.reason}`;
   if (scene.isLevel) return "";
   if (!store.isLive) return store.hasTruth ? "" : "Gravity is not known without --truth: the grid is the robot's own x-y plane.";
   return store.newest ? "Gravity is not known: the grid is the robot's own x-y plane." : "No poses yet: see Health for the reasons.";
@@ -178,6 +181,7 @@ function turn() {
     drawnTime = t;
     mustDraw = false;
     scene.draw(t);
+    stops.place(scene.robots);
     setText(byId("scene-note"), noteOf(t));
     drawTransport(t);
     const now = performance.now();
@@ -230,6 +234,7 @@ function select({ key, name }) {
 function setTheme(name) {
   document.documentElement.dataset.theme = name;
   localStorage.setItem("theme", name);
+  forgetStyles();
   redraw();
 }
 const flipTheme = () => setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
@@ -322,7 +327,7 @@ function listenToPage() {
   });
   on("cameras", "change", ({ checked }) => {
     scene.settings.cameras = checked;
-    if (checked) camera.learn(robot);
+    if (checked) camera.loadCameras(robot);
   });
   on("truth", "change", ({ checked }) => { scene.settings.truth = checked; });
   on("focus", "change", ({ value }) => charts.setFocus(value));
@@ -331,6 +336,7 @@ function listenToPage() {
   on("zoom-all", "click", () => charts.showAll());
   on("csv", "click", () => charts.saveCsv(store.now(wall())));
   on("png", "click", () => charts.savePng());
+  on("scene-png", "click", () => scene.savePng());
   on("play", "click", () => play(!isPlaying));
   on("live", "click", () => play(true));
   on("slider", "input", ({ value }) => seek(Number(value)));

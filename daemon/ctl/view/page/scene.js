@@ -1,16 +1,17 @@
 // The scene: the observer in the middle of a level grid, neighbors where it believes them.
 // Drawn on a canvas by own projection: some thousand lines, no WebGL needed, sharp on every screen.
 
-import { Camera, add, angleBetween, levelOf, norm, product, rotationOf, scale, sub, times, turned } from "./geometry.js";
-import { fit, fixed, length, style } from "./dom.js";
-import { MODE, MODES, T, covarianceOf, indexAt, positionOf, quaternionOf } from "./store.js";
+import { Camera, add, angleBetween, angleOf, carried, levelOf, norm, product, rotationOf, scale, sub, times, turned } from "./geometry.js";
+import { colorOf, dashOf, fit, fixed, length, saveCanvases, style } from "./dom.js";
+import { MODE, MODES, P, T, covarianceOf, indexAt, poseBetween, positionOf, quaternionOf } from "./store.js";
 
 const IDENTITY = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 const BODY = [[0.3, 0, 0], [-0.2, 0.18, 0], [-0.1, 0, 0], [-0.2, -0.18, 0]]; // an arrow head [m]
 const MIN_BODY_PX = 26;
 const DASHES = { direct: [], graph: [9, 5], predicted: [2, 4] };
 const MAX_PITCH = 1.57;
-const RAY = 0.42; // of the distance: the rays from both sides do not touch
+const RAY = 0.42; // of the distance: the thick parts of the rays from both sides do not touch
+const FAR = 3; // m; a ray to a robot whose place is not known
 const CIRCLE_STEPS = 72;
 const CONE = 1.5; // m; how far fields of view are drawn
 
@@ -77,7 +78,7 @@ export class Scene {
     for (const robot of this.robots) this.drawTrail(robot, t);
     for (const robot of this.robots) this.drawLine(robot);
     if (this.settings.cameras) for (const camera of this.store.cameras) this.drawFieldOfView(camera);
-    if (this.settings.measurements) for (const robot of this.robots) this.drawMeasurements(robot, t);
+    if (this.settings.measurements) for (const neighbor of this.store.neighbors.values()) this.drawMeasurements(neighbor, t);
     for (const ghost of this.ghosts) this.drawGhost(ghost);
     for (const robot of this.robots) this.drawEllipsoid(robot);
     this.drawBody([0, 0, 0], this.level, this.colors.text, 1);
@@ -93,7 +94,7 @@ export class Scene {
     return {
       key: neighbor.key,
       name: neighbor.name,
-      color: style(`--robot-${neighbor.index % 8}`),
+      color: colorOf(neighbor),
       neighbor,
       stamp: last[T],
       mode: row ? MODES[row[MODE]] : "none",
@@ -202,7 +203,7 @@ export class Scene {
     for (let i = from; i + stride <= to; i += stride) {
       if (rows[i + stride][T] - rows[i][T] > 1) continue; // no pose in between
       const alpha = 0.1 + 0.75 * (1 - (t - rows[i][T]) / (this.settings.trail + 1));
-      this.line(this.levelPosition(rows[i]), this.levelPosition(rows[i + stride]), color, 1.6, [], Math.max(0.05, alpha));
+      this.line(this.levelPosition(rows[i]), this.levelPosition(rows[i + stride]), color, 1.6, dashOf(neighbor), Math.max(0.05, alpha));
     }
   }
 
@@ -222,20 +223,75 @@ export class Scene {
   }
 
   /**
-   * What was measured within the last second or so, where the estimate is: a ray from each side that sees
-   * the other, and a circle around the observer through a neighbor to which a range was measured.
+   * What was measured within the last second or so, as it was measured: a ray from each side that sees the
+   * other, and the circle on which a range puts a neighbor of its height. Both sides have moved since then.
+   * So a measurement is drawn where it differs from the estimate as much as it did from that of its own time.
    */
-  drawMeasurements(robot, t) {
-    const { position, neighbor, mode, color } = robot;
-    const has = (kind) => this.store.isMeasured(neighbor, kind, t);
-    robot.measured = { bearing: has("bearing"), peer_bearing: has("peer_bearing"), range: has("range") || has("peer_range") };
-    if (mode === "none") return;
-    if (robot.measured.bearing) this.line([0, 0, 0], scale(RAY, position), color, 5, [], 0.75);
-    if (robot.measured.peer_bearing) this.line(scale(1 - RAY, position), position, color, 5, [], 0.75);
-    if (!robot.measured.range) return;
-    const radius = Math.hypot(position[0], position[1]);
-    const at = (i) => [radius * Math.cos((2 * Math.PI * i) / CIRCLE_STEPS), radius * Math.sin((2 * Math.PI * i) / CIRCLE_STEPS), position[2]];
-    for (let i = 0; i < CIRCLE_STEPS; i += 2) this.line(at(i), at(i + 1), color, 1.2, [], 0.8);
+  drawMeasurements(neighbor, t) {
+    const robot = this.robots.find(({ key }) => key === neighbor.key);
+    const about = { neighbor, t, color: colorOf(neighbor), now: robot && robot.mode !== "none" ? this.frameAt(neighbor, t) : null };
+    const measured = {
+      bearing: this.drawRay(about, this.store.freshAt(neighbor, ["bearing"], t), false),
+      peer_bearing: this.drawRay(about, this.store.freshAt(neighbor, ["peer_bearing"], t), true),
+      range: this.drawRange(about, this.store.freshAt(neighbor, ["range", "peer_range"], t)),
+    };
+    if (robot) robot.measured = measured;
+  }
+
+  levelAt(t) {
+    const up = this.store.upAt(t);
+    return up ? levelOf(up) : IDENTITY;
+  }
+
+  /** Places of points in the observer's and the neighbor's body, and rotations of both, by the estimate at `t`; null without one. */
+  frameAt(neighbor, t) {
+    const pose = poseBetween(neighbor.rows, t, P);
+    if (!pose) return null;
+    const level = this.levelAt(t);
+    const [p, R] = [times(level, pose.p), product(level, rotationOf(pose.q))];
+    return { level, R, ours: (x) => times(level, x), theirs: (x) => add(p, times(R, x)) };
+  }
+
+  /** From the camera in the direction in which it saw the other's lights; what was drawn, or null. */
+  drawRay({ neighbor, color, now }, measured, isPeer) {
+    if (!measured) return null;
+    const then = this.frameAt(neighbor, measured.t);
+    const line = ({ ours, theirs }) => (isPeer ? [theirs(measured.from), ours(measured.to)] : [ours(measured.from), theirs(measured.to)]);
+    if (!now || !then) return isPeer ? null : this.drawLoneRay(neighbor, color, measured);
+    const [camera, lights] = line(then);
+    const expected = sub(lights, camera);
+    const seen = times(isPeer ? then.R : then.level, measured.u);
+    const [start, end] = line(now);
+    const ray = carried(seen, expected, sub(end, start));
+    const reach = norm(sub(end, start));
+    const dash = measured.gated ? [6, 4] : [];
+    this.line(start, add(start, scale(RAY * reach, ray)), color, 5, dash, 0.75);
+    this.line(start, add(start, scale(reach, ray)), color, 1.5, dash, 0.75);
+    return { start, end: add(start, scale(reach, ray)), offBy: angleOf(seen, expected) };
+  }
+
+  /** Seen, but where it is is not known. */
+  drawLoneRay(neighbor, color, { t, from, u, gated }) {
+    const level = this.levelAt(t);
+    const [start, end] = [times(level, from), times(level, add(from, scale(FAR, u)))];
+    this.line(start, end, color, 3, gated ? [6, 4] : [], 0.75);
+    this.text(`${neighbor.name} is seen`, end, color, 0, -6);
+    return { start, end, offBy: NaN };
+  }
+
+  /** Where the sphere of the measured distance around our antenna has the height of the neighbor's; a sphere below that height has no circle. */
+  drawRange({ neighbor, color, now }, measured) {
+    if (!measured) return null;
+    const then = this.frameAt(neighbor, measured.t);
+    const line = ({ ours, theirs }) => sub(theirs(measured.to), ours(measured.from));
+    const offBy = now && then ? measured.m - norm(line(then)) : NaN;
+    const across = now ? line(now) : [1, 0, 0];
+    const distance = now && then ? norm(across) + offBy : measured.m;
+    const radius = Math.sqrt(Math.max(0, distance * distance - across[2] * across[2]));
+    const center = now ? now.ours(measured.from) : [0, 0, 0];
+    const at = (i) => add(center, [radius * Math.cos((2 * Math.PI * i) / CIRCLE_STEPS), radius * Math.sin((2 * Math.PI * i) / CIRCLE_STEPS), across[2]]);
+    for (let i = 0; i < CIRCLE_STEPS; i += 2) this.line(at(i), at(i + 1), color, measured.gated ? 2.5 : 1.2, [], 0.8);
+    return { distance, radius, offBy };
   }
 
   drawEllipsoid({ position, covariance, color }) {
@@ -303,15 +359,24 @@ export class Scene {
     this.text(isKnown ? `${robot.name}  ${length(norm(position))}` : `${robot.name}: no pose`, position, color, 14, -12);
   }
 
-  /** The same in words, for screen readers. */
-  describe() {
+  savePng() {
+    return saveCanvases("crepes-scene.png", [{ canvas: this.canvas, caption: this.words() }]);
+  }
+
+  /** What is drawn, in words. */
+  words() {
     const about = this.robots.map(({ name, mode, position }) => {
       if (mode === "none") return `${name}: no pose`;
       const side = position[1] >= 0 ? "left" : "right";
       const end = position[0] >= 0 ? "ahead" : "behind";
       return `${name}: ${fixed(Math.abs(position[0]), 1)} m ${end}, ${fixed(Math.abs(position[1]), 1)} m to the ${side}, ${mode}`;
     });
-    const label = `Scene: ${about.join("; ") || "no robots yet"}`;
+    return `Scene: ${about.join("; ") || "no robots yet"}`;
+  }
+
+  /** For screen readers. */
+  describe() {
+    const label = this.words();
     const now = performance.now();
     // Not with every picture: screen readers would never come to an end.
     if (this.canvas.getAttribute("aria-label") === label || now - (this.described || -Infinity) < 1000) return;

@@ -14,10 +14,16 @@ export const MODES = ["direct", "graph", "predicted"];
 
 const LIVE_SECONDS = 300; // kept of a live swarm
 const STALE_SECONDS = 0.5; // an older pose is none
+const ROW_SECONDS = 0.04; // between two rows
 const MAX_EVENTS = 200;
-const FUSED = 0; // of the verdicts of an innovation
+const GATED = 1; // of the verdicts of an innovation
+const READING = 4; // where its numbers begin in a row of innovations
 export const KINDS = ["bearing", "peer_bearing", "range", "peer_range"];
-export const FRESH_SECONDS = 1.5; // STATUS tells of a neighbor's measurements once a second
+// The values of CalibrationRecord, as STATUS names them: key, how many, factor to SI units.
+const RADIANS = Math.PI / 180;
+const CALIBRATION = [["own_gyro_bias_radps", 3, 1], ["own_accel_bias_mps2", 3, 1], ["gyro_bias_radps", 3, 1], ["accel_bias_mps2", 3, 1], ["range_bias_m", 1, 1],
+  ["own_misalignment_deg", 3, RADIANS], ["misalignment_deg", 3, RADIANS]];
+export const FRESH_SECONDS = 1.5; // STATUS reports a neighbor's measurements once a second
 
 export const positionOf = (row) => row.slice(P, P + 3);
 export const quaternionOf = (row) => row.slice(Q, Q + 4);
@@ -35,6 +41,28 @@ export function indexAt(rows, t) {
     else high = middle;
   }
   return low - 1;
+}
+
+/** Position and quaternion at `t` between the rows before and after it, which have them from a column on; null in a gap. */
+export function poseBetween(rows, t, column) {
+  const i = indexAt(rows, t);
+  const [a, next] = [rows[i], rows[i + 1]];
+  const b = next && next[T] - a?.[T] <= STALE_SECONDS ? next : a;
+  if (!a || (a === b && t - a[T] > 2 * ROW_SECONDS)) return null;
+  const s = a === b ? 0 : (t - a[T]) / (b[T] - a[T]);
+  const [from, to] = [a, b].map((row) => row.slice(column, column + 7));
+  const sign = from.slice(3).reduce((sum, x, k) => sum + x * to[3 + k], 0) < 0 ? -1 : 1;
+  const mixed = from.map((x, k) => x + s * ((k >= 3 ? sign : 1) * to[k] - x));
+  const length = Math.hypot(...mixed.slice(3));
+  return { p: mixed.slice(0, 3), q: mixed.slice(3).map((x) => x / length) };
+}
+
+/** A row of innovations as STATUS says it; see `SensorReading` in outputs.hpp. */
+function readingOf(row, ours, theirs) {
+  const z = row.slice(READING);
+  const about = { t: row[T], gated: row[2] === GATED };
+  if (z.length === 6) return { ...about, u: z.slice(0, 3), from: z.slice(3), to: row[1] === 0 ? theirs.led : ours.led };
+  return { ...about, m: z[0], from: ours.uwb, to: theirs.uwb };
 }
 
 export class Store {
@@ -71,7 +99,8 @@ export class Store {
     return found;
   }
 
-  addReplay({ has_truth: hasTruth, up, cameras, neighbors }) {
+  addReplay({ has_truth: hasTruth, up, mounting, cameras, neighbors }) {
+    this.mounting = mounting;
     this.hasTruth = hasTruth;
     this.cameras = cameras.filter(Boolean);
     this.ups = up;
@@ -94,8 +123,8 @@ export class Store {
   addRow(neighbor, row) {
     const last = neighbor.rows.at(-1);
     if (last && row[T] <= last[T]) return;
-    if (last && row[RESETS] !== last[RESETS]) this.tell("reset", `${neighbor.name}: its filter started anew`);
-    if (last && row[T] - last[T] > 1) this.tell("found", `${neighbor.name}: located again (${MODES[row[MODE]]})`);
+    if (last && row[RESETS] !== last[RESETS]) this.addEvent("reset", `${neighbor.name}: its filter started anew`);
+    if (last && row[T] - last[T] > 1) this.addEvent("found", `${neighbor.name}: located again (${MODES[row[MODE]]})`);
     neighbor.rows.push(row);
   }
 
@@ -110,13 +139,16 @@ export class Store {
 
   forget() {
     this.ups = [];
-    for (const neighbor of this.neighbors.values()) Object.assign(neighbor, { rows: [], measured: [] });
+    for (const neighbor of this.neighbors.values()) Object.assign(neighbor, { rows: [], measured: [], gated: [], nis: [], calibrations: [] });
     this.newest = null;
     this.cursor = null;
   }
 
   /** A STATUS may be about a part: its lists replace ours, its neighbors and clocks join them. */
   addStatus(status) {
+    if (status.pair) this.addPair(status.pair);
+    if (status.team) this.status.team = status.team;
+    if (status.pair || status.team) return this.changed();
     const before = structuredClone(this.status);
     const { neighbors = [], clocks = [], more = [], ...rest } = status;
     Object.assign(this.status, rest);
@@ -128,60 +160,77 @@ export class Store {
     merge("neighbors", neighbors.concat(more.map((peer) => ({ peer }))));
     merge("clocks", clocks);
     for (const { peer, name } of this.status.neighbors) this.neighbor(String(peer), name);
-    for (const { peer, ages_s: ages } of neighbors) if (ages) this.addAges(this.neighbor(String(peer)), ages);
-    this.tellChanges(before, this.status);
+    for (const { peer, ages_s: ages, measured } of neighbors) if (ages) this.addMeasured(this.neighbor(String(peer)), ages, measured, status.timestamp);
+    this.addChanges(before, this.status);
     this.changed();
   }
 
-  /** When each kind of measurement was last taken, as a row of its own time. */
-  addAges(neighbor, ages) {
+  /** Of the pair's filter: NIS by kind, and its calibration as in a replay's rows. */
+  addPair({ peer, name, residuals = {}, calibration }) {
     if (!this.newest) return;
+    const neighbor = this.neighbor(String(peer), name);
+    const append = (rows = [], row) => [...rows.filter(([t]) => t < row[T] && t > row[T] - LIVE_SECONDS), row];
     const { t } = this.newest;
-    const times = Object.fromEntries(Object.entries(ages).map(([kind, age]) => [kind, t - age]));
-    neighbor.measured = [...(neighbor.measured || []).filter((row) => row[T] < t && row[T] > t - LIVE_SECONDS), [t, times]];
+    neighbor.nis = append(neighbor.nis, [t, ...KINDS.map((kind) => residuals[kind]?.nis ?? NaN)]);
+    if (calibration) neighbor.calibrations = append(neighbor.calibrations, [t, ...CALIBRATION.flatMap(([key, count, scale]) => count === 1 ? [(calibration[key]?.value ?? NaN) * scale] : [0, 1, 2].map((i) => (calibration[key]?.value[i] ?? NaN) * scale))]);
   }
 
-  /** Seconds since the newest measurement of a kind that was known at `t`; infinite without any. */
-  ageOf(neighbor, kind, t) {
+  /** The newest measurement of each kind and when it was taken, as a row of the time when it was known. */
+  addMeasured(neighbor, ages, measured = {}, t = this.newest?.t) {
+    if (t === undefined) return;
+    const entries = Object.fromEntries(Object.entries(ages).map(([kind, age]) => [kind, { ...measured[kind], t: t - age }]));
+    neighbor.measured = [...(neighbor.measured || []).filter((row) => row[T] < t && row[T] > t - LIVE_SECONDS), [t, entries]];
+  }
+
+  /** The newest measurement of a kind that was known at `t`, or null: `t` when it was taken, what STATUS says of it, whatever its age. */
+  measuredAt(neighbor, kind, t) {
     if (this.isLive) {
       const row = (neighbor.measured || [])[indexAt(neighbor.measured || [], t)];
-      return row && row[1][kind] !== undefined ? t - row[1][kind] : Infinity;
+      return row?.[1][kind] || null;
     }
     const rows = neighbor.innovations || [];
     for (let i = indexAt(rows, t); i >= 0 && t - rows[i][T] < FRESH_SECONDS; --i)
-      if (rows[i][1] === KINDS.indexOf(kind) && rows[i][2] === FUSED) return t - rows[i][T];
-    return Infinity;
+      if (rows[i][1] === KINDS.indexOf(kind)) return readingOf(rows[i], this.mounting, neighbor.mounting);
+    return null;
   }
 
-  isMeasured(neighbor, kind, t) {
-    return this.ageOf(neighbor, kind, t) < FRESH_SECONDS;
+  /** Seconds since then; infinite without any. */
+  ageOf(neighbor, kind, t) {
+    const measured = this.measuredAt(neighbor, kind, t);
+    return measured ? t - measured.t : Infinity;
   }
 
-  tellChanges(before, after) {
+  /** What was measured within the last second or so: the newest of these kinds, or null. */
+  freshAt(neighbor, kinds, t) {
+    const fresh = kinds.map((kind) => this.measuredAt(neighbor, kind, t)).filter((each) => each && t - each.t < FRESH_SECONDS && (each.u || each.m));
+    return fresh.sort((a, b) => b.t - a.t)[0] || null;
+  }
+
+  addChanges(before, after) {
     if (!before.self) return;
-    if (after.uptime_s < before.uptime_s) this.tell("restart", `${after.name}: the daemon has started anew`);
+    if (after.uptime_s < before.uptime_s) this.addEvent("restart", `${after.name}: the daemon has started anew`);
     if (after.config && before.config) {
-      if (after.config.generation > before.config.generation) this.tell("reload", "the configuration was reloaded");
-      if (after.config.fault && after.config.fault !== before.config.fault) this.tell("fault", `reload refused: ${after.config.fault}`);
+      if (after.config.generation > before.config.generation) this.addEvent("reload", "the configuration was reloaded");
+      if (after.config.fault && after.config.fault !== before.config.fault) this.addEvent("fault", `reload refused: ${after.config.fault}`);
     }
     for (const sensor of after.sensors || []) {
       const was = (before.sensors || []).find(({ name }) => name === sensor.name);
-      if (was && was.ok !== sensor.ok) this.tell(sensor.ok ? "found" : "fault", `${sensor.name}: ${sensor.ok ? "works again" : sensor.message || "fault"}`);
+      if (was && was.ok !== sensor.ok) this.addEvent(sensor.ok ? "found" : "fault", `${sensor.name}: ${sensor.ok ? "works again" : sensor.message || "fault"}`);
     }
     for (const neighbor of after.neighbors) {
       const was = (before.neighbors || []).find(({ peer }) => peer === neighbor.peer);
-      if (was && was.state !== "none" && neighbor.state === "none") this.tell("lost", `${neighbor.name}: no pose (${neighbor.reason})`);
-      for (const fault of neighbor.faults || []) if (was && !(was.faults || []).includes(fault)) this.tell("fault", `${neighbor.name}: ${fault}`);
+      if (was && was.state !== "none" && neighbor.state === "none") this.addEvent("lost", `${neighbor.name}: no pose (${neighbor.reason})`);
+      for (const fault of neighbor.faults || []) if (was && !(was.faults || []).includes(fault)) this.addEvent("fault", `${neighbor.name}: ${fault}`);
     }
   }
 
   setLink(link) {
-    if (link.ok !== this.link.ok) this.tell(link.ok ? "found" : "lost", link.ok ? "the daemon answers" : link.reason);
+    if (link.ok !== this.link.ok) this.addEvent(link.ok ? "found" : "lost", link.ok ? "the daemon answers" : link.reason);
     this.link = link;
     this.changed();
   }
 
-  tell(kind, text) {
+  addEvent(kind, text) {
     this.events.unshift({ kind, text, time: new Date() });
     this.events.length = Math.min(this.events.length, MAX_EVENTS);
   }

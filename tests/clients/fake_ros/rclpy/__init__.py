@@ -15,7 +15,7 @@ def plain(value):
     return value.hex() if isinstance(value, bytes) else vars(value)
 
 
-def tell(topic, message):
+def record(topic, message):
     global _left
     _left -= 1
     print(json.dumps({"topic": topic, "message": message}, default=plain), flush=True)
@@ -61,7 +61,7 @@ class Publisher:
 
     def publish(self, message):
         assert isinstance(message, self.kind)
-        tell(self.topic, message)
+        record(self.topic, message)
 
 
 class Time:

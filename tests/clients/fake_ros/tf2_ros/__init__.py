@@ -8,4 +8,4 @@ class TransformBroadcaster:
 
     def sendTransform(self, transform):
         assert isinstance(transform, TransformStamped)
-        rclpy.tell("/tf", transform)
+        rclpy.record("/tf", transform)

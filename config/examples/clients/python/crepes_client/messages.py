@@ -79,6 +79,7 @@ class Sensor:
     message: str | None = None  #: what is wrong, and what to do
     faults: Mapping[str, int] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
+    calibrated: bool = True  #: false: a camera whose lens is a guess
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,69 @@
+/// What the calibration of a whole swarm estimates.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimator/calibration/batch/arrow_system.hpp"
+#include "estimator/calibration/camera/camera_state.hpp"
+#include "estimator/core/sensor_noise.hpp"
+
+namespace crepes {
+
+/// The order of a robot's constants in normal equations. The first 28 are those of
+/// `camera_constants`: lens, R_C_B, p_B_C, time shift, gyroscope and accelerometer matrix. Then the
+/// LED ring and the antenna in the body, antenna delay, offset and skew of the clock.
+namespace swarm_constants {
+inline constexpr int kLens = camera_constants::kLens;
+inline constexpr int kRotation = camera_constants::kRotation;
+inline constexpr int kPosition = camera_constants::kPosition;
+inline constexpr int kShift = camera_constants::kShift;
+inline constexpr int kGyroMatrix = camera_constants::kGyroMatrix;
+inline constexpr int kAccelMatrix = camera_constants::kAccelMatrix;
+inline constexpr int kRing = camera_constants::kBoards;
+inline constexpr int kAntenna = 31;
+inline constexpr int kDelay = 34;
+inline constexpr int kClock = 35;
+inline constexpr int kSkew = 36;
+inline constexpr int kSize = 37;
+}  // namespace swarm_constants
+
+/// Everything of a robot that does not change during the recording.
+struct RobotConstants {
+  CameraConstants camera;                           ///< without boards
+  Eigen::Vector3d p_B_M = Eigen::Vector3d::Zero();  ///< LED ring
+  Eigen::Vector3d p_B_U = Eigen::Vector3d::Zero();  ///< UWB antenna
+  double range_delay_m = 0.0;                       ///< lengthens all ranges of its module
+  double clock_s = 0.0;                             ///< its stamps are ahead by so much
+  double clock_skew = 0.0;                          ///< and gain so much a second
+
+  /// The common time of a stamp of this robot, and the stamp of a common time [s].
+  [[nodiscard]] double common_s(double stamp_s) const {
+    return (1.0 - clock_skew) * stamp_s - clock_s;
+  }
+  [[nodiscard]] double stamp_s(double common_s) const {
+    return (1.0 + clock_skew) * common_s + clock_s;
+  }
+};
+
+/// Knots of all robots stand at the same times, but for half an IMU sample.
+struct SwarmState {
+  std::vector<RobotConstants> robots;
+  std::vector<std::vector<CameraKnot>> knots;  ///< by robot
+};
+
+/// One-sigma priors of a robot's constants, in the order of `swarm_constants`.
+using RobotPriors = Eigen::Matrix<double, swarm_constants::kSize, 1>;
+
+/// What a configuration by ruler and data sheet is off by: 3 cm, 6 deg, a lens by 2 %, antenna
+/// delays of 0.2 m. The IMU's scales and axes are known as its `noise` says. `focal_px` is that of
+/// the lens.
+[[nodiscard]] RobotPriors default_robot_priors(double focal_px, const ImuNoise& noise);
+
+/// `state` moved by `step`.
+[[nodiscard]] SwarmState moved(const SwarmState& state, const TeamArrowSystem::Step& step);
+
+/// What moves `from` to `to`: the constants' error, in the order of `swarm_constants`.
+[[nodiscard]] RobotPriors difference(const RobotConstants& from, const RobotConstants& to);
+
+}  // namespace crepes

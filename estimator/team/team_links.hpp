@@ -1,0 +1,34 @@
+/// How well each robot is connected with those that are estimated jointly.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "estimator/team/team_belief.hpp"
+
+namespace crepes {
+
+/// Decides whether a robot beyond the filter's size should take the place of one within. A robot's
+/// links are the robots of the filter that it sees or that see it, in the mean of the last seconds;
+/// one that no estimate connects with the filter has none.
+class TeamLinks {
+ public:
+  /// Of robots with an IMU over the interval.
+  void add(const TeamInterval& interval, const TeamBelief& belief);
+
+  /// Two robots that change places.
+  struct Exchange {
+    RobotId leaves{};  ///< the filter
+    RobotId joins{};   ///< in its place
+  };
+  /// The worst connected robot of the belief and the best beyond it, if the latter is clearly
+  /// better connected. At most one in two seconds, so that whoever joins can be trusted first.
+  [[nodiscard]] std::optional<Exchange> exchange(Timestamp now, const TeamBelief& belief);
+
+ private:
+  std::map<RobotId, double> links_;
+  std::optional<Timestamp> last_;
+};
+
+}  // namespace crepes

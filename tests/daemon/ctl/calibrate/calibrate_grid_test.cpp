@@ -1,0 +1,109 @@
+#include "daemon/ctl/calibrate/calibrate_grid.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/core/mat.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/text_file.hpp"
+#include "tests/support/simulated_grid.hpp"
+
+namespace crepes {
+namespace {
+
+namespace fs = std::filesystem;
+
+class CalibrateGrid : public testing::Test {
+ protected:
+  [[nodiscard]] fs::path pictures() const { return scratch_.path() / "pictures"; }
+  [[nodiscard]] fs::path out() const { return scratch_.path() / "camchain.yaml"; }
+
+  /// Names in no order, JPEG and PNG.
+  void write(int count, std::uint64_t seed) const {
+    fs::create_directories(pictures());
+    int k = 0;
+    for (const simulated::SeenGrid& grid : simulated::seen_grids(seed, count, {})) {
+      auto picture = simulated::rendered(grid, seed + static_cast<std::uint64_t>(++k));
+      const cv::Mat image(simulated::kGridHeight, simulated::kGridWidth, CV_8UC1,
+                          picture.pixels.data());
+      const std::string name =
+          "IMG_" + std::to_string((k * 7) % 100) + (k % 3 == 0 ? ".jpg" : ".png");
+      ASSERT_TRUE(cv::imwrite((pictures() / name).string(), image, {cv::IMWRITE_JPEG_QUALITY, 90}));
+    }
+  }
+  [[nodiscard]] Result<CalibrationReport> run(bool json, bool kannala_brandt = false) const {
+    return calibrate_grid({.pictures = pictures(),
+                           .out = out(),
+                           .grid = simulated::five_by_seven(),
+                           .fov_deg = {},
+                           .kannala_brandt = kannala_brandt,
+                           .json = json,
+                           .on_progress = {}});
+  }
+
+  ScratchDirectory scratch_ = ScratchDirectory::create({}).value();
+};
+
+TEST_F(CalibrateGrid, FindsTheLensInAFolderOfPicturesAlone) {
+  write(32, 1);
+
+  const auto report = run(true);
+
+  ASSERT_TRUE(report) << report.error().message;
+  ASSERT_TRUE(report->reasons.empty()) << report->reasons.front();
+  const auto json = nlohmann::json::parse(report->text);
+  EXPECT_TRUE(json["ok"]);
+  EXPECT_EQ(json["pictures"], 32);
+  EXPECT_GE(json["views"], 28);
+  EXPECT_LT(json["residual_px"], 0.2);
+  EXPECT_EQ(json["intrinsics_sigma"].size(), 6U);
+  GridLens found{.kind = LensKind::kDoubleSphere, .numbers = Eigen::VectorXd(6)};
+  for (Eigen::Index i = 0; i < 6; ++i)
+    found.numbers[i] = json["intrinsics"][static_cast<std::size_t>(i)];
+  EXPECT_LT(simulated::shape_error_px(found, simulated::grid_camera(), 80.0), 0.15);
+  const std::string camchain = read_text_file(out(), 1 << 20).value();
+  EXPECT_NE(camchain.find("camera_model: ds"), std::string::npos) << camchain;
+  EXPECT_EQ(camchain.find("T_cam_imu"), std::string::npos) << camchain;
+}
+
+TEST_F(CalibrateGrid, RefusesPicturesWithoutAGridAndWritesNothing) {
+  fs::create_directories(pictures());
+  const cv::Mat dark(simulated::kGridHeight, simulated::kGridWidth, CV_8UC1, cv::Scalar(5));
+  for (const std::string name : {"a", "b", "c"})
+    ASSERT_TRUE(cv::imwrite((pictures() / (name + ".png")).string(), dark));
+
+  const auto report = run(true);
+
+  ASSERT_TRUE(report) << report.error().message;
+  ASSERT_FALSE(report->reasons.empty());
+  EXPECT_NE(report->reasons[0].find("was not found in 3 of 3 pictures: a.png, b.png, c.png"),
+            std::string::npos)
+      << report->reasons[0];
+  EXPECT_FALSE(nlohmann::json::parse(report->text)["ok"]);
+  EXPECT_FALSE(fs::exists(out()));
+}
+
+TEST_F(CalibrateGrid, SaysThatPicturesAreOfDifferentSizes) {
+  fs::create_directories(pictures());
+  ASSERT_TRUE(
+      cv::imwrite((pictures() / "a.png").string(), cv::Mat(100, 200, CV_8UC1, cv::Scalar(5))));
+  ASSERT_TRUE(
+      cv::imwrite((pictures() / "b.png").string(), cv::Mat(100, 201, CV_8UC1, cv::Scalar(5))));
+
+  const auto report = run(false);
+
+  ASSERT_FALSE(report);
+  EXPECT_NE(report.error().message.find("b.png is 201x100"), std::string::npos)
+      << report.error().message;
+}
+
+TEST_F(CalibrateGrid, ReadsTheSizeOfTheGrid) {
+  EXPECT_EQ(parse_grid("5x7", 0.05)->columns, 7);
+  for (const std::string text : {"5", "5x", "x7", "1x7", "5x700", "5*7", "-5x7"})
+    EXPECT_FALSE(parse_grid(text, 0.05)) << text;
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,113 @@
+#include "estimator/swarm/pose_publisher.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/resting_pair.hpp"
+
+namespace crepes {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace test::resting;
+
+constexpr RobotId kNeighbor{2};
+
+/// A neighbor at rest that the team knows, without a filter of its own.
+class TeamPublisher : public testing::Test {
+ protected:
+  TeamPublisher() { self_.imu = neighbor_.imu = imu_at_rest(1000); }
+
+  /// The team's pose at `ms`, seen by anybody at `sighted_ms`.
+  void add(int ms, int sighted_ms, double sigma_m = 0.05) {
+    TeamPose pose{.neighbor = kNeighbor, .T_B_N = kTruth};
+    pose.covariance.diagonal().head<3>().setConstant(sigma_m * sigma_m);
+    pose.covariance.diagonal().segment<6>(3).setConstant(1e-4);
+    pose.last_sighting = at_ms(sighted_ms);
+    publisher_.add_team_pose({at_ms(ms), pose, {}, {}});
+  }
+  [[nodiscard]] std::optional<NeighborPose> at(int now_ms, const LastContact& last = {}) {
+    publisher_.clear();
+    publisher_.update_team(at_ms(now_ms), self_, neighbor_, last);
+    return publisher_.published();
+  }
+
+  RobotState self_;
+  RobotState neighbor_;
+  PosePublisher publisher_{kNeighbor, kMounting, settings()};
+};
+
+TEST_F(TeamPublisher, CarriesTheTeamsPoseToTheNewestSample) {
+  add(900, 900);
+  const auto pose = at(1000);
+  ASSERT_TRUE(pose);
+  EXPECT_EQ(pose->neighbor, kNeighbor);
+  EXPECT_EQ(pose->stamp, at_ms(1000));
+  EXPECT_EQ(pose->published, at_ms(1000));
+  EXPECT_LT((pose->T_B_N.pose.p - kTruth.p).norm(), 1e-6);
+  EXPECT_GT(pose->T_B_N.covariance(0, 0), 0.05 * 0.05);
+  EXPECT_TRUE(pose->sources.graph);
+}
+
+// Who saw it decides the mode: this robot, anybody, or nobody.
+TEST_F(TeamPublisher, TheModeSaysWhoSawItOfLate) {
+  const LastContact seen{.seen = at_ms(950)};
+  const LastContact long_ago{.seen = at_ms(100)};
+  add(900, 900);
+  EXPECT_EQ(at(1000, seen)->mode, PoseMode::kDirect);
+  EXPECT_EQ(at(1000, long_ago)->mode, PoseMode::kGraph);
+  add(900, 200);
+  EXPECT_EQ(at(1000, long_ago)->mode, PoseMode::kPredicted);
+  EXPECT_NEAR(at(1000, long_ago)->age_s, 0.8, 1e-9);
+}
+
+TEST_F(TeamPublisher, AStateIsAtMostTwentyMillisecondsOld) {
+  add(900, 900);
+  const auto pose = at(1200);
+  ASSERT_TRUE(pose);
+  EXPECT_EQ(pose->stamp, at_ms(1180));
+}
+
+TEST_F(TeamPublisher, AnOldSolutionIsNotCarriedOn) {
+  add(100, 100);
+  EXPECT_FALSE(at(1000));
+  add(300, 300);
+  EXPECT_TRUE(at(1000));
+}
+
+TEST_F(TeamPublisher, ASolutionOfTheFutureWaits) {
+  add(1100, 1100);
+  EXPECT_FALSE(at(1000));
+}
+
+TEST_F(TeamPublisher, DoesNotPublishWhatIsTooUncertain) {
+  add(900, 900, 1.5);
+  EXPECT_FALSE(at(1000));
+}
+
+TEST_F(TeamPublisher, PublishesNothingWithoutASolution) { EXPECT_FALSE(at(1000)); }
+
+/// With a filter of its own that knows the same place, or another one.
+class TeamAndFilter : public TeamPublisher {
+ protected:
+  [[nodiscard]] std::optional<NeighborPose> with_filter_at(const Pose& place) {
+    HypothesisSet hypotheses(settings(), kMounting);
+    EXPECT_TRUE(hypotheses.initialize(at_ms(980), GraphPose{kNeighbor, {place, covariance()}}));
+    ReadingIntake intake(kNeighbor, settings());
+    publisher_.clear();
+    publisher_.update(at_ms(1000), self_, neighbor_, hypotheses, intake);
+    if (!publisher_.pose()) return std::nullopt;
+    publisher_.update_team(at_ms(1000), self_, neighbor_, {.seen = at_ms(990)});
+    return publisher_.published();
+  }
+};
+
+TEST_F(TeamAndFilter, TheTeamsPoseReplacesAFiltersThatAgrees) {
+  add(900, 900);
+  const auto pose = with_filter_at({{kDistance + 0.1, 0.0, 0.0}, Eigen::Quaterniond::Identity()});
+  ASSERT_TRUE(pose);
+  EXPECT_LT((pose->T_B_N.pose.p - kTruth.p).norm(), 1e-6);
+  EXPECT_LT(std::sqrt(pose->T_B_N.covariance(0, 0)), 0.1);
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,102 @@
+#include "estimator/team/gyro_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/simulated_belief.hpp"
+
+namespace crepes {
+namespace {
+
+using test::SimulatedTeam;
+
+constexpr RobotId kOther{4};
+
+struct Scene {
+  TeamInterval interval;
+  TeamBelief belief;
+
+  explicit Scene(SimulatedTeam& team)
+      : Scene{test::motions_of(team), team.next()} {}  // in this order
+  Scene(const test::TrueMotions& before, TeamInterval next)
+      : interval(std::move(next)), belief(test::true_belief(before, interval)) {}
+
+  [[nodiscard]] std::map<RobotId, GyroCheck> checks() const {
+    return gyro_checks(interval, belief.trajectories(interval), belief);
+  }
+};
+
+// The chi-square of what honest gyroscopes read, for each dimension. The errors of bearings last
+// longer than the interval, so that their change is known better than is allowed for.
+TEST(GyroCheck, HonestGyroscopesAgreeWithWhatTheirCamerasSee) {
+  double chi2 = 0.0;
+  int dimension = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SimulatedTeam team(seed);
+    const auto checks = Scene(team).checks();
+    ASSERT_EQ(checks.size(), 4U);
+    for (const auto& [robot, check] : checks) {
+      EXPECT_FALSE(check.contradiction) << seed << ", robot " << robot.value;
+      chi2 += check.chi2;
+      dimension += check.dimension;
+    }
+  }
+  EXPECT_LT(chi2 / dimension, 1.2);
+  EXPECT_GT(chi2 / dimension, 0.0);
+}
+
+TEST(GyroCheck, MeasuresByHowMuchAGyroscopeIsOff) {
+  const Eigen::Vector3d error(0.0, 0.4, -0.3);  // rad/s
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamMember& member : interval.members)
+        if (member.robot == kOther)
+          for (ImuMean& mean : member.imu) mean.gyro_radps += error;
+    };
+    const auto checks = Scene(team).checks();
+    const auto& of_liar = checks.at(kOther).contradiction;
+    ASSERT_TRUE(of_liar) << seed;
+    EXPECT_NEAR(of_liar->rate_radps, error.norm(), 0.15) << seed;
+    for (const auto& [robot, check] : checks)
+      EXPECT_EQ(check.contradiction.has_value(), robot == kOther) << seed;
+  }
+}
+
+// A turned camera sees the same changes from elsewhere.
+TEST(GyroCheck, ATurnedCameraIsNoContradiction) {
+  const Eigen::Quaterniond turn = so3_exp(radians(20.0) * Eigen::Vector3d(0.6, 0.0, 0.8));
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamBearing& b : interval.bearings)
+        if (b.observer == kOther) b.bearing.u_B = turn * b.bearing.u_B;
+    };
+    for (const auto& [robot, check] : Scene(team).checks())
+      EXPECT_FALSE(check.contradiction) << seed << ", robot " << robot.value;
+  }
+}
+
+// One robot that moves otherwise than expected is that robot's affair.
+TEST(GyroCheck, OneNeighborAloneProvesNothing) {
+  SimulatedTeam team(1);
+  team.sees = [](RobotId i, RobotId j) { return i != kOther || j == RobotId{2}; };
+  team.damage = [&](TeamInterval& interval) {
+    for (TeamMember& member : interval.members)
+      if (member.robot == kOther)
+        for (ImuMean& mean : member.imu) mean.gyro_radps.z() += 1.0;
+  };
+  const auto checks = Scene(team).checks();
+  EXPECT_FALSE(checks.at(kOther).contradiction);
+  EXPECT_GT(checks.at(kOther).chi2, 10.0);
+}
+
+TEST(GyroCheck, SaysNothingAboutARobotThatSeesNobody) {
+  SimulatedTeam team(1);
+  team.sees = [](RobotId i, RobotId) { return i != kOther; };
+  const auto checks = Scene(team).checks();
+  EXPECT_FALSE(checks.contains(kOther));
+  EXPECT_EQ(checks.size(), 3U);
+}
+
+}  // namespace
+}  // namespace crepes

@@ -1,0 +1,275 @@
+#include "estimator/team/team_trust.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/simulated_belief.hpp"
+
+namespace crepes {
+namespace {
+
+using test::kSelf;
+using test::SimulatedTeam;
+using namespace std::chrono_literals;
+
+constexpr RobotId kSecond{2};
+constexpr RobotId kThird{3};
+constexpr RobotId kAccused{4};
+constexpr Agreement kAgrees{.fused = 10.0};
+constexpr Agreement kContradicts{.gated = 10.0};
+
+using Ids = std::vector<RobotId>;
+
+/// Four robots that see each other, and what each camera thinks of what it sees.
+class TrustOfFour : public testing::Test {
+ protected:
+  TrustOfFour() {
+    const test::TrueMotions motions = test::motions_of(team_);
+    interval_ = team_.next();
+    belief_ = test::true_belief(motions, interval_);
+    for (auto& [id, robot] : belief_.robots)
+      for (const RobotId other : {kSelf, kSecond, kThird, kAccused})
+        if (other != id) robot.cameras[0].agreement[other] = kAgrees;
+  }
+
+  TeamCamera& camera_of(RobotId robot) { return belief_.robots.at(robot).cameras[0]; }
+  void contradict_what_it_sees(RobotId observer) {
+    for (auto& [other, agreement] : camera_of(observer).agreement) agreement = kContradicts;
+  }
+  void contradict_its_place(RobotId robot) {
+    for (const RobotId observer : {kSelf, kSecond, kThird, kAccused})
+      if (observer != robot) camera_of(observer).agreement[robot] = kContradicts;
+  }
+  void all_agree_again() {
+    for (auto& [id, robot] : belief_.robots)
+      for (auto& [other, agreement] : robot.cameras[0].agreement) agreement = kAgrees;
+  }
+  /// Without anything that happens.
+  void wait(Duration time) {
+    belief_.stamp += time;
+    interval_.from += time;
+    interval_.to += time;
+  }
+  Ids lost() { return trust_.lost(interval_, belief_); }
+  Ids turned() { return trust_.turned(interval_, belief_); }
+
+  SimulatedTeam team_{1};
+  TeamInterval interval_;
+  TeamBelief belief_;
+  TeamTrust trust_;
+};
+
+TEST_F(TrustOfFour, NobodyIsAccusedIfAllAgree) {
+  EXPECT_TRUE(lost().empty());
+  EXPECT_TRUE(turned().empty());
+  EXPECT_FALSE(trust_.is_misled(belief_));
+  for (const RobotId robot : {kSelf, kSecond, kThird, kAccused}) {
+    EXPECT_FALSE(trust_.turn_covariance(robot)) << robot.value;
+    EXPECT_EQ(trust_.doubt(robot, belief_.stamp), 1.0);
+  }
+}
+
+TEST_F(TrustOfFour, ARobotWhosePlaceMostCamerasContradictIsLost) {
+  contradict_its_place(kAccused);
+  EXPECT_EQ(lost(), Ids{kAccused});
+}
+
+TEST_F(TrustOfFour, ARobotIsLessCertainEachTimeItIsLostAndLikeOthersLater) {
+  contradict_its_place(kAccused);
+  EXPECT_EQ(lost(), Ids{kAccused});
+  const double once = trust_.doubt(kAccused, belief_.stamp);
+  EXPECT_EQ(lost(), Ids{kAccused});
+  EXPECT_GT(once, 1.0);
+  EXPECT_GT(trust_.doubt(kAccused, belief_.stamp), once);
+  EXPECT_EQ(trust_.doubt(kAccused, belief_.stamp + 11s), 1.0);
+}
+
+TEST_F(TrustOfFour, ARobotThatWasAwayIsForgotten) {
+  contradict_its_place(kAccused);
+  EXPECT_EQ(lost(), Ids{kAccused});
+  all_agree_again();
+  contradict_what_it_sees(kAccused);
+  EXPECT_EQ(turned(), Ids{kAccused});
+  ASSERT_TRUE(trust_.turn_covariance(kAccused));
+
+  const std::vector<TeamMember> all = interval_.members;
+  std::erase_if(interval_.members, [](const TeamMember& m) { return m.robot == kAccused; });
+  EXPECT_EQ(lost(), Ids{kAccused});  // it has no IMU
+  interval_.members = all;
+
+  EXPECT_FALSE(trust_.turn_covariance(kAccused));
+  EXPECT_EQ(trust_.doubt(kAccused, belief_.stamp), 1.0);
+}
+
+TEST_F(TrustOfFour, ACameraThatContradictsWhatItSeesMayBeTurned) {
+  contradict_what_it_sees(kAccused);
+  EXPECT_EQ(turned(), Ids{kAccused});
+  ASSERT_TRUE(trust_.turn_covariance(kAccused));
+  EXPECT_GT(trust_.turn_covariance(kAccused)->trace(), std::pow(radians(20.0), 2));
+  EXPECT_FALSE(trust_.is_refused(kAccused));
+  EXPECT_FALSE(trust_.turn_covariance(kSecond));
+}
+
+TEST_F(TrustOfFour, AMisalignmentBeyondItsPriorIsATurnAboutThatAxis) {
+  TeamCamera& camera = camera_of(kAccused);
+  camera.misalignment = Eigen::Vector3d(0.0, 0.0, radians(3.0));
+  belief_.P.block<3, 3>(camera.index, camera.index) =
+      std::pow(radians(0.1), 2) * Eigen::Matrix3d::Identity();
+  EXPECT_EQ(turned(), Ids{kAccused});
+  const Eigen::Matrix3d turn = trust_.turn_covariance(kAccused).value();
+  EXPECT_GT(turn(2, 2), 50.0 * turn(0, 0));
+}
+
+// It starts like any other robot after that, and its misalignment is tested again.
+TEST_F(TrustOfFour, AVerdictOnACameraThatIsStraightExpires) {
+  contradict_what_it_sees(kAccused);
+  EXPECT_EQ(turned(), Ids{kAccused});
+  all_agree_again();
+  camera_of(kAccused).is_free = true;
+  wait(19s);
+  static_cast<void>(lost());
+  EXPECT_TRUE(trust_.turn_covariance(kAccused));
+  wait(2s);
+  static_cast<void>(lost());
+  EXPECT_FALSE(trust_.turn_covariance(kAccused));
+  EXPECT_TRUE(turned().empty());
+
+  TeamCamera& camera = camera_of(kAccused);
+  camera.misalignment = Eigen::Vector3d(0.0, radians(3.0), 0.0);
+  belief_.P.block<3, 3>(camera.index, camera.index) =
+      std::pow(radians(0.1), 2) * Eigen::Matrix3d::Identity();
+  EXPECT_EQ(turned(), Ids{kAccused});
+  EXPECT_FALSE(trust_.is_refused(kAccused));
+}
+
+TEST_F(TrustOfFour, AVerdictLastsAsLongAsTheCameraIsTurned) {
+  contradict_what_it_sees(kAccused);
+  EXPECT_EQ(turned(), Ids{kAccused});
+  all_agree_again();
+  TeamCamera& camera = camera_of(kAccused);
+  camera.is_free = true;
+  camera.misalignment = Eigen::Vector3d(0.0, radians(3.0), 0.0);
+  belief_.P.block<3, 3>(camera.index, camera.index) =
+      std::pow(radians(0.1), 2) * Eigen::Matrix3d::Identity();
+  for (int i = 0; i < 10; ++i) {
+    wait(10s);
+    EXPECT_TRUE(lost().empty());
+    EXPECT_TRUE(turned().empty());
+  }
+  EXPECT_TRUE(trust_.turn_covariance(kAccused));
+}
+
+TEST_F(TrustOfFour, ACameraThatContradictsAgainMayBeAsCalibratedAgain) {
+  contradict_what_it_sees(kAccused);
+  EXPECT_EQ(turned(), Ids{kAccused});
+  EXPECT_TRUE(trust_.turn_covariance(kAccused));
+  EXPECT_EQ(turned(), Ids{kAccused});
+  EXPECT_FALSE(trust_.turn_covariance(kAccused));
+}
+
+TEST_F(TrustOfFour, ACameraThatContradictsAgainAndAgainIsRefusedAndTriedAgainLater) {
+  contradict_what_it_sees(kAccused);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(turned(), Ids{kAccused});
+    EXPECT_FALSE(trust_.is_refused(kAccused));
+  }
+  EXPECT_EQ(turned(), Ids{kAccused});
+  EXPECT_TRUE(trust_.is_refused(kAccused));
+  all_agree_again();
+  camera_of(kAccused).is_refused = true;
+  wait(19s);
+  EXPECT_TRUE(lost().empty());
+  wait(2s);
+  EXPECT_EQ(lost(), Ids{kAccused});
+  EXPECT_FALSE(trust_.turn_covariance(kAccused));
+}
+
+TEST_F(TrustOfFour, WhoWasFoundTurnedBeforeAndOnceIsBelievedAgain) {
+  contradict_what_it_sees(kSecond);
+  EXPECT_EQ(turned(), Ids{kSecond});
+  all_agree_again();
+  contradict_what_it_sees(kAccused);
+  EXPECT_EQ(turned(), Ids{kAccused});
+  EXPECT_FALSE(trust_.turn_covariance(kSecond));
+  EXPECT_TRUE(trust_.turn_covariance(kAccused));
+}
+
+TEST_F(TrustOfFour, ProbationEndsWhenMostAgreeForASecond) {
+  TeamRobot& robot = belief_.robots.at(kAccused);
+  robot.is_trusted = false;
+  wait(900ms);
+  trust_.end_probations(belief_);
+  EXPECT_FALSE(robot.is_trusted);
+  wait(100ms);
+  contradict_its_place(kAccused);
+  trust_.end_probations(belief_);
+  EXPECT_FALSE(robot.is_trusted);
+  all_agree_again();
+  trust_.end_probations(belief_);
+  EXPECT_TRUE(robot.is_trusted);
+}
+
+TEST_F(TrustOfFour, ARobotThatItsOwnRangesPlacedStaysOnProbation) {
+  TeamRobot& robot = belief_.robots.at(kAccused);
+  robot.is_trusted = false;
+  wait(2s);
+  TeamRangeBias& range = belief_.ranges.at(ordered(kSecond, kAccused));
+  range.agreement[kAccused] = kAgrees;
+  range.agreement[kSecond] = kContradicts;
+  trust_.end_probations(belief_);
+  EXPECT_FALSE(robot.is_trusted);
+}
+
+// All pairs but those of one robot contradict their ranges: its are the wrong ones.
+TEST_F(TrustOfFour, ARobotThatSetAWrongScaleIsFoundOnce) {
+  for (auto& [pair, range] : belief_.ranges) {
+    const bool has_part = pair.first == kAccused || pair.second == kAccused;
+    range.agreement[pair.first] = has_part ? kAgrees : kContradicts;
+  }
+  EXPECT_TRUE(trust_.is_misled(belief_));
+  EXPECT_FALSE(trust_.is_misled(belief_));
+  TeamRobot& robot = belief_.robots.at(kAccused);
+  robot.is_trusted = false;
+  wait(2s);
+  trust_.end_probations(belief_);
+  EXPECT_FALSE(robot.is_trusted) << "it is trusted later than others";
+  wait(2s);
+  trust_.end_probations(belief_);
+  EXPECT_TRUE(robot.is_trusted);
+}
+
+TEST_F(TrustOfFour, AGyroscopeIsFalseAfterSomeContradictionsAndForASecond) {
+  const std::map<RobotId, GyroCheck> checks{
+      {kAccused, {.chi2 = 50.0, .dimension = 6, .contradiction = {{40.0, 0.5}}}},
+      {kSecond, {.chi2 = 6.0, .dimension = 6, .contradiction = {}}}};
+  EXPECT_TRUE(trust_.false_gyros(interval_, belief_, checks).empty());
+  EXPECT_EQ(trust_.false_gyros(interval_, belief_, checks), Ids{kAccused});
+  ASSERT_EQ(trust_.gyro_faults(belief_.stamp).size(), 1U);
+  EXPECT_EQ(trust_.gyro_faults(belief_.stamp).front().robot, kAccused);
+  EXPECT_EQ(trust_.gyro_faults(belief_.stamp).front().size, 0.5);
+  EXPECT_TRUE(trust_.gyro_faults(belief_.stamp + 1s).empty());
+}
+
+TEST_F(TrustOfFour, NamesWhatCalibrationsAndRangesShow) {
+  TeamCamera& camera = camera_of(kAccused);
+  camera.misalignment = Eigen::Vector3d(0.0, 0.0, radians(2.0));
+  belief_.P.block<3, 3>(camera.index, camera.index) =
+      std::pow(radians(0.1), 2) * Eigen::Matrix3d::Identity();
+  camera_of(kSecond).is_refused = true;
+  belief_.robots.at(kThird).clock_s = 0.02;
+  const Priors& priors = interval_.settings.priors;
+  const auto calibrations = calibrations_of(belief_, priors);
+  ASSERT_EQ(calibrations.size(), 4U);
+  EXPECT_EQ(calibrations[3].cameras[0].state, CameraMisalignment::State::kTurned);
+  EXPECT_NEAR(calibrations[3].cameras[0].angle_sigma_rad(), radians(0.1), 1e-9);
+  const auto faults = faults_of(belief_, calibrations);
+  ASSERT_EQ(faults.size(), 3U);
+  EXPECT_EQ(faults[0].kind, TeamFault::Kind::kCameraRefused);
+  EXPECT_EQ(faults[1].kind, TeamFault::Kind::kCameraTurned);
+  EXPECT_NEAR(faults[1].size, radians(2.0), 1e-9);
+  EXPECT_NEAR(faults[1].sigma, radians(0.1), 1e-9);
+  EXPECT_EQ(faults[2].kind, TeamFault::Kind::kClock);
+  EXPECT_EQ(faults[2].robot, kThird);
+}
+
+}  // namespace
+}  // namespace crepes
