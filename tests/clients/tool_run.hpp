@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/demo/child_process.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/child_process.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"

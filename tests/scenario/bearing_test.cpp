@@ -1,7 +1,7 @@
 /// What the tracker alone makes of whole recordings: who is identified, where, and how exactly.
 #include <gtest/gtest.h>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "estimator/core/constants.hpp"
 #include "tests/scenario/recorded_swarm.hpp"
 #include "tests/support/bearing_truth.hpp"

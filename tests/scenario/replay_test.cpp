@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/replay/swarm_replay.hpp"
 #include "daemon/ctl/score/swarm_score.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "estimator/core/constants.hpp"
 #include "tests/scenario/recorded_swarm.hpp"
 #include "tests/support/places.hpp"

@@ -9,11 +9,11 @@
 #include <sstream>
 #include <vector>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/runtime.hpp"
 #include "daemon/service/logging.hpp"
 #include "drivers/base/monotonic_clock.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/uwb/nlink_encoder.hpp"
 #include "drivers/uwb/nlink_frame.hpp"

@@ -9,8 +9,8 @@
 
 #include "config/reading/config_file.hpp"
 #include "daemon/ctl/calibrate/calibrate_camera.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/setup/init.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/dataset/dataset_rows.hpp"
 #include "drivers/dataset/robot_folder.hpp"
 #include "estimator/core/constants.hpp"

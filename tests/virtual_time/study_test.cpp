@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "estimator/core/constants.hpp"
 #include "tests/study/imu_noise.hpp"
 #include "tests/study/simulated_swarm.hpp"

@@ -6,27 +6,25 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
-#include <map>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "config/reading/config_file.hpp"
-#include "daemon/ctl/demo/child_process.hpp"
 #include "daemon/ctl/demo/demo_page.hpp"
+#include "daemon/ctl/demo/demo_pairs.hpp"
 #include "daemon/ctl/demo/demo_screen.hpp"
 #include "daemon/ctl/demo/demo_swarm.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/demo/steered_swarm.hpp"
 #include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
-#include "daemon/ctl/live/neighbor_view.hpp"
 #include "daemon/ctl/text_table.hpp"
+#include "drivers/base/child_process.hpp"
 #include "drivers/base/monotonic_clock.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 #include "drivers/sim/world.hpp"
-#include "estimator/core/constants.hpp"
 #include "net/udp_socket.hpp"
 
 namespace crepes {
@@ -44,15 +42,6 @@ struct RunningRobot {
   DemoRobot robot;
   fs::path log;
   client::Connection daemon;
-};
-
-/// One ordered pair: all its poses, and the time of the first one.
-struct Pair {
-  std::size_t observer;
-  RobotId neighbor;
-  NeighborView view;
-  std::vector<NeighborPose> poses;
-  std::optional<Duration> first_pose;  ///< after the daemons' start
 };
 
 /// The last lines of a log.
@@ -110,6 +99,7 @@ class Demo {
     const fs::path tool = fs::read_symlink("/proc/self/exe", status);
     const fs::path daemon = tool.parent_path() / "crepesd";
     start_ = clock_.now();
+    pairs_.emplace(world_, start_, is_endless() ? std::optional(kScored) : std::nullopt);
     for (DemoRobot& robot : demo_swarm(sim_, ids, epoch_s(), options_.port, *mesh_port)) {
       if (auto done = start_robot(dir, daemon, std::move(robot)); !done) return done;
     }
@@ -170,18 +160,13 @@ class Demo {
 
   /// Scores the whole run of each pair.
   [[nodiscard]] DemoSummary summarize() const {
+    const double to_s = end_s_ - kInFlight;
     DemoSummary summary{.scenario = options_.scenario,
                         .seed = options_.seed,
                         .from_s = scored_from_s(),
                         .to_s = end_s_,
-                        .pairs = {}};
-    if (steered_) summary.formation = score_formation(world_, scored_from_s(), end_s_ - kInFlight);
-    for (const Pair& pair : pairs_) {
-      summary.pairs.push_back({.observer = robots_.at(pair.observer).robot.config.robot.id,
-                               .neighbor = pair.neighbor,
-                               .first_pose = pair.first_pose,
-                               .score = score_of(pair)});
-    }
+                        .pairs = pairs_->score(scored_from_s(), to_s)};
+    if (steered_) summary.formation = score_formation(world_, scored_from_s(), to_s);
     return summary;
   }
 
@@ -194,16 +179,6 @@ class Demo {
   [[nodiscard]] double scored_from_s() const {
     const double settled_s = std::min(steered_ ? 15.0 : 5.0, end_s_ / 2.0);
     return is_endless() ? std::max(settled_s, end_s_ - to_seconds(kScored)) : settled_s;
-  }
-
-  [[nodiscard]] std::string name_of(const Pair& pair) const {
-    return fmt::format("{}->{}", name_of_robot(robots_.at(pair.observer).robot.config.robot.id),
-                       name_of_robot(pair.neighbor));
-  }
-
-  [[nodiscard]] Pose truth(const Pair& pair, Timestamp local) const {
-    const DemoRobot& observer = robots_.at(pair.observer).robot;
-    return world_.T_B_N(observer.config.robot.id, pair.neighbor, observer.clock.true_s(local));
   }
 
   Result<void> start_robot(const fs::path& dir, const fs::path& daemon, DemoRobot robot) {
@@ -224,15 +199,7 @@ class Demo {
     if (!connection) return tl::unexpected(connection.error());
     auto process = ChildProcess::start(daemon, {"--config", file.string()}, log);
     if (!process) return tl::unexpected(process.error());
-    for (const RobotId other : world_.robots()) {
-      if (other == id) continue;
-      pair_index_[{id, other}] = pairs_.size();
-      pairs_.push_back({.observer = robots_.size(),
-                        .neighbor = other,
-                        .view = {},
-                        .poses = {},
-                        .first_pose = {}});
-    }
+    pairs_->add_observer(id, robot.clock);
     robots_.push_back({std::move(robot), log, std::move(*connection)});
     daemons_.push_back(std::move(*process));
     return {};
@@ -278,37 +245,8 @@ class Demo {
     std::chrono::milliseconds patience = 5ms;
     for (RunningRobot& robot : robots_) {
       while (const auto answer = robot.daemon.receive(std::exchange(patience, 0ms)))
-        handle(robot, answer->message);
+        pairs_->handle(robot.robot.config.robot.id, answer->message, clock_.now());
     }
-  }
-
-  void handle(const RunningRobot& robot, const client::Message& message) {
-    const RobotId self = robot.robot.config.robot.id;
-    if (const auto* heard = std::get_if<client::Pose>(&message)) {
-      const auto index = pair_index_.find({self, RobotId{heard->peer}});
-      if (index != pair_index_.end())
-        add_pose(pairs_[index->second], robot, neighbor_pose_of(*heard));
-    } else if (const auto* status = std::get_if<client::Status>(&message)) {
-      for (const client::Status::Neighbor& neighbor : status->neighbors) {
-        const auto index = pair_index_.find({self, RobotId{neighbor.peer}});
-        if (index != pair_index_.end()) pairs_[index->second].view.set_reason(neighbor.reason);
-      }
-    }
-  }
-
-  void add_pose(Pair& pair, const RunningRobot& robot, NeighborPose pose) {
-    pose.published = robot.robot.clock.local(world_s());
-    pair.view.update(pose, clock_.now());
-    if (!pair.first_pose) pair.first_pose = clock_.now() - start_;
-    if (pair.poses.empty() || pose.stamp > pair.poses.back().stamp) pair.poses.push_back(pose);
-    if (is_endless()) forget_old(pair.poses);
-  }
-
-  /// Rarely, because it moves all that stays.
-  static void forget_old(std::vector<NeighborPose>& poses) {
-    const Timestamp newest = poses.back().stamp;
-    if (newest - poses.front().stamp < 2 * kScored) return;
-    std::erase_if(poses, [&](const NeighborPose& pose) { return newest - pose.stamp > kScored; });
   }
 
   static std::optional<char> next_key(const std::optional<KeyReader>& keys) {
@@ -330,40 +268,12 @@ class Demo {
   [[nodiscard]] std::string table(bool is_interactive) const {
     ScreenFormat format = format_of_output();
     format.is_interactive = is_interactive;
-    std::vector<DemoRow> rows;
-    rows.reserve(pairs_.size());
-    for (const Pair& pair : pairs_) rows.push_back(live_row(pair));
     const std::string url = page_ ? page_->url() : "";
     const std::string page = url.empty() ? "" : fmt::format("page: {}\n", url);
     const std::string end = is_endless() ? "" : fmt::format(" of {}", fixed(options_.for_s, 0));
     const std::string head =
         fmt::format("{}world time {} s{}\n{}", page, fixed(world_s(), 1), end, steering());
-    return table_.text(head, rows, format);
-  }
-
-  [[nodiscard]] DemoRow live_row(const Pair& pair) const {
-    DemoRow row{.pair = name_of(pair), .known = {}, .reason = pair.view.reason()};
-    if (pair.first_pose) row.first_pose_s = to_seconds(*pair.first_pose);
-    const NeighborPose* pose = pair.view.pose(clock_.now());
-    if (pose == nullptr) return row;
-    const Pose T_B_N = truth(pair, pose->stamp);
-    const Vector6d d = pose_difference(pose->T_B_N.pose, T_B_N);
-    const PoseSigma sigma = sigma_of(pose->T_B_N.covariance);
-    row.known = {.mode = std::string(crepes::name_of(pose->mode)),
-                 .range_m = T_B_N.p.norm(),
-                 .error_m = d.head<3>().norm(),
-                 .error_deg = kDegPerRad * d.tail<3>().norm(),
-                 .sigma_m = sigma.position_m,
-                 .sigma_deg = kDegPerRad * sigma.rotation_rad,
-                 .age_ms = 1e3 * to_seconds(pose->published - pose->stamp)};
-    return row;
-  }
-
-  [[nodiscard]] PairScore score_of(const Pair& pair) const {
-    const RobotClock& clock = robots_.at(pair.observer).robot.clock;
-    return score_pair(
-        pair.poses, [&](Timestamp t) { return truth(pair, t); }, clock.local(0.0),
-        {.begin = clock.local(scored_from_s()), .end = clock.local(end_s_ - kInFlight)});
+    return table_.text(head, pairs_->live_rows(clock_.now()), format);
   }
 
   DemoOptions options_;
@@ -378,9 +288,8 @@ class Demo {
   DemoScreen table_;
   std::optional<ChildProcess> program_;
   fs::path program_log_;
-  std::vector<Pair> pairs_;
-  std::map<std::pair<RobotId, RobotId>, std::size_t> pair_index_;
-  double end_s_ = 0.0;  ///< world time at the end
+  std::optional<DemoPairs> pairs_;  ///< since the start
+  double end_s_ = 0.0;              ///< world time at the end
 };
 
 }  // namespace

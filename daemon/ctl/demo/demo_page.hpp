@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/demo/child_process.hpp"
+#include "drivers/base/child_process.hpp"
 
 namespace crepes {
 

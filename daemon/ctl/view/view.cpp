@@ -9,13 +9,13 @@
 #include <chrono>
 #include <optional>
 
-#include "daemon/ctl/demo/child_process.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
 #include "daemon/ctl/view/access.hpp"
 #include "daemon/ctl/view/http_server.hpp"
 #include "daemon/ctl/view/listen_address.hpp"
 #include "daemon/ctl/view/site.hpp"
 #include "daemon/version.hpp"
+#include "drivers/base/child_process.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/base/text_file.hpp"
 #include "net/endpoint.hpp"

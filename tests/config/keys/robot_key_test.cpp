@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "config/keys/mesh_key.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 
 namespace crepes {

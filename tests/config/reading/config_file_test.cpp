@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "tests/support/places.hpp"
 
 namespace crepes {

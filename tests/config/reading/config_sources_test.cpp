@@ -15,7 +15,7 @@
 #include "config/keys/robot_key.hpp"
 #include "config/reading/config_file.hpp"
 #include "config/schema/mesh_slice.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/unique_fd.hpp"
 #include "tests/support/places.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 
 namespace crepes {
 

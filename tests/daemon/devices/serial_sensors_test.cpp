@@ -6,10 +6,10 @@
 #include <memory>
 #include <variant>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/service/logging.hpp"
 #include "daemon/stages/sensor_stage.hpp"
 #include "drivers/base/monotonic_clock.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/sim/pseudo_terminal.hpp"
 #include "tests/support/manual_clock.hpp"

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <optional>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 
 namespace crepes {
 namespace {

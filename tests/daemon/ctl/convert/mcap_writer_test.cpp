@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 
 namespace crepes {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/ctl/demo/formation_score.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 
 namespace crepes {
 namespace {

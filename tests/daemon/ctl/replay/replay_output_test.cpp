@@ -8,7 +8,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/dataset/pose_file.hpp"
 #include "drivers/dataset/record_file.hpp"
 #include "drivers/dataset/team_record_file.hpp"

@@ -5,8 +5,8 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/stages/worker.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/sleep.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/sim/pseudo_terminal.hpp"

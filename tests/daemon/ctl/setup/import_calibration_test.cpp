@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "config/reading/config_file.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 #include "tests/support/places.hpp"
 

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/stages/worker.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/sleep.hpp"
 #include "drivers/base/text_file.hpp"
 #include "drivers/imu/witmotion.hpp"

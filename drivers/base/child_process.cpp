@@ -1,4 +1,4 @@
-#include "daemon/ctl/demo/child_process.hpp"
+#include "drivers/base/child_process.hpp"
 
 #include <fcntl.h>
 #include <fmt/core.h>

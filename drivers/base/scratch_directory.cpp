@@ -1,4 +1,4 @@
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 
 #include <fmt/core.h>
 

@@ -20,7 +20,6 @@
 #include "config/keys/mesh_key.hpp"
 #include "config/keys/robot_key.hpp"
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/ctl/replay/swarm_replay.hpp"
 #include "daemon/recording/block.hpp"
 #include "daemon/recording/picture_block.hpp"
@@ -28,6 +27,7 @@
 #include "daemon/recording/recorder_stage.hpp"
 #include "daemon/recording/unix_socket.hpp"
 #include "daemon/runtime.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/dataset/csv_file.hpp"
 #include "tests/support/live_daemon.hpp"
 

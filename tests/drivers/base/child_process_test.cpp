@@ -1,4 +1,4 @@
-#include "daemon/ctl/demo/child_process.hpp"
+#include "drivers/base/child_process.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "daemon/ctl/demo/scratch_directory.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 
 namespace crepes {

@@ -19,10 +19,10 @@
 
 #include "config/keys/mesh_key.hpp"
 #include "config/keys/robot_key.hpp"
-#include "daemon/ctl/demo/child_process.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
+#include "drivers/base/child_process.hpp"
 #include "drivers/base/monotonic_clock.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"

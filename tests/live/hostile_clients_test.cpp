@@ -12,9 +12,9 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/ctl/demo/child_process.hpp"
-#include "daemon/ctl/demo/scratch_directory.hpp"
 #include "daemon/runtime.hpp"
+#include "drivers/base/child_process.hpp"
+#include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 #include "drivers/base/unique_fd.hpp"
 #include "estimator/core/quantile.hpp"
@@ -228,11 +228,11 @@ TEST_F(HostileClients, AreCounted) {
 TEST_F(HostileClients, GetNothingAmplifiedWhoeverTheyPretendToBe) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
   const auto log = scratch.path() / "log";
-  auto child = ChildProcess::start("/usr/bin/env",
-                                   {"unshare", "-rn", "/usr/bin/python3", "-B",
-                                    source_dir() + "/tests/scenario/forged_requests.py",
-                                    crepesd_path(), source_dir() + "/config/examples"},
-                                   log);
+  auto child = ChildProcess::start(
+      "/usr/bin/env",
+      {"unshare", "-rn", "/usr/bin/python3", "-B", source_dir() + "/tests/live/forged_requests.py",
+       crepesd_path(), source_dir() + "/config/examples"},
+      log);
   ASSERT_TRUE(child) << child.error().message;
   const Timestamp end = machine_.now() + kPatience;
   while (!child->exit_reason() && machine_.now() < end) ::poll(nullptr, 0, 50);

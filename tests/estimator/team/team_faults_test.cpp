@@ -1,0 +1,368 @@
+/// The filter of a team in which a robot lies.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <vector>
+
+#include "estimator/core/constants.hpp"
+#include "estimator/core/so3.hpp"
+#include "estimator/team/team_filter.hpp"
+#include "tests/support/simulated_team.hpp"
+#include "tests/support/team_solution.hpp"
+
+namespace crepes {
+namespace {
+
+using test::error_of;
+using test::find;
+using test::kIntervalSeconds;
+using test::kProbation;
+using test::kSelf;
+using test::nees_of;
+using test::position_nees_of;
+using test::SimulatedTeam;
+using test::solution_after;
+
+// A robot whose camera is turned contradicts all others. They are as good as a team without it, and
+// not much worse than with it when its camera is right.
+TEST(TeamFaults, ATurnedCameraHarmsNobody) {
+  constexpr RobotId kLiar{4};
+  constexpr int kSeeds = 20;
+  // Mean squared errors of the others in position.
+  const auto error_with = [&](double turn_deg, bool has_liar) {
+    const Eigen::Quaterniond turn = so3_exp(radians(turn_deg) * Eigen::Vector3d(0.6, 0.0, 0.8));
+    double sum = 0.0;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      SimulatedTeam team(seed);
+      team.damage = [&](TeamInterval& interval) {
+        for (TeamBearing& b : interval.bearings)
+          if (b.observer == kLiar) b.bearing.u_B = turn * b.bearing.u_B;
+      };
+      if (!has_liar) team.sees = [&](RobotId i, RobotId j) { return i != kLiar && j != kLiar; };
+      TeamFilter filter;
+      const TeamSolution solution = solution_after(team, filter, 10.0);
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        EXPECT_NE(pose, nullptr) << turn_deg << " deg, seed " << seed;
+        if (pose != nullptr)
+          sum += error_of(*pose, team.truth(robot)).head<3>().squaredNorm() / (2.0 * kSeeds);
+      }
+    }
+    return sum;
+  };
+  const double alone = error_with(0.0, false);
+  const double healthy = error_with(0.0, true);
+  for (const double turn_deg : {5.0, 20.0}) {
+    const double turned = error_with(turn_deg, true);
+    EXPECT_LT(std::sqrt(turned), 1.2 * std::sqrt(alone)) << turn_deg;
+    EXPECT_LT(std::sqrt(turned), 1.5 * std::sqrt(healthy)) << turn_deg;
+  }
+}
+
+const TeamFault* fault_of(const TeamSolution& solution, RobotId robot) {
+  const auto found = std::ranges::find(solution.faults, robot, &TeamFault::robot);
+  return found == solution.faults.end() ? nullptr : &*found;
+}
+
+// Robots that start from what a turned camera sees take its carrier to be turned. Then only motion
+// contradicts it, little by little. It is found before the others are wrong beyond their
+// covariance.
+TEST(TeamFaults, ACameraThatWasTurnedFromTheBeginningLeavesTheOthersHonest) {
+  constexpr RobotId kLiar{4};
+  int beyond = 0;
+  int named = 0;
+  constexpr int kSeeds = 20;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    SimulatedTeam team(seed);
+    const Eigen::Quaterniond turn = so3_exp(radians(20.0) * Eigen::Vector3d::UnitZ());
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamBearing& b : interval.bearings)
+        if (b.observer == kLiar) b.bearing.u_B = turn * b.bearing.u_B;
+      for (RelativePoseEdge& edge : interval.edges) {
+        Pose& T = edge.T_from_to.pose;
+        if (edge.to == kLiar) T = T * Pose{Eigen::Vector3d::Zero(), turn.conjugate()};
+        if (edge.from == kLiar) T = Pose{Eigen::Vector3d::Zero(), turn} * T;
+      }
+    };
+    TeamFilter filter;
+    TeamSolution solution;
+    for (double t = 0.0; t < 12.0; t += kIntervalSeconds) {
+      solution = filter.step(team.next());
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        if (pose != nullptr && position_nees_of(*pose, team.truth(robot)) > 35.0) ++beyond;
+      }
+    }
+    named += fault_of(solution, kLiar) != nullptr ? 1 : 0;
+    for (const RobotId robot : {kSelf, RobotId{2}, RobotId{3}})
+      EXPECT_EQ(fault_of(solution, robot), nullptr) << "seed " << seed;
+  }
+  EXPECT_LE(beyond, 4);  // of some 4,700
+  EXPECT_GE(named, kSeeds - 1);
+}
+
+TEST(TeamFaults, FindsNoFaultInAHealthyTeam) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    for (double t = 0.0; t < 5.0; t += kIntervalSeconds) {
+      for (const TeamFault& fault : filter.step(team.next()).faults) {
+        ADD_FAILURE() << "seed " << seed << " at " << t << " s, robot " << fault.robot.value
+                      << ": kind " << static_cast<int>(fault.kind) << ", " << fault.size;
+      }
+    }
+  }
+}
+
+// Found by how much, or left out: both are safe.
+TEST(TeamFaults, NamesATurnedCamera) {
+  constexpr RobotId kLiar{4};
+  int measured = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 3.0));
+    const Eigen::Quaterniond turn = so3_exp(radians(8.0) * Eigen::Vector3d(0.6, 0.0, 0.8));
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamBearing& b : interval.bearings)
+        if (b.observer == kLiar) b.bearing.u_B = turn * b.bearing.u_B;
+    };
+    const TeamSolution solution = solution_after(team, filter, 5.0);
+    const TeamFault* fault = fault_of(solution, kLiar);
+    ASSERT_NE(fault, nullptr) << seed;
+    EXPECT_NE(fault->kind, TeamFault::Kind::kRanges);
+    EXPECT_NE(fault->kind, TeamFault::Kind::kGyro);
+    if (fault->kind == TeamFault::Kind::kCameraTurned) {
+      EXPECT_NEAR(fault->size, radians(8.0), radians(1.0)) << seed;
+      ++measured;
+    }
+    for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+      ASSERT_NE(find(solution, robot), nullptr);
+      EXPECT_LT(nees_of(*find(solution, robot), team.truth(robot)), 30.0) << seed;
+      EXPECT_EQ(fault_of(solution, robot), nullptr) << seed;
+    }
+  }
+  EXPECT_GE(measured, 2);
+}
+
+// As when its pair's filter believed it from the beginning: its place fits its own ranges, and all
+// others' contradict. Nobody else is drawn along.
+TEST(TeamFaults, ARobotThatStartsByItsOwnLongRangesMovesNobody) {
+  constexpr RobotId kLiar{4};
+  int beyond = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      const std::vector<TeamRange> by_one = interval.ranges;
+      for (TeamRange range : by_one) {
+        std::swap(range.observer, range.neighbor);
+        interval.ranges.push_back(range);
+      }
+      for (TeamRange& range : interval.ranges)
+        if (range.observer == kLiar) range.reading.range_m += 1.0;
+      for (RelativePoseEdge& edge : interval.edges)
+        if (edge.from == kLiar || edge.to == kLiar)
+          edge.T_from_to.pose.p += edge.T_from_to.pose.p.normalized();
+    };
+    TeamFilter filter;
+    for (double t = 0.0; t < 8.0; t += kIntervalSeconds) {
+      const bool are_alone = t < kProbation;
+      team.sees = [=](RobotId i, RobotId j) {
+        return !are_alone || std::set{i, j} == std::set{kSelf, kLiar};
+      };
+      const TeamSolution solution = filter.step(team.next());
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        if (pose != nullptr && position_nees_of(*pose, team.truth(robot)) > 35.0) ++beyond;
+      }
+    }
+  }
+  EXPECT_EQ(beyond, 0);
+}
+
+// All ranges to and from a robot that this one trusts before it knows anybody else. So the robots
+// that come later contradict the scale, until most pairs do: then the filter begins anew.
+TEST(TeamFaults, AnAntennaDelayThatCameFirstIsOutvoted) {
+  constexpr RobotId kLiar{4};
+  constexpr double kSettled = 6.0;  // s
+  int poses = 0;
+  int beyond = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamRange& range : interval.ranges)
+        if (range.observer == kLiar || range.neighbor == kLiar) range.reading.range_m += 1.0;
+      for (RelativePoseEdge& edge : interval.edges)
+        if (edge.from == kLiar || edge.to == kLiar)
+          edge.T_from_to.pose.p += edge.T_from_to.pose.p.normalized();
+    };
+    TeamFilter filter;
+    for (double t = 0.0; t < 12.0; t += kIntervalSeconds) {
+      const bool are_alone = t < kProbation;
+      team.sees = [=](RobotId i, RobotId j) {
+        return !are_alone || std::set{i, j} == std::set{kSelf, kLiar};
+      };
+      const TeamSolution solution = filter.step(team.next());
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        if (pose == nullptr || t < kSettled) continue;
+        ++poses;
+        if (position_nees_of(*pose, team.truth(robot)) > 35.0) ++beyond;
+      }
+    }
+  }
+  EXPECT_GT(poses, 1000);
+  EXPECT_EQ(beyond, 0);
+}
+
+/// Its gyroscope reads nearly twice its rate.
+void scale_gyro(TeamInterval& interval, RobotId robot) {
+  for (TeamMember& member : interval.members)
+    if (member.robot == robot)
+      for (ImuMean& mean : member.imu) mean.gyro_radps *= 1.9;
+}
+
+TEST(TeamFaults, NamesAFalseGyroscopeAndIsWithoutThatRobotAsLongAsItLasts) {
+  constexpr RobotId kLiar{4};
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 3.0));
+    team.damage = [&](TeamInterval& interval) { scale_gyro(interval, kLiar); };
+    TeamSolution solution;
+    bool is_named = false;
+    for (double t = 0.0; t < 3.0; t += kIntervalSeconds) {
+      solution = filter.step(team.next());
+      const TeamFault* fault = fault_of(solution, kLiar);
+      is_named = is_named || (fault != nullptr && fault->kind == TeamFault::Kind::kGyro);
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        ASSERT_NE(pose, nullptr) << seed;
+        EXPECT_LT(nees_of(*pose, team.truth(robot)), 30.0) << seed << " at " << t;
+      }
+    }
+    EXPECT_TRUE(is_named) << seed;
+    team.damage = [](TeamInterval&) {};
+    solution = solution_after(team, filter, 3.0);
+    for (const TeamFault& fault : solution.faults)
+      ADD_FAILURE() << seed << ": robot " << fault.robot.value << ", kind "
+                    << static_cast<int>(fault.kind) << ", " << fault.size;
+    const TeamPose* pose = find(solution, kLiar);
+    ASSERT_NE(pose, nullptr) << seed;
+    EXPECT_LT(nees_of(*pose, team.truth(kLiar)), 30.0) << seed;
+  }
+}
+
+// Everything that it knows is relative to itself, so it begins anew.
+TEST(TeamFaults, RecoversFromItsOwnFalseGyroscope) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 3.0));
+    team.damage = [](TeamInterval& interval) { scale_gyro(interval, kSelf); };
+    TeamSolution solution = solution_after(team, filter, 2.0);
+    const TeamFault* fault = fault_of(solution, kSelf);
+    ASSERT_NE(fault, nullptr) << seed;
+    EXPECT_EQ(fault->kind, TeamFault::Kind::kGyro);
+    team.damage = [](TeamInterval&) {};
+    solution = solution_after(team, filter, 3.0);
+    for (const TeamFault& found : solution.faults)
+      ADD_FAILURE() << seed << ": robot " << found.robot.value << ", kind "
+                    << static_cast<int>(found.kind) << ", " << found.size;
+    ASSERT_EQ(solution.poses.size(), 3U) << seed;
+    for (const TeamPose& pose : solution.poses) {
+      EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0) << seed;
+      EXPECT_LT(error_of(pose, team.truth(pose.neighbor)).head<3>().norm(), 0.15) << seed;
+    }
+  }
+}
+
+TEST(TeamFaults, NamesRangesThatAreTooLong) {
+  constexpr RobotId kLiar{4};
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamRange& r : interval.ranges)
+        if (r.neighbor == kLiar) std::swap(r.observer, r.neighbor);
+      for (TeamRange& r : interval.ranges)
+        if (r.observer == kLiar) r.reading.range_m += 1.0;
+    };
+    TeamFilter filter;
+    const TeamSolution solution = solution_after(team, filter, 5.0);
+    const TeamFault* fault = fault_of(solution, kLiar);
+    ASSERT_NE(fault, nullptr) << seed;
+    EXPECT_EQ(fault->kind, TeamFault::Kind::kRanges);
+    EXPECT_NEAR(fault->size, 1.0, 0.15) << seed;
+    for (const TeamPose& pose : solution.poses)
+      EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0) << seed;
+  }
+}
+
+// All sensors of a robot are stamped 20 ms late. These robots are slow, so it takes some seconds.
+TEST(TeamFaults, NamesAClockThatIsOff) {
+  constexpr RobotId kLiar{4};
+  constexpr double kLate = 0.02;  // s
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.late_s[kLiar] = kLate;
+    TeamFilter filter;
+    const TeamSolution solution = solution_after(team, filter, 10.0);
+    ASSERT_EQ(solution.faults.size(), 1U) << seed;
+    const TeamFault& fault = solution.faults.front();
+    EXPECT_EQ(fault.robot, kLiar);
+    EXPECT_EQ(fault.kind, TeamFault::Kind::kClock);
+    EXPECT_NEAR(fault.size, kLate, 0.008) << seed;
+    for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+      const TeamPose* pose = find(solution, robot);
+      ASSERT_NE(pose, nullptr) << seed;
+      EXPECT_LT(nees_of(*pose, team.truth(robot)), 30.0) << seed;
+    }
+  }
+}
+
+// The frame moves on by what this robot's own clock says.
+TEST(TeamFaults, NamesItselfIfItsOwnClockIsOff) {
+  SimulatedTeam team(1);
+  team.late_s[kSelf] = 0.02;
+  TeamFilter filter;
+  const TeamSolution solution = solution_after(team, filter, 10.0);
+  ASSERT_EQ(solution.faults.size(), 1U);
+  EXPECT_EQ(solution.faults.front().robot, kSelf);
+  EXPECT_EQ(solution.faults.front().kind, TeamFault::Kind::kClock);
+  EXPECT_GT(solution.faults.front().size, 0.0);
+}
+
+// All estimates of a robot are a metre off at a sigma of 5 cm.
+TEST(TeamFaults, ARobotThatStartsAtAWrongPlaceMovesNobody) {
+  constexpr RobotId kLiar{4};
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      for (RelativePoseEdge& edge : interval.edges) {
+        if (edge.to == kLiar) edge.T_from_to.pose.p += Eigen::Vector3d(0.6, 0.0, 0.8);
+        if (edge.from == kLiar) edge.T_from_to.pose.p -= Eigen::Vector3d(0.6, 0.0, 0.8);
+      }
+    };
+    TeamFilter filter;
+    for (double t = 0.0; t < 8.0; t += kIntervalSeconds) {
+      const bool are_alone = t < kProbation;
+      team.sees = [=](RobotId i, RobotId j) {
+        return !are_alone || std::set{i, j} == std::set{kSelf, kLiar};
+      };
+      for (const TeamPose& pose : filter.step(team.next()).poses) {
+        if (pose.neighbor == kLiar) continue;
+        EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 40.0) << seed << " at " << t;
+      }
+    }
+    const TeamSolution solution = solution_after(team, filter, kIntervalSeconds);
+    for (const TeamPose& pose : solution.poses)
+      EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 40.0) << seed;
+    EXPECT_EQ(solution.poses.size(), 3U) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace crepes
