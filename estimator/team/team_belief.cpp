@@ -133,14 +133,57 @@ int TeamBelief::append(int count, double sigma) {
 }
 
 int TeamBelief::append_calibration(const Priors& priors) {
-  const int index = append(kBias, priors.gyro_scale);
-  const double gyro = priors.gyro_bias_radps * priors.gyro_bias_radps;
-  P.diagonal().segment<3>(index).setConstant(std::max(gyro, kLeastVariance));
-  P.diagonal().segment<3>(index + 3).setConstant(
-      std::max(accel_bias_variance(priors), kLeastVariance));
+  const int index = append(kBias, 0.0);
+  set_imu_prior(index, priors);
   append(1, std::sqrt(0.5 * kShareOfModules) * priors.range_bias_m);
   append(1, kClockSigma);
   return index;
+}
+
+void TeamBelief::set_imu_prior(int bias_index, const Priors& priors) {
+  const auto variance = [](double sigma2) { return std::max(sigma2, kLeastVariance); };
+  auto diagonal = P.diagonal().segment<kBias>(bias_index);
+  diagonal.head<3>().setConstant(variance(priors.gyro_bias_radps * priors.gyro_bias_radps));
+  diagonal.segment<3>(3).setConstant(variance(accel_bias_variance(priors)));
+  diagonal.tail<9>().setConstant(variance(priors.gyro_scale * priors.gyro_scale));
+}
+
+/// The states become independent of all others, and their variance zero.
+void TeamBelief::forget(int index, int count) {
+  P.middleRows(index, count).setZero();
+  P.middleCols(index, count).setZero();
+}
+
+void TeamBelief::place(RobotId id, const FreeMotion& motion,
+                       const Eigen::Matrix<double, kMotion, kMotion>& covariance) {
+  TeamRobot& robot = robots.at(id);
+  robot.motion = motion;
+  forget(robot.motion_index, kMotion);
+  P.block<kMotion, kMotion>(robot.motion_index, robot.motion_index) = covariance;
+}
+
+void TeamBelief::doubt_imu(RobotId id, const Priors& priors) {
+  const int index = robots.at(id).bias_index;
+  forget(index, kBias);
+  set_imu_prior(index, priors);
+}
+
+TeamBelief TeamBelief::calibrations_at(const TeamInterval& interval) const {
+  TeamBelief belief = *this;
+  for (const auto& [id, robot] : robots)
+    if (interval.member(id) == nullptr) belief.remove(id);
+  for (auto& [id, robot] : belief.robots) {
+    for (TeamCamera& camera : robot.cameras) camera.agreement.clear();
+    if (robot.motion_index >= 0)
+      belief.place(id, {}, Eigen::Matrix<double, kMotion, kMotion>::Identity());
+  }
+  for (auto& [pair, range] : belief.ranges) {
+    range.agreement.clear();
+    range.refused_m.clear();
+  }
+  belief.add_drift(interval, to_seconds(interval.from - stamp));
+  belief.stamp = interval.from;
+  return belief;
 }
 
 void TeamBelief::erase(int index, int count) {
@@ -338,14 +381,14 @@ void TeamBelief::advance(const TeamInterval& interval) {
       all.push_back(moved(paths.at(id).end(), end_of_self, self_bias, robot));
   }
   carry(all, end_of_self.noise, P);
-  add_drift(interval);
+  add_drift(interval, to_seconds(interval.to - interval.from));
   stamp = interval.to;
 }
 
 /// What changes by itself: the IMUs' biases, and the pairs' range biases, which return to zero.
-void TeamBelief::add_drift(const TeamInterval& interval) {
+/// At the turn rates of the interval.
+void TeamBelief::add_drift(const TeamInterval& interval, double dt) {
   const ProcessNoise& noise = interval.settings.noise;
-  const double dt = to_seconds(interval.to - interval.from);
   for (auto& [id, robot] : robots) {
     P.diagonal().segment<3>(robot.bias_index).array() += noise.gyro_walk * noise.gyro_walk * dt;
     const double turning =

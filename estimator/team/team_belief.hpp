@@ -28,12 +28,23 @@ struct TeamBelief {
   /// This robot alone, calibrated as well as the priors say.
   [[nodiscard]] static TeamBelief beginning(const TeamInterval& interval);
 
+  /// This earlier belief at the beginning of the interval: the calibrations of all robots that have
+  /// an IMU there. Where the others are is unknown until `place`. Readings since then are
+  /// forgotten.
+  [[nodiscard]] TeamBelief calibrations_at(const TeamInterval& interval) const;
+
   /// Appends independent states of this sigma. Returns their index.
   int append(int count, double sigma);
   /// The states of a robot's IMU and UWB module.
   int append_calibration(const Priors& priors);
   /// For pairs that measure ranges for the first time.
   void append_range_biases(const TeamInterval& interval);
+  /// Sets where a robot is, in the frame of this robot, with the covariance of [p, v, theta].
+  void place(RobotId id, const FreeMotion& motion,
+             const Eigen::Matrix<double, FreeMotionAt::kMotion, FreeMotionAt::kMotion>& covariance);
+  /// Makes a robot's IMU as uncertain as one that was never calibrated. Its errors stay the best
+  /// guess.
+  void doubt_imu(RobotId id, const Priors& priors);
   /// Removes a robot and its states.
   void remove(RobotId id);
 
@@ -59,7 +70,9 @@ struct TeamBelief {
 
  private:
   void erase(int index, int count);
-  void add_drift(const TeamInterval& interval);
+  void forget(int index, int count);
+  void set_imu_prior(int bias_index, const Priors& priors);
+  void add_drift(const TeamInterval& interval, double dt);
 };
 
 /// Near hovering, an accelerometer's scale and axis errors act as a bias that gravity causes.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
@@ -61,46 +62,90 @@ double largest_step(const std::map<RobotId, TeamRobot>& robots, const Eigen::Vec
 TeamSolution TeamFilter::step(const TeamInterval& interval) {
   if (interval.member(interval.self) == nullptr || interval.to <= interval.from) {
     belief_.robots.clear();
+    memory_.clear();
     return {.stamp = interval.to, .poses = {}, .calibrations = {}, .residuals = {}, .faults = {}};
   }
   residuals_.clear();
   if (belief_.robots.empty() || interval.self != belief_.self || interval.from != belief_.stamp)
-    belief_ = TeamBelief::beginning(interval);
+    begin_anew(interval);
   append_cameras(interval);  // before their first interval corrects anything, it is checked
-  remove_members(interval);
-  trust_.end_probations(belief_);
-  append_cameras(interval);
-  belief_.append_range_biases(interval);
-  if (!correct(interval)) belief_ = TeamBelief::beginning(interval);
+  const bool are_placed = !remove_members(interval);
+  if (are_placed) {
+    trust_.end_probations(belief_);
+    append_cameras(interval);
+    belief_.append_range_biases(interval);
+    if (!correct(interval)) begin_anew(interval);
+  }
   belief_.advance(interval);
-  estimates_.add(interval, belief_);
+  if (are_placed) {
+    estimates_.add(interval, belief_);
+    if (!trust_.is_anybody_strained(belief_.stamp)) memory_.add(belief_);
+  }
   TeamSolution solution{.stamp = belief_.stamp,
                         .poses = {},
                         .calibrations = {},
                         .residuals = residuals_,
                         .faults = {}};
-  add_members(interval, exchange_member(interval), solution);
-  report(interval, solution);
+  add_members(interval, exchange_member(interval), are_placed, solution);
+  report(interval, are_placed, solution);
   return solution;
 }
 
-/// A turned camera of a trusted robot has strained everybody's calibration, so that all start anew.
-/// So have robots with false ranges, and this robot's own gyroscope, if it was false.
-void TeamFilter::remove_members(const TeamInterval& interval) {
+/// A turned camera of a trusted robot has strained everybody's calibration, perhaps for long, so
+/// that all start anew. So have robots with false ranges, and this robot's own gyroscope, if it was
+/// false and there is no earlier belief.
+bool TeamFilter::remove_members(const TeamInterval& interval) {
   bool has_strained = false;
   for (const RobotId id : trust_.lost(interval, belief_)) {
     has_strained = has_strained || id == belief_.self;
-    if (id != belief_.self) belief_.remove(id);
+    remove(id);
   }
-  for (const RobotId id : false_gyros(interval)) {
-    has_strained = has_strained || id == belief_.self;
-    if (id != belief_.self) belief_.remove(id);
+  bool has_spoilt = false;
+  const std::vector<RobotId> false_ones = false_gyros(interval);
+  for (const RobotId id : false_ones) {
+    has_spoilt = has_spoilt || belief_.robots.at(id).is_trusted;
+    remove(id);
   }
   for (const RobotId id : trust_.turned(interval, belief_)) {
     has_strained = has_strained || belief_.robots.at(id).is_trusted;
-    if (id != belief_.self) belief_.remove(id);
+    remove(id);
   }
-  if (has_strained || trust_.is_misled(belief_)) belief_ = TeamBelief::beginning(interval);
+  if (!has_strained && !trust_.is_misled(belief_)) {
+    if (!has_spoilt) return false;
+    if (recall(interval, false_ones)) return true;
+    if (std::ranges::find(false_ones, belief_.self) == false_ones.end()) return false;
+  }
+  begin_anew(interval);
+  return false;
+}
+
+/// This robot itself stays.
+void TeamFilter::remove(RobotId id) {
+  if (id == belief_.self) return;
+  belief_.remove(id);
+  memory_.remove(id);
+}
+
+bool TeamFilter::recall(const TeamInterval& interval, const std::vector<RobotId>& false_gyros) {
+  const std::optional<TeamBelief> earlier = memory_.recall(interval.from);
+  if (!earlier) return false;
+  const std::map<RobotId, TeamRobot> present = std::move(belief_.robots);
+  belief_ = earlier->calibrations_at(interval);
+  const bool is_own = std::ranges::find(false_gyros, belief_.self) != false_gyros.end();
+  if (is_own) belief_.doubt_imu(belief_.self, interval.settings.priors);
+  for (auto& [id, robot] : belief_.robots) {
+    const auto now = present.find(id);
+    // This robot's estimates, which will place the others, are as disturbed as the team's were.
+    robot.is_trusted =
+        id == belief_.self || (!is_own && now != present.end() && now->second.is_trusted);
+    if (id != belief_.self && is_own) robot.since = interval.to;
+  }
+  return true;
+}
+
+void TeamFilter::begin_anew(const TeamInterval& interval) {
+  belief_ = TeamBelief::beginning(interval);
+  memory_.clear();
 }
 
 RobotId TeamFilter::exchange_member(const TeamInterval& interval) {
@@ -108,7 +153,7 @@ RobotId TeamFilter::exchange_member(const TeamInterval& interval) {
   if (belief_.robots.size() < interval.settings.max_robots) return {};
   const auto exchange = links_.exchange(belief_.stamp, belief_);
   if (!exchange) return {};
-  belief_.remove(exchange->leaves);
+  remove(exchange->leaves);
   return exchange->joins;
 }
 
@@ -233,8 +278,9 @@ std::vector<bool> TeamFilter::corrected_states(Stage stage) const {
 
 /// Robots that estimates connect to a known one, the most certain first; a place is kept for
 /// `first`, if it is one. When the filter is full, the others are located by their chain of
-/// estimates alone.
-void TeamFilter::add_members(const TeamInterval& interval, RobotId first, TeamSolution& solution) {
+/// estimates alone. Unless the robots of the belief are placed, they are placed here or removed.
+void TeamFilter::add_members(const TeamInterval& interval, RobotId first, bool are_placed,
+                             TeamSolution& solution) {
   std::map<RobotId, TeamPlace> places;
   std::map<RobotId, TeamPlace> candidates;
   const auto add_candidates_from = [&](RobotId known) {
@@ -256,8 +302,10 @@ void TeamFilter::add_members(const TeamInterval& interval, RobotId first, TeamSo
       if (!is_first && place.doubt() < best->second.doubt()) best->second = place;
     }
   };
-  for (const auto& [id, robot] : belief_.robots) places[id] = TeamPlace::of(belief_, id);
-  for (const auto& [id, robot] : belief_.robots) add_candidates_from(id);
+  for (const auto& [id, robot] : belief_.robots)
+    if (are_placed || id == belief_.self) places[id] = TeamPlace::of(belief_, id);
+  const auto placed = places;
+  for (const auto& [id, place] : placed) add_candidates_from(id);
   while (!candidates.empty()) {
     const auto best = std::ranges::min_element(
         candidates, {}, [](const auto& candidate) { return candidate.second.doubt(); });
@@ -265,7 +313,9 @@ void TeamFilter::add_members(const TeamInterval& interval, RobotId first, TeamSo
     candidates.erase(best);
     places[id] = place;
     const std::size_t reserved = first != RobotId{} && first != id ? 1 : 0;
-    if (belief_.robots.size() + reserved < interval.settings.max_robots) {
+    if (belief_.robots.contains(id)) {
+      place_member(id, place);
+    } else if (belief_.robots.size() + reserved < interval.settings.max_robots) {
       if (first == id) first = {};
       add_member(interval, id, place);
     } else if (!has_own_edge(interval, id)) {
@@ -274,29 +324,39 @@ void TeamFilter::add_members(const TeamInterval& interval, RobotId first, TeamSo
     }
     add_candidates_from(id);
   }
+  std::vector<RobotId> unplaced;
+  for (const auto& [id, robot] : belief_.robots)
+    if (!places.contains(id)) unplaced.push_back(id);
+  for (const RobotId id : unplaced) remove(id);
 }
 
 void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const TeamPlace& place) {
   TeamRobot& robot = belief_.robots[id];
-  robot.motion = {place.T_S_N.p, place.v_S_N, place.T_S_N.q};
-  const double doubt = trust_.doubt(id, belief_.stamp);
   robot.motion_index = belief_.append(FreeMotionAt::kMotion, 0.0);
-  auto block = belief_.P.bottomRightCorner<FreeMotionAt::kMotion, FreeMotionAt::kMotion>();
-  block = place.covariance;
-  block.diagonal().head<3>().array() += std::pow(doubt * kStartPosition, 2);
-  block.diagonal().segment<3>(3).array() +=
-      (doubt * doubt - 1.0) * std::pow(TeamPlace::kSpeedSigma, 2);
-  block.diagonal().tail<3>().array() += std::pow(doubt * kStartAttitude, 2);
-  if (const auto turn = trust_.turn_covariance(id)) block.bottomRightCorner<3, 3>() += *turn;
   robot.bias_index = belief_.append_calibration(interval.settings.priors);
-  robot.last_sighting = place.last_sighting;
   robot.since = belief_.stamp;
+  place_member(id, place);
 }
 
-void TeamFilter::report(const TeamInterval& interval, TeamSolution& solution) const {
+void TeamFilter::place_member(RobotId id, const TeamPlace& place) {
+  TeamPlace::Covariance covariance = place.covariance;
+  const double doubt = trust_.doubt(id, belief_.stamp);
+  covariance.diagonal().head<3>().array() += std::pow(doubt * kStartPosition, 2);
+  covariance.diagonal().segment<3>(3).array() +=
+      (doubt * doubt - 1.0) * std::pow(TeamPlace::kSpeedSigma, 2);
+  covariance.diagonal().tail<3>().array() += std::pow(doubt * kStartAttitude, 2);
+  if (const auto turn = trust_.turn_covariance(id)) covariance.bottomRightCorner<3, 3>() += *turn;
+  belief_.place(id, {place.T_S_N.p, place.v_S_N, place.T_S_N.q}, covariance);
+  belief_.robots.at(id).last_sighting = place.last_sighting;
+}
+
+void TeamFilter::report(const TeamInterval& interval, bool are_placed,
+                        TeamSolution& solution) const {
   for (const auto& [id, robot] : belief_.robots) {
-    // On probation it is known worse than by its pair's filter, if there is one.
-    if (robot.motion_index < 0 || (!robot.is_trusted && has_own_edge(interval, id))) continue;
+    // On probation, or placed just now, it is known worse than by its pair's filter, if there is
+    // one.
+    const bool is_new = !robot.is_trusted || !are_placed;
+    if (robot.motion_index < 0 || (is_new && has_own_edge(interval, id))) continue;
     solution.poses.push_back(belief_.team_pose(id, *interval.member(id)));
   }
   std::ranges::sort(solution.poses, {}, &TeamPose::neighbor);

@@ -6,6 +6,7 @@
 #include "estimator/team/estimate_check.hpp"
 #include "estimator/team/team_belief.hpp"
 #include "estimator/team/team_links.hpp"
+#include "estimator/team/team_memory.hpp"
 #include "estimator/team/team_place.hpp"
 #include "estimator/team/team_readings.hpp"
 #include "estimator/team/team_trust.hpp"
@@ -28,6 +29,8 @@ namespace crepes {
 /// still does, it is left out.
 /// `TeamSettings::max_robots` are estimated jointly, those that are best connected with each other.
 /// Robots beyond are located through them.
+/// A gyroscope that was found false has spoilt all calibrations. They are taken from a belief of
+/// some seconds ago, and estimates place the robots again.
 /// Deterministic.
 class TeamFilter {
  public:
@@ -38,7 +41,12 @@ class TeamFilter {
  private:
   using Stage = TeamReadings::Stage;
 
-  void remove_members(const TeamInterval& interval);
+  /// Whether the robots that remain must be placed again.
+  [[nodiscard]] bool remove_members(const TeamInterval& interval);
+  void remove(RobotId id);
+  /// After false gyroscopes. False if there is no earlier belief.
+  [[nodiscard]] bool recall(const TeamInterval& interval, const std::vector<RobotId>& false_gyros);
+  void begin_anew(const TeamInterval& interval);
   [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval);
   /// Whoever joins in exchange for another one; RobotId{} if nobody does.
   [[nodiscard]] RobotId exchange_member(const TeamInterval& interval);
@@ -47,11 +55,14 @@ class TeamFilter {
   [[nodiscard]] bool correct(const TeamInterval& interval);
   [[nodiscard]] bool correct(const TeamInterval& interval, Stage stage, TeamReadings readings);
   [[nodiscard]] std::vector<bool> corrected_states(Stage stage) const;
-  void add_members(const TeamInterval& interval, RobotId first, TeamSolution& solution);
+  void add_members(const TeamInterval& interval, RobotId first, bool are_placed,
+                   TeamSolution& solution);
   void add_member(const TeamInterval& interval, RobotId id, const TeamPlace& place);
-  void report(const TeamInterval& interval, TeamSolution& solution) const;
+  void place_member(RobotId id, const TeamPlace& place);
+  void report(const TeamInterval& interval, bool are_placed, TeamSolution& solution) const;
 
   TeamBelief belief_;
+  TeamMemory memory_;
   TeamTrust trust_;
   TeamLinks links_;
   EstimateCheck estimates_;

@@ -236,6 +236,11 @@ bool TeamTrust::is_strained(RobotId robot, Timestamp now) const {
          now - *doubt->second.found < kStrained;
 }
 
+bool TeamTrust::is_anybody_strained(Timestamp now) const {
+  return std::ranges::any_of(gyro_doubts_,
+                             [&](const auto& entry) { return is_strained(entry.first, now); });
+}
+
 std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBelief& belief) {
   const Witnesses all = witnesses(belief.robots, [&](RobotId observer, const TeamCamera& camera) {
     return is_turned(belief.robots, observer, camera);

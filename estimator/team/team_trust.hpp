@@ -39,6 +39,9 @@ class TeamTrust {
   /// Robots whose gyroscope was found false within the last second.
   [[nodiscard]] std::vector<TeamFault> gyro_faults(Timestamp now) const;
 
+  /// Whether anybody's gyroscope was false of late, so that all states may be disturbed.
+  [[nodiscard]] bool is_anybody_strained(Timestamp now) const;
+
   /// Covariance of the misalignment of its cameras, which is also that of its attitude, in body
   /// axes [rad^2]. Empty if its cameras are as calibrated.
   [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot) const;
