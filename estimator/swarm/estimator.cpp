@@ -271,12 +271,14 @@ Outputs Estimator::State::handle(const GraphSolution& solution) {
 Outputs Estimator::State::handle(const TeamSolution& solution) {
   constexpr Duration kRefusal = std::chrono::milliseconds{300};  // some solutions
   team_log.add(solution);
-  const bool is_gyro_false = std::ranges::any_of(solution.faults, [this](const TeamFault& fault) {
-    return fault.robot == id && fault.kind == TeamFault::Kind::kGyro;
-  });
-  if (is_gyro_false) {
-    self.refused_until = last_tick + kRefusal;
-    tilt_filter.restart();
+  for (const TeamFault& fault : solution.faults) {
+    if (fault.kind != TeamFault::Kind::kGyro) continue;
+    if (fault.robot == id) {
+      self.refused_until = last_tick + kRefusal;
+      tilt_filter.restart();
+    } else if (const auto neighbor = neighbors.find(fault.robot); neighbor != neighbors.end()) {
+      neighbor->second.refuse_imu_until(last_tick + kRefusal);
+    }
   }
   const auto bias_of = [&](RobotId robot) {
     const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);

@@ -39,6 +39,8 @@ class Neighbor {
 
   /// Advances to `now`: fuses the released readings and updates the pose.
   void tick(Timestamp now, const RobotState& self);
+  /// The team found its gyroscope false: no filter runs until then.
+  void refuse_imu_until(Timestamp t) { body_.refused_until = t; }
 
   /// The pose at the last tick.
   [[nodiscard]] const PosePublisher& output() const { return publisher_; }
