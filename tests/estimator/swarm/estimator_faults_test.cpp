@@ -189,23 +189,29 @@ TEST(EstimatorFaults, ASaturatedImuTakesThePoseAwayAndIsReported) {
   EXPECT_LE(Trials(saturate<false>).slowest_return, 500ms);
 }
 
-/// Solutions come ten times a second; ours says for three quarters of a second that the gyroscope
-/// is false.
+/// Solutions come ten times a second; they say for three quarters of a second that our gyroscope or
+/// the neighbor's is false.
+template <bool kOwn>
 void distrust(EstimatorPair& pair, std::uint64_t seed) {
   TeamSolution solution;
-  solution.faults = {{EstimatorPair::kSelf, TeamFault::Kind::kGyro, 0.5}};
+  solution.faults = {
+      {kOwn ? EstimatorPair::kSelf : EstimatorPair::kOther, TeamFault::Kind::kGyro, 0.5}};
   for (Duration time{}; time < 750ms; time += 100ms) {
     pair.solve(solution);
     pair.run_for(100ms);
     EXPECT_EQ(pair.latest(), nullptr) << seed;
   }
-  EXPECT_EQ(pair.status().reason, NoPoseReason::kNoOwnImu) << seed;
+  EXPECT_EQ(pair.status().reason, kOwn ? NoPoseReason::kNoOwnImu : NoPoseReason::kNoPeerImu)
+      << seed;
 }
 
 TEST(EstimatorFaults, AGyroscopeThatTheTeamFoundFalseTakesThePoseAway) {
-  const Trials trials(distrust, 20);
-  EXPECT_LE(trials.slowest_return, 1s);
-  EXPECT_LE(trials.after.dishonest_share(), 0.02);
+  const Trials own(distrust<true>, 20);
+  EXPECT_LE(own.slowest_return, 1s);
+  EXPECT_LE(own.after.dishonest_share(), 0.02);
+  const Trials others(distrust<false>, 20);
+  EXPECT_LE(others.slowest_return, 1s);
+  EXPECT_LE(others.after.dishonest_share(), 0.02);
 }
 
 TEST(EstimatorFaults, HundredStartsAfterASaturatedImuAreHonest) {
