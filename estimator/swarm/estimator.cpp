@@ -290,9 +290,10 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
       neighbor->second.add(TeamEstimate{solution.stamp, pose, bias_of(id), bias_of(pose.neighbor)});
   }
   Outputs outputs;
-  if (keeps_records)
+  if (keeps_records) {
     outputs.records.team.push_back(
         {solution.stamp, solution.residuals, solution.calibrations, solution.faults});
+  }
   return outputs;
 }
 

@@ -300,9 +300,10 @@ TeamPose TeamBelief::team_pose(RobotId id, const TeamMember& member) const {
   pose.covariance.topLeftCorner<kMotion, kMotion>() = 0.5 * (of_motion + of_motion.transpose());
   pose.covariance.topRightCorner<kMotion, kBiases>() = with_biases;
   pose.covariance.bottomLeftCorner<kBiases, kMotion>() = with_biases.transpose();
-  for (int i = 0; i < kBiases; ++i)
+  for (int i = 0; i < kBiases; ++i) {
     pose.covariance.bottomRightCorner<kBiases, kBiases>().row(i) =
         of_biases(biases.at(static_cast<std::size_t>(i / 6)) + i % 6);
+  }
   return pose;
 }
 

@@ -84,11 +84,11 @@ SimConfig sim_config(const DemoOptions& options, const fs::path& dir) {
 class Demo {
  public:
   /// With robots that are steered if the world has a track, which must exist.
-  Demo(const DemoOptions& options, const SimConfig& sim, std::optional<SteeredSwarm> steered)
-      : options_(options),
-        sim_(sim),
+  Demo(DemoOptions options, SimConfig sim, std::optional<SteeredSwarm> steered)
+      : options_(std::move(options)),
+        sim_(std::move(sim)),
         steered_(std::move(steered)),
-        world_(sim),
+        world_(sim_),
         start_(clock_.now()) {}
 
   Result<void> start(const fs::path& dir) {
@@ -150,8 +150,11 @@ class Demo {
       const fs::path file = dir / "truth" / (name_of_robot(id) + ".csv");
       std::ofstream out(file);
       out << "# t, p_W (3), q_WB (4), v_W (3)\n";
-      for (double t_s = 0.0; t_s < end_s_; t_s += kTrackPeriod)
+      const int rows = static_cast<int>(std::ceil(end_s_ / kTrackPeriod));
+      for (int i = 0; i < rows; ++i) {
+        const double t_s = i * kTrackPeriod;
         out << truth_row(world_.state(id, t_s), t_s);
+      }
       out.close();
       if (!out) return fail(ErrorCode::kIo, file.string() + ": cannot be written");
     }
