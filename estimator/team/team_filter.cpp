@@ -79,7 +79,7 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
   belief_.advance(interval);
   if (are_placed) {
     estimates_.add(interval, belief_);
-    if (!trust_.is_anybody_strained(belief_.stamp)) memory_.add(belief_);
+    if (!trust_.is_everybody_strained(belief_.stamp)) memory_.add(belief_);
   }
   TeamSolution solution{.stamp = belief_.stamp,
                         .poses = {},

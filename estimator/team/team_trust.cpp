@@ -16,6 +16,7 @@ constexpr Duration kVerdictLife = std::chrono::seconds{20};  // then a camera is
 constexpr int kRefusedAt = 4;  // convictions: realigned, as calibrated, realigned, refused
 constexpr Duration kProbation = std::chrono::seconds{1};
 constexpr Duration kLateProbation = std::chrono::seconds{3};
+constexpr int kMostDoublings = 5;  // of a probation, that is 32 s
 constexpr Duration kLossMemory = std::chrono::seconds{10};
 constexpr double kDoubtPerLoss = 4.0;
 // A misalignment is a fault beyond so many sigmas of its prior and of its estimate.
@@ -30,8 +31,9 @@ constexpr double kWrongClock = 8e-3;          // s
 constexpr double kGyroMemory = 0.5;           // s
 constexpr double kFalseGyro = 60.0;           // chi-square within that time
 constexpr Duration kGyroRefusal = std::chrono::seconds{1};
-constexpr Duration kStrained = std::chrono::seconds{2};  // by a false gyroscope
-constexpr int kLeastRefused = 3;                         // pairs
+constexpr Duration kGyroRecord = std::chrono::seconds{60};  // then it is as good as any other
+constexpr Duration kStrained = std::chrono::seconds{2};     // by a false gyroscope
+constexpr int kLeastRefused = 3;                            // pairs
 
 /// How many cameras agree with each robot's place, and how many contradict it.
 using Witnesses = std::map<RobotId, Agreement>;
@@ -220,6 +222,10 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
     if (doubt.chi2 <= kFalseGyro) continue;
     doubt.found = belief.stamp;
     doubt.rate_radps = check.contradiction->rate_radps;
+    if (belief.robots.at(id).is_trusted) {
+      const bool is_repeated = belief.stamp - doubt.as_trusted.last < kGyroRecord;
+      doubt.as_trusted = {belief.stamp, is_repeated ? doubt.as_trusted.count + 1 : 1};
+    }
     robots.push_back(id);
     // The gyroscope may have caused what its camera was blamed for.
     if (const auto verdict = verdicts_.find(id); verdict != verdicts_.end())
@@ -236,9 +242,11 @@ bool TeamTrust::is_strained(RobotId robot, Timestamp now) const {
          now - *doubt->second.found < kStrained;
 }
 
-bool TeamTrust::is_anybody_strained(Timestamp now) const {
-  return std::ranges::any_of(gyro_doubts_,
-                             [&](const auto& entry) { return is_strained(entry.first, now); });
+bool TeamTrust::is_everybody_strained(Timestamp now) const {
+  return std::ranges::any_of(gyro_doubts_, [&](const auto& entry) {
+    const Losses& as_trusted = entry.second.as_trusted;
+    return as_trusted.count > 0 && now - as_trusted.last < kStrained;
+  });
 }
 
 std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBelief& belief) {
@@ -383,12 +391,21 @@ void TeamTrust::end_probations(TeamBelief& belief) const {
   }
   for (auto& [id, robot] : belief.robots) {
     const Agreement& agreement = all[id];
-    const Duration probation = has_misled(id, belief.stamp) ? kLateProbation : kProbation;
-    const bool is_long_enough = belief.stamp - robot.since >= probation;
+    const bool is_long_enough = belief.stamp - robot.since >= probation(id, belief.stamp);
     if (is_long_enough && agreement.fused > 4.0 * agreement.gated + 2.0 &&
         !is_placed_by_its_own_ranges(belief, id))
       robot.is_trusted = true;
   }
+}
+
+/// A gyroscope that is false now and then costs everybody something each time that its robot is
+/// trusted. So each time the next probation is twice as long.
+Duration TeamTrust::probation(RobotId robot, Timestamp now) const {
+  const Duration least = has_misled(robot, now) ? kLateProbation : kProbation;
+  const auto doubt = gyro_doubts_.find(robot);
+  if (doubt == gyro_doubts_.end()) return least;
+  const int repeated = std::clamp(doubt->second.as_trusted.count - 1, 0, kMostDoublings);
+  return std::max(least, kProbation * (1 << repeated));
 }
 
 std::vector<TeamFault> TeamTrust::gyro_faults(Timestamp now) const {

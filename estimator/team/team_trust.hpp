@@ -39,8 +39,9 @@ class TeamTrust {
   /// Robots whose gyroscope was found false within the last second.
   [[nodiscard]] std::vector<TeamFault> gyro_faults(Timestamp now) const;
 
-  /// Whether anybody's gyroscope was false of late, so that all states may be disturbed.
-  [[nodiscard]] bool is_anybody_strained(Timestamp now) const;
+  /// Whether the gyroscope of a trusted robot was false of late, so that all states may be
+  /// disturbed.
+  [[nodiscard]] bool is_everybody_strained(Timestamp now) const;
 
   /// Covariance of the misalignment of its cameras, which is also that of its attitude, in body
   /// axes [rad^2]. Empty if its cameras are as calibrated.
@@ -59,6 +60,7 @@ class TeamTrust {
     double chi2 = 0.0;               ///< of the latest intervals
     std::optional<Timestamp> found;  ///< when it was last too large
     double rate_radps = 0.0;         ///< how wrong the gyroscope was then
+    Losses as_trusted;               ///< when it was found although the robot was trusted
   };
   struct Verdict {
     Timestamp shown{};  ///< when its camera was last found turned; after a while it may be repaired
@@ -72,6 +74,7 @@ class TeamTrust {
   [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
   [[nodiscard]] bool is_realigned(RobotId robot) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
+  [[nodiscard]] Duration probation(RobotId robot, Timestamp now) const;
   [[nodiscard]] int recent_losses(RobotId robot, Timestamp now) const;
 
   std::map<RobotId, Losses> losses_;

@@ -314,6 +314,44 @@ TEST(TeamFaults, AFalseGyroscopeCostsNobodyWhatWasLearnedOfHisCamera) {
   }
 }
 
+// Again and again its robot is trusted, found false, and leaves. The others go on learning.
+TEST(TeamFaults, AGyroscopeThatIsFalseNowAndThenForAMinuteCostsTheOthersLittle) {
+  constexpr RobotId kLiar{4};
+  constexpr double kMinute = 60.0;
+  for (const double period_s : {1.4, 2.0, 3.0, 5.0}) {
+    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+      const auto label = testing::Message() << "every " << period_s << " s, seed " << seed;
+      SimulatedTeam team(seed);
+      TeamFilter filter;
+      team.damage = [&](TeamInterval& interval) {
+        const double since_s = to_seconds(interval.from.time_since_epoch());
+        if (std::fmod(since_s, period_s) < 0.4) scale_gyro(interval, kLiar);
+      };
+      TeamSolution solution = solution_after(team, filter, 5.0);
+      int absent = 0;
+      for (double t = 0.0; t < kMinute; t += kIntervalSeconds) {
+        solution = filter.step(team.next());
+        for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+          const TeamPose* pose = find(solution, robot);
+          if (pose == nullptr) {
+            ++absent;
+          } else {
+            EXPECT_LT(position_nees_of(*pose, team.truth(robot)), 35.0) << label << " at " << t;
+          }
+        }
+      }
+      EXPECT_LE(absent, 8) << label;  // of 1,200: both of them, at most four times
+
+      SimulatedTeam others(seed);
+      others.sees = [=](RobotId i, RobotId j) { return i != kLiar && j != kLiar; };
+      TeamFilter unharmed;
+      const TeamSolution alone = solution_after(others, unharmed, 5.0 + kMinute);
+      for (const RobotId robot : {RobotId{2}, RobotId{3}})
+        EXPECT_LT(camera_sigma_of(solution, robot), 1.1 * camera_sigma_of(alone, robot)) << label;
+    }
+  }
+}
+
 TEST(TeamFaults, NamesRangesThatAreTooLong) {
   constexpr RobotId kLiar{4};
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
