@@ -2,9 +2,10 @@
 
 step() { printf '\n== %s  (%s s)\n' "$*" "$SECONDS"; }
 
-# install_packages [PACKAGE...]: installs what packages.txt lists and is not there, and these.
+# install_packages [PACKAGE...]: installs what packages.txt lists and is not there, and these. What
+# the archive does not have, as Ubuntu has no chromium but as a snap, is named and left out.
 install_packages() {
-  local wanted missing=() as_root=()
+  local wanted missing=() absent=() found=() as_root=()
   mapfile -t wanted < <(grep -v -e '^#' -e '^$' packages.txt)
   for package in "${wanted[@]}" "$@"; do
     dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
@@ -14,8 +15,14 @@ install_packages() {
   step "install ${missing[*]}"
   [ "$(id -u)" -eq 0 ] || as_root=(sudo)
   "${as_root[@]}" apt-get update -qq
+  for package in "${missing[@]}"; do
+    if apt-cache show "$package" >/dev/null 2>&1; then found+=("$package")
+    else absent+=("$package"); fi
+  done
+  [ ${#absent[@]} -eq 0 ] || step "not in this system's archive: ${absent[*]}"
+  [ ${#found[@]} -eq 0 ] && return
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-    apt-get install -y -qq --no-install-recommends "${missing[@]}"
+    apt-get install -y -qq --no-install-recommends "${found[@]}"
 }
 
 # build PRESET [TARGET...]: configures, and builds these targets or all.

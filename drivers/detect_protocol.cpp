@@ -8,6 +8,7 @@
 #include "drivers/imu/vectornav.hpp"
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/imu/xsens.hpp"
+#include "drivers/uwb/bu03.hpp"
 #include "drivers/uwb/dwm1001.hpp"
 #include "drivers/uwb/fira_uci.hpp"
 #include "drivers/uwb/mauwb.hpp"
@@ -34,6 +35,7 @@ constexpr std::array kCandidates{
     Candidate{SerialProtocol::kDwm1001Tlv, "dwm1001_tlv", &Dwm1001Tlv::examine},
     Candidate{SerialProtocol::kMaUwb, "mauwb", &MaUwb::examine},
     Candidate{SerialProtocol::kFiraUci, "fira", &FiraUci::examine},
+    Candidate{SerialProtocol::kBu03, "bu03", &Bu03::examine},
     Candidate{SerialProtocol::kRangeLine, "lines", &examine_range_line},
     Candidate{SerialProtocol::kWitMotion, "witmotion", &WitMotion::examine},
     Candidate{SerialProtocol::kHipnuc, "hipnuc", &Hipnuc::examine},

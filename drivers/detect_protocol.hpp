@@ -16,6 +16,7 @@ enum class SerialProtocol : std::uint8_t {
   kDwm1001Tlv,
   kMaUwb,
   kFiraUci,
+  kBu03,
   kRangeLine,
   kWitMotion,
   kHipnuc,

@@ -16,6 +16,7 @@
 #include "drivers/imu/xsens.hpp"
 #include "drivers/serial/device_name.hpp"
 #include "drivers/serial/serial_reader.hpp"
+#include "drivers/uwb/bu03.hpp"
 #include "drivers/uwb/dwm1001.hpp"
 #include "drivers/uwb/fira_uci.hpp"
 #include "drivers/uwb/mauwb.hpp"
@@ -134,6 +135,8 @@ OpenDevice uwb_device(SerialProtocol protocol, const UwbSensorSettings& settings
       return with(std::type_identity<MaUwbParser>());
     case SerialProtocol::kFiraUci:
       return with(std::type_identity<FiraUciParser>());
+    case SerialProtocol::kBu03:
+      return with(std::type_identity<Bu03Parser>());
     case SerialProtocol::kRangeLine:
       return with(std::type_identity<RangeLineParser>());
     default:
@@ -236,6 +239,8 @@ OpenDevice configured_uwb(const UwbSensorSettings& settings, const Clock& clock,
       return device_of(SerialProtocol::kMaUwb);
     case UwbProtocol::kFiraUci:
       return device_of(SerialProtocol::kFiraUci);
+    case UwbProtocol::kBu03:
+      return device_of(SerialProtocol::kBu03);
     case UwbProtocol::kRangeLine:
       return device_of(SerialProtocol::kRangeLine);
     case UwbProtocol::kAuto:

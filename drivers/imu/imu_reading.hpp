@@ -30,6 +30,7 @@ struct ImuReading {
   Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
   std::optional<DeviceTime> time = std::nullopt;  ///< of sensors that have a clock
+  std::string_view no_sample = {};  ///< the name of a frame without rate and acceleration
 };
 
 /// False for values that are not finite or beyond every sensor's range, and for exactly zero
@@ -93,17 +94,21 @@ class ImuFrameParser {
   [[nodiscard]] static FrameCheck examine(Bytes bytes) { return Protocol::examine(bytes); }
 
   void parse(Bytes frame, Timestamp arrival, const std::function<void(const ImuSample&)>& sink) {
-    forward_sample(Protocol::read(frame), arrival, clock_, counts_, sink);
+    const ImuReading reading = Protocol::read(frame);
+    no_sample_ = reading.no_sample;
+    forward_sample(reading, arrival, clock_, counts_, sink);
   }
 
-  [[nodiscard]] static std::string no_measurement_reason() {
-    return std::string(Protocol::kNoSamples);
+  [[nodiscard]] std::string no_measurement_reason() const {
+    if (no_sample_.empty()) return std::string(Protocol::kNoSamples);
+    return "the sensor sends " + std::string(no_sample_) + "; " + std::string(Protocol::kNoSamples);
   }
   [[nodiscard]] const ImuCounts& counts() const { return counts_; }
 
  private:
   DeviceClock clock_;
   ImuCounts counts_;
+  std::string_view no_sample_;  ///< of the last frame
 };
 
 }  // namespace crepes

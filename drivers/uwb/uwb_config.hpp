@@ -18,6 +18,7 @@ enum class UwbProtocol : std::uint8_t {
   kDwm1001Tlv,
   kMaUwb,
   kFiraUci,
+  kBu03,
   kRangeLine
 };
 inline constexpr std::array kUwbProtocols{Choice{"auto", UwbProtocol::kAuto},
@@ -26,6 +27,7 @@ inline constexpr std::array kUwbProtocols{Choice{"auto", UwbProtocol::kAuto},
                                           Choice{"dwm1001_tlv", UwbProtocol::kDwm1001Tlv},
                                           Choice{"mauwb", UwbProtocol::kMaUwb},
                                           Choice{"fira", UwbProtocol::kFiraUci},
+                                          Choice{"bu03", UwbProtocol::kBu03},
                                           Choice{"lines", UwbProtocol::kRangeLine}};
 
 /// The serial line.

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "drivers/detect_protocol.hpp"
+#include "drivers/uwb/bu03.hpp"
 #include "drivers/uwb/dwm1001.hpp"
 #include "drivers/uwb/fira_uci.hpp"
 #include "drivers/uwb/mauwb.hpp"
@@ -283,6 +285,52 @@ TEST(FiraUci, RefusesCountsThatDoNotFitAndOtherKindsOfRanging) {
   bytes = bytes_of(kShort);
   bytes[17] = 0x02;
   EXPECT_EQ(FiraUci::examine(bytes).kind, FrameKind::kNone);
+}
+
+/// The first 35 bytes are of a board, as its user published them with what they mean: 2.030 m to
+/// station 0, 1.240 m to station 1. The last two are as the drivers of two other users expect them.
+const char* const kBu03 =
+    "aa 25 01 ee 07 00 00 d8 04 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 "
+    "00 00 00 00 00 55";
+
+TEST(Bu03, ReadsThePublishedFrame) {
+  Bu03Parser parser(modules_of({0, 1, 2}), 200.0, 8);
+
+  const auto ranges = ranges_in(parser, bytes_of(kBu03));
+
+  ASSERT_EQ(ranges.size(), 2U);
+  EXPECT_EQ(ranges[0].neighbor, RobotId{1});
+  EXPECT_DOUBLE_EQ(ranges[0].range_m, 2.030);
+  EXPECT_EQ(ranges[1].neighbor, RobotId{2});
+  EXPECT_DOUBLE_EQ(ranges[1].range_m, 1.240);
+  EXPECT_EQ(parser.counts().implausible, 0U);
+}
+
+TEST(Bu03, FindsFramesInEveryChunkSizeAndAfterEveryCut) {
+  const auto good = bytes_of(kBu03);
+  for (std::size_t chunk = 1; chunk <= good.size(); ++chunk)
+    EXPECT_EQ(decode<Bu03Parser>(good + good, chunk), (Frames{good, good})) << chunk;
+  for (std::size_t length = 0; length < good.size(); ++length) {
+    expect_only_good_frames<Bu03Parser>(
+        {good.begin(), good.begin() + static_cast<std::ptrdiff_t>(length)}, good, length);
+  }
+}
+
+TEST(Bu03, RefusesFramesThatCannotBe) {
+  auto bytes = bytes_of(kBu03);
+  bytes[36] = 0x54;
+  EXPECT_EQ(Bu03::examine(bytes).kind, FrameKind::kNone);
+  bytes = bytes_of(kBu03);
+  bytes[6] = 0x01;  // 16 779 m
+  EXPECT_EQ(Bu03::examine(bytes).kind, FrameKind::kNone);
+  bytes = bytes_of(kBu03);
+  std::copy_n(bytes.begin(), 3, bytes.begin() + 20);
+  EXPECT_EQ(Bu03::examine(bytes).kind, FrameKind::kNone);
+}
+
+TEST(Bu03, IsRecognized) {
+  const auto good = bytes_of(kBu03);
+  EXPECT_EQ(detect_protocol(good + good + good), SerialProtocol::kBu03);
 }
 
 }  // namespace

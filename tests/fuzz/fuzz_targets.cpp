@@ -16,6 +16,7 @@
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/imu/xsens.hpp"
 #include "drivers/serial/byte_fields.hpp"
+#include "drivers/uwb/bu03.hpp"
 #include "drivers/uwb/dwm1001.hpp"
 #include "drivers/uwb/fira_uci.hpp"
 #include "drivers/uwb/mauwb.hpp"
@@ -301,6 +302,13 @@ constexpr std::array kTargets{
           frame.resize(60);
           return std::vector<FuzzInput>{piece_by_piece(frame)};
         }},
+    FuzzTarget{"bu03", &run_uwb<Bu03Parser>,
+               [] {
+                 FuzzInput frame = bytes_of("aa 25 01 ee 07 00 00 d8 04 00 00");
+                 frame.resize(37);
+                 frame.back() = 0x55;
+                 return std::vector<FuzzInput>{piece_by_piece(frame)};
+               }},
     FuzzTarget{"witmotion", [](Bytes data) { run_stream(data, WitMotionParser()); },
                [] { return recorded("imu", "witmotion_hwt905"); }},
     FuzzTarget{"witmotion_ble", [](Bytes data) { run_stream(data, WitMotionBleParser()); },

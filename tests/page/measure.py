@@ -1,11 +1,13 @@
 #!/usr/bin/python3
 """What the page costs: its size, the server's bytes and CPU with robots at 50 Hz and open pages, latency and rate of the pictures.
-    tests/page/measure.py [SECONDS]"""
+The median of RUNS (3) of SECONDS (10) each, and the least and the greatest of what varies most.
+    tests/page/measure.py [SECONDS [RUNS]]"""
 import gzip
 import json
 import pathlib
 import select
 import socket
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -17,6 +19,13 @@ from fake_daemon import FakeDaemon
 from viewer import SOURCE, TOOL, Viewer, cpu_s
 
 PORT = 47583
+
+
+def medians(runs, measure, *arguments):
+    """Of each column of what `measure` returns, and the least and greatest of the first."""
+    rows = [measure(*arguments) for _ in range(runs)]
+    first = [row[0] for row in rows]
+    return [statistics.median(column) for column in zip(*rows)], (min(first), max(first))
 
 
 def size_of_the_page():
@@ -175,25 +184,27 @@ def live_pictures(robots, seconds):
     browser.close()
     viewer.stop()
     daemon.stop()
-    return sorted(latencies), rate, share
+    latencies.sort()
+    return latencies[len(latencies) // 2], latencies[len(latencies) * 95 // 100], rate, share
 
 
 if __name__ == "__main__":
     duration = float(sys.argv[1]) if len(sys.argv) > 1 else 10
+    runs = int(sys.argv[2]) if len(sys.argv) > 2 else 3
     print("page: {} bytes, {} compressed".format(*size_of_the_page()))
-    for robots, pages in ((2, 1), (5, 0), (5, 1), (5, 10), (20, 1), (20, 10)):
-        share, rate = cost(robots, pages, duration)
-        print(f"{robots} robots, {pages} pages: {100 * share:.1f} % of a core, {rate / 1000:.1f} kB/s to each page")
+    for robots, pages in ((2, 1), (2, 10), (5, 0), (5, 1), (5, 10), (20, 1), (20, 10)):
+        (share, rate), (least, most) = medians(runs, cost, robots, pages, duration)
+        print(f"{robots} robots, {pages} pages: {100 * share:.1f} % of a core ({100 * least:.1f} to {100 * most:.1f}), {rate / 1000:.1f} kB/s to each page")
     for pages in (1, 10):
-        share, rate, pictures = cost_of_pictures(pages, duration)
+        (share, rate, pictures), _ = medians(runs, cost_of_pictures, pages, duration)
         print(f"5 robots, {pages} pages with the camera: {100 * share:.1f} % of a core, {rate / 1000:.1f} kB/s to each page, {pictures:.1f} pictures a second")
     for share, median, worst, pictures in cost_to_the_daemon(duration):
         print(f"daemon with {pictures:.1f} looks a second: {100 * share:.1f} % of a core; a picture's delay to its spots {median} us median, {worst} us 99 %")
     try:
         times, period = first_picture()
         for robots in (2, 5, 20):
-            late, pictures, share = live_pictures(robots, duration)
-            print(f"{robots} robots: POSE to picture {late[len(late) // 2]:.0f} ms median, {late[len(late) * 95 // 100]:.0f} ms 95 %; {pictures:.1f} pictures a second; "
+            (middle, late, pictures, share), (least, most) = medians(runs, live_pictures, robots, duration)
+            print(f"{robots} robots: POSE to picture {middle:.0f} ms median ({least:.0f} to {most:.0f}), {late:.0f} ms 95 %; {pictures:.1f} pictures a second; "
                   f"{100 * share:.0f} % of a core in the page")
         print(f"first robot in the scene after {', '.join(f'{t:.2f}' for t in times)} s; frames every {1000 * period:.0f} ms")
     except CannotStart as why:

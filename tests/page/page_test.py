@@ -181,6 +181,17 @@ class Live(PageTest):
                 self.assertLessEqual(page.value("document.documentElement.scrollWidth"), width, f"{width}, panel {key}")
                 self.assertLessEqual(page.value("document.documentElement.scrollHeight"), height, f"{width}, panel {key}")
 
+    def test_the_header_of_the_scene_is_one_line(self):
+        page = self.open(self.viewer)
+        for width in (768, 860, 1280, 1440, 1920):
+            page.size(width, 800)
+            page.wait(f"innerWidth === {width}")
+            rows, names = page.value("""(() => { const seen = [...document.querySelector('#scene .bar').children].filter((child) => child.offsetHeight > 0);
+                return [new Set(seen.map((child) => { const { top, height } = child.getBoundingClientRect(); return Math.round((top + height / 2) / 8); })).size,
+                  seen.map((child) => child.textContent.trim())]; })()""")
+            self.assertIn("Save PNG", names)
+            self.assertEqual(rows, 1, f"{width}: {names}")
+
     def test_links_have_residuals_and_air(self):
         page = self.open(self.viewer)
         cell = "[...document.querySelectorAll('#links tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent))[0]"
