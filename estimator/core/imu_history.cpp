@@ -63,13 +63,14 @@ bool ImuHistory::push(const ImuSample& sample) {
   return true;
 }
 
-std::optional<ImuHistory::Recent> ImuHistory::recent() const {
-  constexpr int kSamples = SignalModel::Window::ColsAtCompileTime;
+template <class Samples>
+std::optional<ImuHistory::Recent<Samples>> ImuHistory::recent() const {
+  constexpr int kSamples = Samples::ColsAtCompileTime;
   if (size_ < kSamples) return std::nullopt;
   const Duration span = newest().stamp - (*this)[size_ - kSamples].stamp;
   const Duration pace = span / (kSamples - 1);
   if (pace > kMaxGap) return std::nullopt;
-  Recent recent{.gyro = {}, .accel = {}, .period_s = to_seconds(pace)};
+  Recent<Samples> recent{.gyro = {}, .accel = {}, .period_s = to_seconds(pace)};
   for (int back = 0; back < kSamples; ++back) {
     const std::size_t i = size_ - 1 - static_cast<std::size_t>(back);
     if (back > 0 && (*this)[i + 1].stamp - (*this)[i].stamp > 2 * pace) return std::nullopt;
@@ -80,31 +81,36 @@ std::optional<ImuHistory::Recent> ImuHistory::recent() const {
 }
 
 void ImuHistory::observe_motion() {
-  if (const auto samples = recent()) {
+  if (const auto samples = recent<SignalModel::Past>()) {
     gyro_.observe(samples->gyro, samples->period_s);
     accel_.observe(samples->accel, samples->period_s);
   }
 }
 
 // The newest sample is the mean since the one before, so it is the value in the middle of that
-// time. The prediction is limited to the horizon for which its weights were estimated.
+// time.
+double ImuHistory::strides_to(Timestamp from, Timestamp to, double period_s) const {
+  const double since = 0.5 * (to_seconds(from - newest().stamp) + to_seconds(to - newest().stamp));
+  return std::max(0.0, since / period_s + 0.5) / SignalModel::kStride;
+}
+
+// The prediction is limited to the horizons for which there are weights.
 void ImuHistory::add_predicted(Timestamp from, Timestamp to, ImuMean& sum) const {
   const double dt = to_seconds(to - from);
   add(newest(), dt, sum);
-  if (const auto samples = recent()) {
-    const double since =
-        0.5 * (to_seconds(from - newest().stamp) + to_seconds(to - newest().stamp));
-    const double strides =
-        std::clamp(since / samples->period_s + 0.5, 0.0, double{SignalModel::kStride}) /
-        SignalModel::kStride;
-    sum.gyro_radps += dt * strides * gyro_.next_change(samples->gyro);
-    sum.accel_mps2 += dt * strides * accel_.next_change(samples->accel);
-  }
+  const auto samples = recent<SignalModel::Window>();
+  if (!samples) return;
+  const double strides = strides_to(from, to, samples->period_s);
+  sum.gyro_radps += dt * gyro_.change_after(strides, samples->gyro);
+  sum.accel_mps2 += dt * accel_.change_after(strides, samples->accel);
+  sum.gyro_innovation_density = gyro_.innovation_density(strides);
+  sum.accel_innovation_density = accel_.innovation_density(strides);
 }
 
 ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
   CREPES_EXPECT(size_ > 0 && from < to, "mean over an interval with samples");
-  ImuMean sum;
+  ImuMean sum{.gyro_innovation_density = gyro_.innovation_density(),
+              .accel_innovation_density = accel_.innovation_density()};
   const auto extrapolate = [&](double since, double dt) {
     sum.extrapolated += dt;
     sum.extrapolation_time2_s2 += extrapolation_time_squared(since, dt);
@@ -133,8 +139,8 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
           .extrapolation_time2_s2 = sum.extrapolation_time2_s2 / width,
           .gyro_noise_density = gyro_.noise_density(),
           .accel_noise_density = accel_.noise_density(),
-          .gyro_innovation_density = gyro_.innovation_density(),
-          .accel_innovation_density = accel_.innovation_density()};
+          .gyro_innovation_density = sum.gyro_innovation_density,
+          .accel_innovation_density = sum.accel_innovation_density};
 }
 
 Eigen::Quaterniond ImuHistory::rotation(Timestamp from, Timestamp to) const {

@@ -63,13 +63,17 @@ class ImuHistory {
   ImuSample& slot(std::size_t i) { return samples_[(first_ + i) % kCapacity]; }
   [[nodiscard]] std::size_t first_after(Timestamp t) const;
   /// The newest samples, if they are equally spaced.
+  template <class Samples>
   struct Recent {
-    SignalModel::Window gyro;
-    SignalModel::Window accel;
+    Samples gyro;
+    Samples accel;
     double period_s = 0.0;
   };
-  [[nodiscard]] std::optional<Recent> recent() const;
+  template <class Samples>
+  [[nodiscard]] std::optional<Recent<Samples>> recent() const;
   void observe_motion();
+  /// Strides from the newest sample to the middle of an interval beyond it.
+  [[nodiscard]] double strides_to(Timestamp from, Timestamp to, double period_s) const;
   void add_predicted(Timestamp from, Timestamp to, ImuMean& sum) const;
 
   std::array<ImuSample, kCapacity> samples_{};

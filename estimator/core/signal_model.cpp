@@ -1,7 +1,9 @@
 #include "estimator/core/signal_model.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 namespace crepes {
 namespace {
@@ -11,45 +13,75 @@ constexpr double kPredictionShare = 0.01;  // ... in the prediction's weights: 1
 constexpr double kRidge = 1e-3;            // of the changes' power, in both
 constexpr double kMostGrowth = 2.0;        // from one change to the next
 
-// The last two changes before sample `now` of a window, as columns, the later one first.
-Eigen::Matrix<double, 3, 2> changes_before(const SignalModel::Window& window, int now) {
-  const auto sample = [&](int strides) { return window.col(now + strides * SignalModel::kStride); };
-  Eigen::Matrix<double, 3, 2> changes;
-  changes << sample(0) - sample(1), sample(1) - sample(2);
+using Changes = Eigen::Matrix<double, 3, SignalModel::kChanges>;
+
+// The last changes before sample `now`, as columns, the latest one first.
+template <class Samples>
+Changes changes_before(const Samples& samples, int now) {
+  Changes changes;
+  for (int i = 0; i < SignalModel::kChanges; ++i) {
+    const int later = now + i * SignalModel::kStride;
+    changes.col(i) = samples.col(later) - samples.col(later + SignalModel::kStride);
+  }
   return changes;
+}
+
+// Between the values at whole strides; `value_at(0)` is before the first.
+template <class ValueAt>
+auto interpolated(double strides, ValueAt value_at) {
+  const double inside = std::clamp(strides, 0.0, double{SignalModel::kHorizons});
+  const int below = std::min(static_cast<int>(inside), SignalModel::kHorizons - 1);
+  const double part = inside - below;
+  return ((1 - part) * value_at(below) + part * value_at(below + 1)).eval();
 }
 
 }  // namespace
 
-void SignalModel::observe(const Window& window, double period_s) {
+void SignalModel::observe(const Past& past, double period_s) {
   const auto smooth = [](double value, double& mean) { mean += kNoiseShare * (value - mean); };
   // White noise of variance s^2 has second differences of variance 6 s^2, on each of three axes.
-  const Eigen::Vector3d second = window.col(0) - 2.0 * window.col(1) + window.col(2);
+  const Eigen::Vector3d second = past.col(0) - 2.0 * past.col(1) + past.col(2);
   smooth(period_s * second.squaredNorm() / 18.0, noise_density2_);
 
-  const Eigen::Matrix<double, 3, 2> before = changes_before(window, kStride);
-  const Eigen::Vector3d next = window.col(0) - window.col(kStride);
-  const double span_s = kStride * period_s;
-  smooth((next - before * weights_).squaredNorm() / 3.0 / span_s, innovation_density2_);
+  for (int i = 0; i < kHorizons; ++i) {
+    Horizon& horizon = horizons_.at(static_cast<std::size_t>(i));
+    const int then = (i + 1) * kStride;
+    const Changes before = changes_before(past, then);
+    const Eigen::Vector3d next = past.col(0) - past.col(then);
+    const double span_s = then * period_s;
+    smooth((next - before * horizon.weights).squaredNorm() / 3.0 / span_s,
+           horizon.innovation_density2);
 
-  changes_ += kPredictionShare * (before.transpose() * before - changes_);
-  with_next_ += kPredictionShare * (before.transpose() * next - with_next_);
-  const double power = changes_.trace();
-  if (!(power > 0.0)) return;
-  const Eigen::Matrix2d ridged = changes_ + kRidge * power * Eigen::Matrix2d::Identity();
-  weights_ = ridged.inverse() * with_next_;
+    horizon.changes += kPredictionShare * (before.transpose() * before - horizon.changes);
+    horizon.with_next += kPredictionShare * (before.transpose() * next - horizon.with_next);
+    const double power = horizon.changes.trace();
+    if (!(power > 0.0)) continue;
+    const Eigen::Matrix<double, kChanges, kChanges> ridged =
+        horizon.changes + kRidge * power * Eigen::Matrix<double, kChanges, kChanges>::Identity();
+    horizon.weights = ridged.inverse() * horizon.with_next;
+  }
 }
 
-Eigen::Vector3d SignalModel::next_change(const Window& window) const {
-  const Eigen::Matrix<double, 3, 2> before = changes_before(window, 0);
-  const Eigen::Vector3d next = before * weights_;
-  const double most = kMostGrowth * before.colwise().norm().maxCoeff();
-  const double size = next.norm();
-  return size > most ? Eigen::Vector3d(most / size * next) : next;
+Eigen::Vector3d SignalModel::change_after(double strides, const Window& window) const {
+  const Weights weights = interpolated(strides, [&](int i) -> Weights {
+    return i == 0 ? Weights::Zero() : horizons_.at(static_cast<std::size_t>(i - 1)).weights;
+  });
+  const Changes before = changes_before(window, 0);
+  const Eigen::Vector3d change = before * weights;
+  const double most = kMostGrowth * std::max(1.0, strides) * before.colwise().norm().maxCoeff();
+  const double size = change.norm();
+  return size > most ? Eigen::Vector3d(most / size * change) : change;
 }
 
 double SignalModel::noise_density() const { return std::sqrt(noise_density2_); }
 
-double SignalModel::innovation_density() const { return std::sqrt(innovation_density2_); }
+double SignalModel::innovation_density(double strides) const {
+  using Scalar = Eigen::Matrix<double, 1, 1>;
+  const auto density2 = interpolated(strides, [&](int i) -> Scalar {
+    const auto known = static_cast<std::size_t>(std::max(i - 1, 0));
+    return Scalar(horizons_.at(known).innovation_density2);
+  });
+  return std::sqrt(density2(0));
+}
 
 }  // namespace crepes

@@ -2,38 +2,52 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 namespace crepes {
 
 /// Needs equally spaced samples; its memory is about a second. The second differences of successive
 /// samples, in which motion cancels, give the white noise with the vibration of the airframe. A
-/// linear prediction from the last two changes (Makhoul 1975) gives the next change: a slow swing
-/// continues, a vibration returns to the mean.
+/// linear prediction from the last changes (Makhoul 1975) gives the next ones, each horizon by
+/// weights of its own: a slow swing continues and returns, a vibration returns to the mean.
 class SignalModel {
  public:
-  /// Samples of one change: about the delay of a peer's samples.
+  /// Samples of one change.
   static constexpr int kStride = 3;
-  /// Successive samples, the newest first.
-  using Window = Eigen::Matrix<double, 3, 3 * kStride + 1>;
+  static constexpr int kChanges = 4;   ///< that a prediction uses
+  static constexpr int kHorizons = 7;  ///< strides ahead: the delay of samples if some are lost
+  /// Successive samples, the newest first: those that a prediction uses.
+  using Window = Eigen::Matrix<double, 3, kStride * kChanges + 1>;
+  /// Those that the model learns from.
+  using Past = Eigen::Matrix<double, 3, kStride*(kChanges + kHorizons) + 1>;
 
   /// Updates the model with samples `period_s` apart.
-  void observe(const Window& window, double period_s);
+  void observe(const Past& past, double period_s);
 
-  /// The change from the newest sample to kStride samples later.
-  [[nodiscard]] Eigen::Vector3d next_change(const Window& window) const;
+  /// The change from the newest sample to so many strides later, at most kHorizons.
+  [[nodiscard]] Eigen::Vector3d change_after(double strides, const Window& window) const;
 
   /// White noise, in the unit of the signal per sqrt(Hz).
   [[nodiscard]] double noise_density() const;
-  /// Error of the prediction as a random walk, in the unit of the signal per sqrt(s).
-  [[nodiscard]] double innovation_density() const;
+  /// Error of the prediction after so many strides, as a random walk, in the unit of the signal per
+  /// sqrt(s).
+  [[nodiscard]] double innovation_density(double strides = 1.0) const;
 
  private:
+  using Weights = Eigen::Matrix<double, kChanges, 1>;
+
+  /// Of the prediction a fixed time ahead.
+  struct Horizon {
+    // Smoothed products of the changes with each other and with the one that is predicted.
+    Eigen::Matrix<double, kChanges, kChanges> changes =
+        Eigen::Matrix<double, kChanges, kChanges>::Zero();
+    Weights with_next = Weights::Zero();
+    Weights weights = Weights::Zero();
+    double innovation_density2 = 0.0;
+  };
+
   double noise_density2_ = 0.0;
-  double innovation_density2_ = 0.0;
-  // Smoothed products of the last two changes with each other and with the next one.
-  Eigen::Matrix2d changes_ = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d with_next_ = Eigen::Vector2d::Zero();
-  Eigen::Vector2d weights_ = Eigen::Vector2d::Zero();
+  std::array<Horizon, kHorizons> horizons_{};
 };
 
 }  // namespace crepes

@@ -16,8 +16,9 @@ constexpr double kPeriod = 0.01;  // s
 constexpr int kStride = SignalModel::kStride;
 
 /// `newest` and those before it.
-SignalModel::Window window_at(const std::vector<Eigen::Vector3d>& samples, std::size_t newest) {
-  SignalModel::Window window;
+template <class Samples = SignalModel::Past>
+Samples window_at(const std::vector<Eigen::Vector3d>& samples, std::size_t newest) {
+  Samples window;
   for (int back = 0; back < window.cols(); ++back)
     window.col(back) = samples.at(newest - static_cast<std::size_t>(back));
   return window;
@@ -29,21 +30,22 @@ struct Missed {
   double innovation_density = 0.0;  ///< of the model at the end
 };
 
-/// How far a model that learns along the way is from what comes kStride samples later.
-Missed missed_by(const std::vector<Eigen::Vector3d>& samples) {
+/// How far a model that learns along the way is from what comes so many strides later.
+Missed missed_by(const std::vector<Eigen::Vector3d>& samples, int strides = 1) {
   SignalModel model;
   Missed sum;
   int n = 0;
-  for (std::size_t i = SignalModel::Window::ColsAtCompileTime; i + kStride < samples.size(); ++i) {
-    const auto window = window_at(samples, i);
-    model.observe(window, kPeriod);
+  const auto ahead = static_cast<std::size_t>(strides) * kStride;
+  for (std::size_t i = SignalModel::Past::ColsAtCompileTime; i + ahead < samples.size(); ++i) {
+    model.observe(window_at(samples, i), kPeriod);
     if (i < samples.size() / 2) continue;
-    const Eigen::Vector3d change = samples.at(i + kStride) - samples.at(i);
-    sum.predicted += (model.next_change(window) - change).squaredNorm() / 3.0;
+    const auto window = window_at<SignalModel::Window>(samples, i);
+    const Eigen::Vector3d change = samples.at(i + ahead) - samples.at(i);
+    sum.predicted += (model.change_after(strides, window) - change).squaredNorm() / 3.0;
     sum.held += change.squaredNorm() / 3.0;
     ++n;
   }
-  return {std::sqrt(sum.predicted / n), std::sqrt(sum.held / n), model.innovation_density()};
+  return {std::sqrt(sum.predicted / n), std::sqrt(sum.held / n), model.innovation_density(strides)};
 }
 
 TEST(SignalModel, KnowsHowASwingGoesOn) {
@@ -61,6 +63,27 @@ TEST(SignalModel, KnowsHowASwingGoesOn) {
     EXPECT_LT(missed.predicted, 0.1 * missed.held + 2.5 * noise);
     EXPECT_NEAR(missed.innovation_density / (missed.predicted / std::sqrt(kStride * kPeriod)), 1.0,
                 0.4);
+  }
+}
+
+TEST(SignalModel, KnowsHowASwingGoesOnWhileSamplesAreMissing) {
+  constexpr double kNoise = 0.005;
+  RandomGeometry random(4);
+  std::vector<Eigen::Vector3d> samples;
+  for (int i = 0; i < 2000; ++i) {
+    const double t = kPeriod * i;
+    samples.emplace_back(Eigen::Vector3d(2.0 * std::sin(6.0 * t), std::cos(4.0 * t + 1.0), 0.5) +
+                         random.normal_vector<3>(kNoise));
+  }
+
+  for (const int strides : {2, 3, 5, 7}) {
+    const Missed missed = missed_by(samples, strides);
+
+    EXPECT_LT(missed.predicted, (strides > 5 ? 0.15 : 0.1) * missed.held) << strides;
+    EXPECT_NEAR(
+        missed.innovation_density / (missed.predicted / std::sqrt(strides * kStride * kPeriod)),
+        1.0, 0.4)
+        << strides;
   }
 }
 
@@ -84,7 +107,9 @@ TEST(SignalModel, ReadsNoiseOffASwing) {
                          random.normal_vector<3>(0.1));
   }
   SignalModel model;
-  for (std::size_t i = 10; i < samples.size(); ++i) model.observe(window_at(samples, i), kPeriod);
+  constexpr std::size_t kFirst = SignalModel::Past::ColsAtCompileTime;
+  for (std::size_t i = kFirst; i < samples.size(); ++i)
+    model.observe(window_at(samples, i), kPeriod);
 
   EXPECT_NEAR(model.noise_density() / (0.1 * std::sqrt(kPeriod)), 1.0, 0.3);
 }
@@ -99,14 +124,15 @@ TEST(SignalModel, StaysWithinReasonWhateverItSees) {
       // Stands still, jumps to the end of the range and back, drifts by the least there is.
       if (random.index(10) == 0) value = random.vector(random.index(2) == 0 ? 100.0 : 1e-300);
       samples.push_back(value);
-      if (i < 10) continue;
-      const auto window = window_at(samples, i);
-      model.observe(window, kPeriod);
-      ASSERT_TRUE(model.next_change(window).allFinite());
-      ASSERT_TRUE(std::isfinite(model.innovation_density()) &&
+      if (i < SignalModel::Past::ColsAtCompileTime) continue;
+      model.observe(window_at(samples, i), kPeriod);
+      const auto window = window_at<SignalModel::Window>(samples, i);
+      ASSERT_TRUE(model.change_after(7.0, window).allFinite());
+      ASSERT_TRUE(std::isfinite(model.innovation_density(2.5)) &&
                   std::isfinite(model.noise_density()));
       const double range = window.colwise().norm().maxCoeff();
-      ASSERT_LE(model.next_change(window).norm(), 4.0 * range) << "of a jump by twice the range";
+      ASSERT_LE(model.change_after(1.0, window).norm(), 4.0 * range)
+          << "of a jump by twice the range";
     }
   }
 }
