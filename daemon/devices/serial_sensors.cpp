@@ -217,9 +217,10 @@ class UnknownDevice final : public Device {
 template <class Choices>
 std::string names_of(const Choices& choices) {
   std::string names;
-  for (const auto& choice : choices)
-    if (choice.name != "auto" && choice.name != "iio")
-      names += (names.empty() ? "" : ", ") + std::string(choice.name);
+  for (const auto& choice : choices) {
+    if (choice.name == "auto" || choice.name == "iio") continue;
+    names += (names.empty() ? "" : ", ") + std::string(choice.name);
+  }
   return names;
 }
 
