@@ -48,15 +48,21 @@ Missed missed_by(const std::vector<Eigen::Vector3d>& samples, int strides = 1) {
   return {std::sqrt(sum.predicted / n), std::sqrt(sum.held / n), model.innovation_density(strides)};
 }
 
+/// Twenty seconds of a hand's swing.
+std::vector<Eigen::Vector3d> swing(double noise) {
+  RandomGeometry random(4);
+  std::vector<Eigen::Vector3d> samples;
+  for (int i = 0; i < 2000; ++i) {
+    const double t = kPeriod * i;
+    samples.emplace_back(Eigen::Vector3d(2.0 * std::sin(6.0 * t), std::cos(4.0 * t + 1.0), 0.5) +
+                         random.normal_vector<3>(noise));
+  }
+  return samples;
+}
+
 TEST(SignalModel, KnowsHowASwingGoesOn) {
   for (const double noise : {0.0, 0.005, 0.05}) {
-    RandomGeometry random(4);
-    std::vector<Eigen::Vector3d> samples;
-    for (int i = 0; i < 2000; ++i) {
-      const double t = kPeriod * i;
-      samples.emplace_back(Eigen::Vector3d(2.0 * std::sin(6.0 * t), std::cos(4.0 * t + 1.0), 0.5) +
-                           random.normal_vector<3>(noise));
-    }
+    const std::vector<Eigen::Vector3d> samples = swing(noise);
 
     const Missed missed = missed_by(samples);
 
@@ -68,13 +74,7 @@ TEST(SignalModel, KnowsHowASwingGoesOn) {
 
 TEST(SignalModel, KnowsHowASwingGoesOnWhileSamplesAreMissing) {
   constexpr double kNoise = 0.005;
-  RandomGeometry random(4);
-  std::vector<Eigen::Vector3d> samples;
-  for (int i = 0; i < 2000; ++i) {
-    const double t = kPeriod * i;
-    samples.emplace_back(Eigen::Vector3d(2.0 * std::sin(6.0 * t), std::cos(4.0 * t + 1.0), 0.5) +
-                         random.normal_vector<3>(kNoise));
-  }
+  const std::vector<Eigen::Vector3d> samples = swing(kNoise);
 
   for (const int strides : {2, 3, 5, 7}) {
     const Missed missed = missed_by(samples, strides);
