@@ -10,7 +10,7 @@ import sys
 DOCUMENTS = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CITATION.cff", "SECURITY.md", "config/README.md", "config/crepesd.yaml",
              "config/docs", "config/examples", "config/libraries", "daemon/ctl/view/README.md", "estimator/vision/README.md",
              "firmware/HARDWARE.md", "firmware/led_board/README.md", "firmware/pictures", "systemd/MESH.md", "systemd/README.md", "systemd/mesh", "tests/bench/README.md",
-             "tests/study/README.md"]
+             "tests/faults/results.md", "tests/study/README.md"]
 # Debian has its examples at one place; all else is as deep as in the source.
 MOVED = {"config/examples": "examples", "config/crepesd.yaml": "examples/crepesd.yaml", "systemd/mesh": "examples/mesh"}
 MAKERS = shutil.ignore_patterns("draw.py", "make_pictures.sh", "make_recording.sh", "__pycache__", "*.egg-info", "build")
