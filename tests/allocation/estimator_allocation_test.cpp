@@ -7,7 +7,7 @@
 #include "tests/allocation/allocation_counter.hpp"
 #include "tests/support/estimator_pair.hpp"
 
-namespace crepes {
+namespace crepes::estimator_allocation_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -69,4 +69,4 @@ TEST(EstimatorAllocation, EndsAfterTheFirstSecondsButForOutputs) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::estimator_allocation_test

@@ -5,7 +5,7 @@
 #include "tests/allocation/allocation_counter.hpp"
 #include "tests/support/ring_scene.hpp"
 
-namespace crepes {
+namespace crepes::spot_detector_allocation_test {
 namespace {
 
 using test::allocated_bytes;
@@ -83,4 +83,4 @@ TEST(SpotDetectorAllocation, IsBoundedWhateverThePictureShows) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::spot_detector_allocation_test

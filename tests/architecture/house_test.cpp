@@ -14,7 +14,7 @@
 #include "tests/architecture/source_tree.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::house_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -93,6 +93,20 @@ TEST(Folders, HaveFewConceptsOnOneLevel) {
   for (const auto& [folder, files] : concepts) EXPECT_LE(files.size(), kMost) << folder;
 }
 
+/// Tests of one program are compiled together, and repeat short names.
+TEST(Folders, HaveTestsInNamespacesCalledLikeTheirFiles) {
+  int tests = 0;
+  for (const std::string& file : source_files({"tests"})) {
+    const std::string stem = fs::path(file).stem();
+    if (!stem.ends_with("_test")) continue;
+    ++tests;
+    EXPECT_NE(text_of_file(fs::path(source_dir()) / file).find("::" + stem + " {\nnamespace {\n"),
+              std::string::npos)
+        << file << " needs: namespace crepes::" << stem << " {";
+  }
+  EXPECT_GT(tests, 200);
+}
+
 TEST(Documents, NameTheReleaseOfTheProject) {
   const fs::path root = source_dir();
   std::smatch found;
@@ -116,4 +130,4 @@ TEST(Documents, NameTheReleaseOfTheProject) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::house_test

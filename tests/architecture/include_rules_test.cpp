@@ -11,7 +11,7 @@
 #include "tests/architecture/source_tree.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::include_rules_test {
 namespace {
 
 struct Sample {
@@ -122,4 +122,4 @@ TEST(IncludeRules, HoldInEverySourceFile) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::include_rules_test

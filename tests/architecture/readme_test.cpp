@@ -7,7 +7,7 @@
 #include "tests/architecture/source_tree.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::readme_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -31,4 +31,4 @@ TEST(Readmes, NameEverySourceFileOfTheirFolder) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::readme_test

@@ -19,7 +19,7 @@
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::client_examples_test {
 namespace {
 
 const std::string kClients = source_dir() + "/config/examples/clients";
@@ -161,4 +161,4 @@ TEST_F(Clients, InRosGetPosesOdometryTransformsAndDiagnostics) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::client_examples_test

@@ -16,7 +16,7 @@
 #include "tests/support/places.hpp"
 #include "tests/support/witmotion_sensor.hpp"
 
-namespace crepes {
+namespace crepes::tools_json_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -243,4 +243,4 @@ TEST_F(LiveToolsInJson, SumUpARecording) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::tools_json_test

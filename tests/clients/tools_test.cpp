@@ -11,7 +11,7 @@
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::tools_test {
 namespace {
 
 class Tools : public LiveDaemon {
@@ -382,4 +382,4 @@ TEST(ToolsAlone, CompleteTheirWordsInFish) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::tools_test

@@ -10,7 +10,7 @@
 #include "drivers/base/monotonic_clock.hpp"
 #include "tests/support/live_daemon.hpp"
 
-namespace crepes {
+namespace crepes::runtime_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -64,4 +64,4 @@ TEST(Watchdog, NamesTheLoopThatMadeNoProgress) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::runtime_test

@@ -10,7 +10,7 @@
 #include "tests/support/counted.hpp"
 #include "tests/support/gige_camera.hpp"
 
-namespace crepes {
+namespace crepes::aravis_camera_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -236,4 +236,4 @@ TEST_F(AravisCameraTest, SaysThatThereIsNone) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::aravis_camera_test

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <vector>
 
-namespace crepes {
+namespace crepes::bundle_spacing_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -77,4 +77,4 @@ TEST(BundleSpacing, KeepsAnySequenceOfBundlesInOrderAndNeverStampsAfterArrival) 
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::bundle_spacing_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/recorded_files.hpp"
 
-namespace crepes {
+namespace crepes::detect_protocol_test {
 namespace {
 
 /// So many times the same frame, cut off at both ends.
@@ -65,4 +65,4 @@ TEST(Recognize, FindsNothingInNoise) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::detect_protocol_test

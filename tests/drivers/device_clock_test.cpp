@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace crepes {
+namespace crepes::device_clock_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -199,4 +199,4 @@ TEST(DeviceClock, TakesTheArrivalWhereThereIsNoStamp) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::device_clock_test

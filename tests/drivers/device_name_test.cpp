@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <fstream>
 
-namespace crepes {
+namespace crepes::device_name_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -107,4 +107,4 @@ TEST_F(DeviceNameTest, NamesTheProgramThatHasADeviceOpen) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::device_name_test

@@ -8,7 +8,7 @@
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/recorded_frames.hpp"
 
-namespace crepes {
+namespace crepes::frame_decoder_test {
 namespace {
 
 TEST(FrameDecoder, FindsTheSameFramesInEveryChunkSize) {
@@ -66,4 +66,4 @@ TEST(FrameDecoder, AccountsForEveryByteOfAnyStream) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::frame_decoder_test

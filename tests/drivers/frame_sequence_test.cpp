@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace crepes {
+namespace crepes::frame_sequence_test {
 namespace {
 
 std::uint64_t missed_in(const std::vector<std::uint64_t>& numbers) {
@@ -32,4 +32,4 @@ TEST(FrameSequence, TakesALeapForACounterThatBeganAnew) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::frame_sequence_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::image_folder_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -97,4 +97,4 @@ TEST_F(ImageFolderTest, PlaysPicturesAtTheirRecordedPaceOnItsOwnClock) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::image_folder_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::imu_correction_test {
 namespace {
 
 const ImuSample kSample{.stamp = Timestamp{std::chrono::seconds(3)},
@@ -33,4 +33,4 @@ TEST(ImuCorrection, TakesOffTheBiasThenScalesThenStraightensThenTurns) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::imu_correction_test

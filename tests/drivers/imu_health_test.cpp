@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::imu_health_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -76,4 +76,4 @@ TEST(ImuHealth, ReportsARateOtherThanTheConfigured) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::imu_health_test

@@ -13,7 +13,7 @@
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/recorded_files.hpp"
 
-namespace crepes {
+namespace crepes::imu_protocols_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -534,4 +534,4 @@ TEST(ImuReading, RefusesWhatIsNoNumberOrBeyondEverySensor) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::imu_protocols_test

@@ -9,7 +9,7 @@
 #include "tests/support/counted.hpp"
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::libcamera_camera_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -221,4 +221,4 @@ TEST(GreyConversion, KeepsTheUpperBytesOfPackedLevels) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::libcamera_camera_test

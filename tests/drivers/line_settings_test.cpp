@@ -10,7 +10,7 @@
 
 #include "drivers/base/unique_fd.hpp"
 
-namespace crepes {
+namespace crepes::line_settings_test {
 namespace {
 
 class LineSettings : public testing::Test {
@@ -60,4 +60,4 @@ TEST_F(LineSettings, SayThatADeviceIsNoSerialLine) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::line_settings_test

@@ -10,7 +10,7 @@ extern "C" {
 #include "tests/support/mindvision_stub/mindvision_stub.h"
 }
 
-namespace crepes {
+namespace crepes::mindvision_camera_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -207,4 +207,4 @@ TEST_F(MindVisionCameraTest, ClosesACameraThatCannotBeSetUp) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::mindvision_camera_test

@@ -8,7 +8,7 @@
 
 #include "drivers/sim/world.hpp"
 
-namespace crepes {
+namespace crepes::motion_track_test {
 namespace {
 
 class MotionTrack : public testing::Test {
@@ -104,4 +104,4 @@ TEST_F(MotionTrack, AWorldWithoutItsTrackSaysSo) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::motion_track_test

@@ -11,7 +11,7 @@
 #include "tests/support/frame_damage.hpp"
 #include "tests/support/recorded_files.hpp"
 
-namespace crepes {
+namespace crepes::nlink_frame_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -219,4 +219,4 @@ TEST(NlinkFrame, NeverWaitsForUserDataThatCannotBe) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::nlink_frame_test

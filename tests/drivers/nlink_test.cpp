@@ -7,7 +7,7 @@
 #include "tests/support/recorded_files.hpp"
 #include "tests/support/recorded_frames.hpp"
 
-namespace crepes {
+namespace crepes::nlink_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -181,4 +181,4 @@ TEST(Nlink, SaysWhyThereAreNoRanges) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::nlink_test

@@ -10,7 +10,7 @@
 #include "estimator/vision/spot_detector.hpp"
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::ring_renderer_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -234,4 +234,4 @@ TEST(SimCamera, KeepsItsBeatAndMissesFramesRatherThanFallBehind) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::ring_renderer_test

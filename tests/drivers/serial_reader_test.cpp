@@ -10,7 +10,7 @@
 #include "tests/support/manual_clock.hpp"
 #include "tests/support/recorded_frames.hpp"
 
-namespace crepes {
+namespace crepes::serial_reader_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -183,4 +183,4 @@ TEST_F(SerialReaderTest, NamesDeviceAndCauseWhenItCannotOpen) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::serial_reader_test

@@ -10,7 +10,7 @@
 #include "estimator/core/constants.hpp"
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::sim_devices_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -199,4 +199,4 @@ TEST(SimSerial, LosesBytesThatNobodyReadsAndNeverWaits) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::sim_devices_test

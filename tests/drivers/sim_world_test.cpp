@@ -8,7 +8,7 @@
 #include "estimator/core/constants.hpp"
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::sim_world_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -155,4 +155,4 @@ TEST(SimClock, RunsAsItsConfigurationSays) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::sim_world_test

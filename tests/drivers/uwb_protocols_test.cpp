@@ -10,7 +10,7 @@
 #include "drivers/uwb/range_line.hpp"
 #include "tests/support/frame_damage.hpp"
 
-namespace crepes {
+namespace crepes::uwb_protocols_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -334,4 +334,4 @@ TEST(Bu03, IsRecognized) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::uwb_protocols_test

@@ -12,7 +12,7 @@
 #include "tests/support/counted.hpp"
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::v4l2_camera_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -355,4 +355,4 @@ TEST(GreyConversion, KeepsTheHighByteOfSixteenBits) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::v4l2_camera_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace crepes {
+namespace crepes::velocity_lag_test {
 namespace {
 
 constexpr VelocityLag kSome{.begin_s = 3.0,
@@ -53,4 +53,4 @@ TEST(VelocityLag, IsTheSameWhenTheSameCommandIsRepeated) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::velocity_lag_test

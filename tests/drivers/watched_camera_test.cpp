@@ -7,7 +7,7 @@
 
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::watched_camera_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -162,4 +162,4 @@ TEST_F(WatchedCameraTest, ReadsBorrowedMemoryByItsStride) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::watched_camera_test

@@ -8,7 +8,7 @@
 #include "tests/support/recorded_files.hpp"
 #include "tests/support/recorded_frames.hpp"
 
-namespace crepes {
+namespace crepes::witmotion_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -180,4 +180,4 @@ TEST(WitMotionBle, PassesByAnswersAndRefusesTheEndOfTheRange) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::witmotion_test

@@ -7,7 +7,7 @@
 #include "estimator/vision/id_library.hpp"
 #include "tests/support/led_settings.hpp"
 
-namespace crepes {
+namespace crepes::blink_test {
 namespace {
 
 constexpr Duration kTick = std::chrono::microseconds(LED_TICK_US);
@@ -75,4 +75,4 @@ TEST(Blink, TheTestLightEndsByItselfAndLeavesThePhaseAlone) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::blink_test

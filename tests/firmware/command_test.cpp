@@ -8,7 +8,7 @@
 #include "tests/support/led_settings.hpp"
 #include "tests/support/ram_flash.hpp"
 
-namespace crepes {
+namespace crepes::command_test {
 namespace {
 
 struct Board {
@@ -133,4 +133,4 @@ TEST(LedCommand, RefusesWhatItDoesNotKnowAndPayloadsOfAnotherSize) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::command_test

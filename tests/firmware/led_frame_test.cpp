@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace crepes {
+namespace crepes::led_frame_test {
 namespace {
 
 using ByteVector = std::vector<std::uint8_t>;
@@ -142,4 +142,4 @@ TEST(LedFrame, AFalseStartThatSwallowsTwoFramesGivesBothBack) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::led_frame_test

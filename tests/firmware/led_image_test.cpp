@@ -15,7 +15,7 @@
 #include "tests/support/led_settings.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::led_image_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -229,4 +229,4 @@ TEST(LedImage, SetsTheLightWithinTenMicrosecondsOfEveryTickWhateverTheLineCarrie
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::led_image_test

@@ -7,7 +7,7 @@
 #include "tests/support/led_settings.hpp"
 #include "tests/support/ram_flash.hpp"
 
-namespace crepes {
+namespace crepes::settings_store_test {
 namespace {
 
 const led_settings kOld = pattern_settings(3, "00100100111100111111");
@@ -93,4 +93,4 @@ TEST(SettingsStore, ReportsWhenFlashDoesNotHoldTheSettings) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::settings_store_test

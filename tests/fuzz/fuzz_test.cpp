@@ -6,7 +6,7 @@
 
 #include "tests/fuzz/fuzz_targets.hpp"
 
-namespace crepes {
+namespace crepes::fuzz_test {
 namespace {
 
 using Random = std::mt19937;
@@ -76,4 +76,4 @@ INSTANTIATE_TEST_SUITE_P(Targets, Fuzz,
                          [](const auto& target) { return std::string(target.param.name); });
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::fuzz_test

@@ -21,7 +21,7 @@
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::hostile_clients_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -244,4 +244,4 @@ TEST_F(HostileClients, GetNothingAmplifiedWhoeverTheyPretendToBe) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::hostile_clients_test

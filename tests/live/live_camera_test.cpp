@@ -13,7 +13,7 @@
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/live_daemon.hpp"
 
-namespace crepes {
+namespace crepes::live_camera_test {
 namespace {
 
 using namespace nlohmann::literals;
@@ -132,4 +132,4 @@ TEST_F(LiveCamera, ReportsWhatIsWrongWithTheCameraAndRecovers) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::live_camera_test

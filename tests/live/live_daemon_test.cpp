@@ -14,7 +14,7 @@
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/sim/pseudo_terminal.hpp"
 
-namespace crepes {
+namespace crepes::live_daemon_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -104,4 +104,4 @@ TEST_F(LiveDaemon, CountsForeignDatagramsAndAnswersFoolishRequests) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::live_daemon_test

@@ -25,7 +25,7 @@
 #include "tests/support/datagram_flood.hpp"
 #include "tests/support/live_daemon.hpp"
 
-namespace crepes {
+namespace crepes::live_faults_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -228,4 +228,4 @@ TEST_F(SealedSwarm, KeepsItsPosesWhateverHappensToAMember) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::live_faults_test

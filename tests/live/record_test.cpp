@@ -31,7 +31,7 @@
 #include "drivers/dataset/csv_file.hpp"
 #include "tests/support/live_daemon.hpp"
 
-namespace crepes {
+namespace crepes::record_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -333,4 +333,4 @@ TEST_F(Record, SurvivesToolsThatTalkNonsense) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::record_test

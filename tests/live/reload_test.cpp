@@ -27,7 +27,7 @@
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::reload_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -358,4 +358,4 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsNotified) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::reload_test

@@ -10,7 +10,7 @@
 #include <optional>
 #include <thread>
 
-namespace crepes {
+namespace crepes::udp_socket_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -140,4 +140,4 @@ TEST(UdpSocket, DistinguishesACongestedLinkFromABrokenOne) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::udp_socket_test

@@ -7,7 +7,7 @@
 #include "tests/support/bearing_truth.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::bearing_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -95,4 +95,4 @@ TEST_P(MirroringFloor, IsTheOnlyOtherPlaceWhereRobotsAreSeen) {
 INSTANTIATE_TEST_SUITE_P(Datasets, MirroringFloor, testing::Values("interference"));
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::bearing_test

@@ -14,7 +14,7 @@
 #include "tests/scenario/recorded_swarm.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::replay_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -239,4 +239,4 @@ TEST_P(TeamRecording, IsImprovedByTheGraph) {
 INSTANTIATE_TEST_SUITE_P(Datasets, TeamRecording, testing::Values("four"));
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::replay_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::soak_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -20,4 +20,4 @@ TEST(Soak, TenSecondsOfMishapsLeaveNothingBehind) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::soak_test

@@ -20,7 +20,7 @@
 #include "tests/study/simulated_swarm.hpp"
 #include "tests/support/live_daemon.hpp"
 
-namespace crepes {
+namespace crepes::faults_test {
 namespace {
 
 using faults::Fault;
@@ -328,4 +328,4 @@ TEST(FaultSchedule, CanBePrintedAndRead) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::faults_test

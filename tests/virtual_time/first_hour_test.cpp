@@ -18,7 +18,7 @@
 #include "tests/study/simulated_swarm.hpp"
 #include "tests/support/calibration_recording.hpp"
 
-namespace crepes {
+namespace crepes::first_hour_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -160,4 +160,4 @@ TEST_F(FirstHour, MakesOfAGuessedCameraOneWithPosesLikeThoseOfAPerfectOne) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::first_hour_test

@@ -10,7 +10,7 @@
 #include "daemon/ctl/replay/swarm_replay.hpp"
 #include "tests/study/simulated_swarm.hpp"
 
-namespace crepes {
+namespace crepes::flood_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -96,4 +96,4 @@ TEST(Flood, OfForgedDatagramsMovesNoPose) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::flood_test

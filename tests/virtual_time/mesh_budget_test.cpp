@@ -8,7 +8,7 @@
 #include "tests/study/crowd.hpp"
 #include "tests/study/simulated_swarm.hpp"
 
-namespace crepes {
+namespace crepes::mesh_budget_test {
 namespace {
 
 /// Of the robot that sends the most, sealed and signed.
@@ -65,4 +65,4 @@ TEST(MeshBudget, OfTwelveRobotsIsHalfOfASlowChannel) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::mesh_budget_test

@@ -13,7 +13,7 @@
 #include "tests/study/swarm_writer.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes::study {
+namespace crepes::study::study_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -185,4 +185,4 @@ TEST_P(SeedStudy, FindsTheTightProfileNearTheBoundAndAheadOfThePapers) {
 INSTANTIATE_TEST_SUITE_P(Scenarios, SeedStudy, testing::Values("static", "manual"));
 
 }  // namespace
-}  // namespace crepes::study
+}  // namespace crepes::study::study_test

@@ -14,7 +14,7 @@
 #include "tests/study/crowd.hpp"
 #include "tests/study/simulated_swarm.hpp"
 
-namespace crepes::study {
+namespace crepes::study::team_changes_test {
 namespace {
 
 using faults::PoseTrace;
@@ -158,4 +158,4 @@ TEST(TwoGroups, ThatMeetBecomeOne) {
 }
 
 }  // namespace
-}  // namespace crepes::study
+}  // namespace crepes::study::team_changes_test

@@ -11,7 +11,7 @@
 #include "tests/study/team_trial.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes::study {
+namespace crepes::study::team_study_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -255,4 +255,4 @@ TEST(TeamStudy, ComparesTheHonestWithAndWithoutALiar) {
 }
 
 }  // namespace
-}  // namespace crepes::study
+}  // namespace crepes::study::team_study_test

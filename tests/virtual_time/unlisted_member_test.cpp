@@ -8,7 +8,7 @@
 #include "daemon/ctl/replay/swarm_replay.hpp"
 #include "tests/study/simulated_swarm.hpp"
 
-namespace crepes {
+namespace crepes::unlisted_member_test {
 namespace {
 
 TEST(UnlistedMember, IsSeenAndHasNoTruth) {
@@ -40,4 +40,4 @@ TEST(UnlistedMember, IsSeenAndHasNoTruth) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::unlisted_member_test

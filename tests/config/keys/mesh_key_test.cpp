@@ -8,7 +8,7 @@
 #include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 
-namespace crepes {
+namespace crepes::mesh_key_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -85,4 +85,4 @@ TEST(MeshKey, IsRefusedForWhatIsWrongWithItsFile) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::mesh_key_test

@@ -9,7 +9,7 @@
 #include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 
-namespace crepes {
+namespace crepes::robot_key_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -64,4 +64,4 @@ TEST(RobotKeyFile, IsRefusedForWhatIsWrongWithIt) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::robot_key_test

@@ -14,7 +14,7 @@
 #include "drivers/base/scratch_directory.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::config_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -579,4 +579,4 @@ TEST(ConfigFile, ReadsTheConfigurationsOfTheRecordedSwarms) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::config_file_test

@@ -19,7 +19,7 @@
 #include "drivers/base/unique_fd.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::config_sources_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -440,4 +440,4 @@ TEST_F(CalibrationReference, IsWrittenOutByADumpThatLoadsByItself) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::config_sources_test

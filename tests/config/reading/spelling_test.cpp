@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace crepes {
+namespace crepes::spelling_test {
 namespace {
 
 const std::vector<std::string> kWords{"watch", "waitpose", "view", "status"};
@@ -27,4 +27,4 @@ TEST(Spelling, KeepsTheFirstOfEquals) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::spelling_test

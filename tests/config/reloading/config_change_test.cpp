@@ -9,7 +9,7 @@
 
 #include "config/reading/config_file.hpp"
 
-namespace crepes {
+namespace crepes::config_change_test {
 namespace {
 
 /// Changes the nth setting of a config struct and remembers which that was.
@@ -181,4 +181,4 @@ TEST(ConfigChange, GivesNoLightToACameraOfAnotherName) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::config_change_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::camera_sensor_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -92,4 +92,4 @@ TEST_F(CameraSensor, OpensACameraThatReturnsWithTheNewestLight) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::camera_sensor_test

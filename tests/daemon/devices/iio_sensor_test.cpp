@@ -7,7 +7,7 @@
 #include "tests/support/fake_iio.hpp"
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::iio_sensor_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -82,4 +82,4 @@ TEST_F(IioSensor, IsGoneAfterItWasUnpluggedAndCanBeOpenedAgain) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::iio_sensor_test

@@ -15,7 +15,7 @@
 #include "tests/support/manual_clock.hpp"
 #include "tests/support/recorded_files.hpp"
 
-namespace crepes {
+namespace crepes::serial_sensors_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -270,4 +270,4 @@ TEST(SensorStage, ReportsASilentDeviceWithinTwoSeconds) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::serial_sensors_test

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace crepes {
+namespace crepes::robot_lock_test {
 namespace {
 
 /// Claims are of the whole machine, where other tests may run: ids of this process.
@@ -56,4 +56,4 @@ TEST(RobotLock, FollowsToAnotherMesh) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::robot_lock_test

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-namespace crepes {
+namespace crepes::systemd_status_test {
 namespace {
 
 NeighborStatus located(std::uint16_t id) {
@@ -64,4 +64,4 @@ TEST(SystemdStatus, SaysWhatWaitsForARestartAndWhyAReloadWasRefused) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::systemd_status_test

@@ -12,7 +12,7 @@
 #include "daemon/stages/counters.hpp"
 #include "daemon/stages/worker.hpp"
 
-namespace crepes {
+namespace crepes::bounded_queue_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -121,4 +121,4 @@ TEST(BoundedQueueDeathTest, RefusesToBeWithoutCapacity) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::bounded_queue_test

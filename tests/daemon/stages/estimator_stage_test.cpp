@@ -10,7 +10,7 @@
 #include "drivers/base/monotonic_clock.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::estimator_stage_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -52,4 +52,4 @@ TEST(EstimatorStage, LeavesOutSpotsThatWaitedForTooLong) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::estimator_stage_test

@@ -9,7 +9,7 @@
 #include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 
-namespace crepes {
+namespace crepes::child_process_test {
 namespace {
 
 TEST(ChildProcess, ReportsHowItEndedAndKeepsItsOutput) {
@@ -47,4 +47,4 @@ TEST(ChildProcess, NamesAProgramThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::child_process_test

@@ -7,7 +7,7 @@
 
 #include "drivers/base/number_text.hpp"
 
-namespace crepes {
+namespace crepes::text_file_test {
 namespace {
 
 class TextFile : public testing::Test {
@@ -74,4 +74,4 @@ TEST(NumberText, ReadsBackToTheSameBits) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::text_file_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/fake_iio.hpp"
 
-namespace crepes {
+namespace crepes::iio_attributes_test {
 namespace {
 
 class IioFiles : public testing::Test {
@@ -76,4 +76,4 @@ TEST_F(IioFiles, AreWrittenOnlyIfTheyChange) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::iio_attributes_test

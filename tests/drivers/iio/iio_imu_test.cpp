@@ -5,7 +5,7 @@
 #include "tests/support/fake_iio.hpp"
 #include "tests/support/manual_clock.hpp"
 
-namespace crepes {
+namespace crepes::iio_imu_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -312,4 +312,4 @@ TEST(ChipOf, LeavesOutTheKind) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::iio_imu_test

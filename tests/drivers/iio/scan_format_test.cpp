@@ -5,7 +5,7 @@
 
 #include "tests/support/fake_iio.hpp"
 
-namespace crepes {
+namespace crepes::scan_format_test {
 namespace {
 
 TEST(ScanFormat, ReadsTypesAsTheKernelWritesThem) {
@@ -74,4 +74,4 @@ TEST(ScanFormat, ShiftsAndExtendsTheSignOfEveryWidth) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::scan_format_test

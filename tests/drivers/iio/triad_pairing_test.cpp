@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::triad_pairing_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -82,4 +82,4 @@ TEST(TriadPairing, GivesUpOnASilentAccelerometer) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::triad_pairing_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::libcamera_device_test {
 namespace {
 
 // libcamera itself, on whatever machine this is: most have no camera that it knows.
@@ -23,4 +23,4 @@ TEST(LibcameraDevice, NamesACameraThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::libcamera_device_test

@@ -11,7 +11,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::imu_history_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -227,4 +227,4 @@ TEST(ImuHistory, ReadsTheWhiteNoiseOffTheSamples) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::imu_history_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::pose_test {
 namespace {
 
 using test::RandomGeometry;
@@ -91,4 +91,4 @@ TEST(Pose, PositionErrorIsInTheReferenceAxesAndAttitudeErrorInTheBodys) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::pose_test

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace crepes {
+namespace crepes::quantile_test {
 namespace {
 
 TEST(Quantile, IsAValueThatTheShareOfTheOthersDoesNotExceed) {
@@ -28,4 +28,4 @@ TEST(Quantile, OfOneValueIsThatValue) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::quantile_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::signal_model_test {
 namespace {
 
 using test::RandomGeometry;
@@ -138,4 +138,4 @@ TEST(SignalModel, StaysWithinReasonWhateverItSees) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::signal_model_test

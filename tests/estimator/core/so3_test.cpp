@@ -9,7 +9,7 @@
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::so3_test {
 namespace {
 
 using test::largest_difference;
@@ -189,4 +189,4 @@ TEST(So3, TangentBasisHoldsAtBothPoles) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::so3_test

@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-namespace crepes {
+namespace crepes::token_bucket_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -60,4 +60,4 @@ TEST(TokenBucket, PaysBackWhatWasConsumedInExcess) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::token_bucket_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::pose_graph_test {
 namespace {
 
 using test::RandomGeometry;
@@ -317,4 +317,4 @@ TEST(PoseGraph, GivesTheSameToTheBit) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::pose_graph_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::spanning_tree_test {
 namespace {
 
 using test::RandomGeometry;
@@ -66,4 +66,4 @@ TEST(SpanningTree, LeavesOutRobotsWithoutAChain) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::spanning_tree_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::team_velocity_test {
 namespace {
 
 using test::RandomGeometry;
@@ -73,4 +73,4 @@ TEST(TeamVelocity, IgnoresEdgesOfRobotsWithoutAPose) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_velocity_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::chi_square_test {
 namespace {
 
 TEST(ChiSquare, NormalQuantilesMatchTheTable) {
@@ -37,4 +37,4 @@ INSTANTIATE_TEST_SUITE_P(
                     Entry{0.9999, 1, 15.137}, Entry{0.95, 3, 7.815}, Entry{0.999, 3, 16.266}));
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::chi_square_test

@@ -11,7 +11,7 @@
 #include "estimator/core/so3.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::imu_guard_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -283,4 +283,4 @@ TEST(ImuGuard, ForgetsThePredictionInAGap) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::imu_guard_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::imu_watch_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -78,4 +78,4 @@ TEST(ImuWatch, RefusesAnAxisAtTheEndOfItsRangeWhileOthersMove) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::imu_watch_test

@@ -9,7 +9,7 @@
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::kalman_update_test {
 namespace {
 
 using test::RandomGeometry;
@@ -132,4 +132,4 @@ TEST(KalmanUpdate, ASingularInnovationIsDegenerate) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::kalman_update_test

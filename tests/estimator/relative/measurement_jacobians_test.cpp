@@ -6,7 +6,7 @@
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::measurement_jacobians_test {
 namespace {
 
 using test::largest_difference;
@@ -179,4 +179,4 @@ TEST(PoseMeasurement, JacobianIsMinusTheDerivativeOfTheResidualAtAnyResidual) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::measurement_jacobians_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/tight_filter.hpp"
 
-namespace crepes {
+namespace crepes::neighbor_filter_honesty_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -177,4 +177,4 @@ TEST(NeighborFilter, SharpBearingsDoNotTeachItTheCamerasMisalignment) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::neighbor_filter_honesty_test

@@ -9,7 +9,7 @@
 #include "estimator/relative/paper_filter.hpp"
 #include "tests/support/tight_filter.hpp"
 
-namespace crepes {
+namespace crepes::neighbor_filter_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -188,4 +188,4 @@ TEST(PaperFilter, IsAtLeastAsAccurateAsTheRawPosesItIsFed) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::neighbor_filter_test

@@ -5,7 +5,7 @@
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::paper_filter_test {
 namespace {
 
 using test::largest_difference;
@@ -179,4 +179,4 @@ TEST(PaperFilter, StartsWithTheCovarianceOfTheRawPose) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::paper_filter_test

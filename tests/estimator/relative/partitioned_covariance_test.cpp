@@ -4,7 +4,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::partitioned_covariance_test {
 namespace {
 
 constexpr int kS = 4;
@@ -70,4 +70,4 @@ TEST(PartitionedCovariance, SubtractsAnOuterProduct) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::partitioned_covariance_test

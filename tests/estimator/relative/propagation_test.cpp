@@ -6,7 +6,7 @@
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::propagation_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -278,4 +278,4 @@ TEST(Propagation, TrustsAGapFarLessThanSamples) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::propagation_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::range_update_test {
 namespace {
 
 using E = ErrorState;
@@ -83,4 +83,4 @@ TEST(RangeUpdate, OneRangeThatMayBeFalseDoesNotSettleTheDistance) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::range_update_test

@@ -8,7 +8,7 @@
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::raw_pose_test {
 namespace {
 
 using test::RandomGeometry;
@@ -265,4 +265,4 @@ TEST(RawPose, NotANumberIsRefusedWhereverItStands) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::raw_pose_test

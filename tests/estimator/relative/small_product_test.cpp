@@ -4,7 +4,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::small_product_test {
 namespace {
 
 Eigen::MatrixXd random_matrix(test::RandomGeometry& random, Eigen::Index rows,
@@ -71,4 +71,4 @@ TEST(SmallProduct, OfAMatrixWithItselfIsSymmetricToTheBit) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::small_product_test

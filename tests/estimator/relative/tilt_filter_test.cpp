@@ -9,7 +9,7 @@
 #include "estimator/core/so3.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::tilt_filter_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -117,4 +117,4 @@ TEST(TiltFilter, AFreeFallTeachesItNothing) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::tilt_filter_test

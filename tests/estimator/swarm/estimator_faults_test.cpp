@@ -8,7 +8,7 @@
 #include "estimator/core/constants.hpp"
 #include "tests/support/estimator_pair.hpp"
 
-namespace crepes {
+namespace crepes::estimator_faults_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -363,4 +363,4 @@ TEST(EstimatorFaults, ReadsIdsThroughALensThatIsNotCalibratedAndFusesNoDirection
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::estimator_faults_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/estimator_pair.hpp"
 
-namespace crepes {
+namespace crepes::estimator_reconfigure_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -97,4 +97,4 @@ TEST(EstimatorReconfigure, ForgetsANeighborWhoseMountingHasChanged) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::estimator_reconfigure_test

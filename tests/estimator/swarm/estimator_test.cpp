@@ -9,7 +9,7 @@
 
 #include "tests/support/simulated_pair.hpp"
 
-namespace crepes {
+namespace crepes::estimator_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -288,4 +288,4 @@ TEST(Estimator, SurvivesExtremeStamps) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::estimator_test

@@ -6,7 +6,7 @@
 #include "estimator/swarm/neighbor.hpp"
 #include "tests/support/simulated_pair.hpp"
 
-namespace crepes {
+namespace crepes::false_bearings_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -173,4 +173,4 @@ INSTANTIATE_TEST_SUITE_P(Nuisances, Among,
                          testing::Values(Nuisance::kCrowd, Nuisance::kFlicker, Nuisance::kFloor));
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::false_bearings_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/estimator_pair.hpp"
 
-namespace crepes {
+namespace crepes::foreign_boards_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -49,4 +49,4 @@ TEST_P(AForeignBoard, ThatIsReadAsOursHarmsNoPose) {
 INSTANTIATE_TEST_SUITE_P(Beside, AForeignBoard, testing::Values(0.1, -0.3, 0.7));
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::foreign_boards_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/resting_pair.hpp"
 
-namespace crepes {
+namespace crepes::gaussian_sum_test {
 namespace {
 
 using namespace test::resting;
@@ -117,4 +117,4 @@ TEST(LogLikelihoodRatio, ComparesAFusedReadingWithClutterAndIgnoresOthers) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::gaussian_sum_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/simulated_pair.hpp"
 
-namespace crepes {
+namespace crepes::graph_problem_builder_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -126,4 +126,4 @@ TEST(GraphProblemBuilder, PutsOwnEstimatesFirstAsTheyAre) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::graph_problem_builder_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/resting_pair.hpp"
 
-namespace crepes {
+namespace crepes::hypothesis_set_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -263,4 +263,4 @@ TEST(CorrectionBudget, RefillsByTheSecondUpToABurst) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::hypothesis_set_test

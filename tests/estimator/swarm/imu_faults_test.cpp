@@ -9,7 +9,7 @@
 #include "estimator/core/constants.hpp"
 #include "tests/support/estimator_pair.hpp"
 
-namespace crepes {
+namespace crepes::imu_faults_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -175,4 +175,4 @@ TEST(ImuFaults, SwappedAxesTakeThePoseAwayUntilASecondAfterThem) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::imu_faults_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/simulated_pair.hpp"
 
-namespace crepes {
+namespace crepes::neighbor_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -396,4 +396,4 @@ TEST(Neighbor, LooksAheadFromTheLastLookAsFromTheStart) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::neighbor_test

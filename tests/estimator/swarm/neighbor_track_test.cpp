@@ -4,7 +4,7 @@
 
 #include "tests/support/resting_pair.hpp"
 
-namespace crepes {
+namespace crepes::neighbor_track_test {
 namespace {
 
 using namespace test::resting;
@@ -143,4 +143,4 @@ TEST(NeighborTrack, OfThePapersProfileIsOnePartWithoutCalibration) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::neighbor_track_test

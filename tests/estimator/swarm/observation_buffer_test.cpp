@@ -4,7 +4,7 @@
 
 #include "tests/support/simulated_pair.hpp"
 
-namespace crepes {
+namespace crepes::observation_buffer_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -188,4 +188,4 @@ TEST_F(Sighted, ARobotWithoutAnImuStartsNothingFromWhatItSees) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::observation_buffer_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::outcome_log_test {
 namespace {
 
 Fusion residual(double value, std::size_t dimension = 1) {
@@ -47,4 +47,4 @@ TEST(OutcomeLog, KeepsTheNewestReadingOfEachKindAndOfAlternativesTheFusedOne) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::outcome_log_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/resting_pair.hpp"
 
-namespace crepes {
+namespace crepes::output_predictor_test {
 namespace {
 
 using namespace test::resting;
@@ -95,4 +95,4 @@ TEST_F(Prediction, FollowsANewLeader) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::output_predictor_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/resting_pair.hpp"
 
-namespace crepes {
+namespace crepes::pose_publisher_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -110,4 +110,4 @@ TEST_F(TeamAndFilter, TheTeamsPoseReplacesAFiltersThatAgrees) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::pose_publisher_test

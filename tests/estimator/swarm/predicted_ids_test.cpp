@@ -2,7 +2,7 @@
 
 #include "tests/support/estimator_pair.hpp"
 
-namespace crepes {
+namespace crepes::predicted_ids_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -65,4 +65,4 @@ TEST(PredictedIds, DoNotLetALampPullThePose) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::predicted_ids_test

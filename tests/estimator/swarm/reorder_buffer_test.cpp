@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-namespace crepes {
+namespace crepes::reorder_buffer_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -134,4 +134,4 @@ TEST(ReorderBuffer, WhateverTheOrderOfArrivalReleasesNeverGoBackAndNothingIsLost
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::reorder_buffer_test

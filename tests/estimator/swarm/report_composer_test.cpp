@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace crepes {
+namespace crepes::report_composer_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -107,4 +107,4 @@ TEST(ReportComposer, StaysBoundedWhileThereIsNoTilt) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::report_composer_test

@@ -2,7 +2,7 @@
 
 #include "estimator/swarm/team_intake.hpp"
 
-namespace crepes {
+namespace crepes::team_intake_bounds_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -84,4 +84,4 @@ TEST(TeamIntakeBounds, KeepsABoundedNumberWhileNothingIsDrained) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_intake_bounds_test

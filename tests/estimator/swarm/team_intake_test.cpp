@@ -4,7 +4,7 @@
 
 #include "tests/support/resting_pair.hpp"
 
-namespace crepes {
+namespace crepes::team_intake_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -141,4 +141,4 @@ TEST_F(Intake, AnIntervalIsNeverLongerThanHalfASecond) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_intake_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::team_log_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -75,4 +75,4 @@ TEST_F(Log, KnowsTheFaultsOfEachRobot) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_log_test

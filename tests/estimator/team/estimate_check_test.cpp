@@ -4,7 +4,7 @@
 
 #include "tests/support/simulated_belief.hpp"
 
-namespace crepes {
+namespace crepes::estimate_check_test {
 namespace {
 
 using test::SimulatedTeam;
@@ -84,4 +84,4 @@ TEST(EstimateCheck, ForgetsWhenTheyAreRightAgain) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::estimate_check_test

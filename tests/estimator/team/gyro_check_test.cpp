@@ -4,7 +4,7 @@
 
 #include "tests/support/simulated_belief.hpp"
 
-namespace crepes {
+namespace crepes::gyro_check_test {
 namespace {
 
 using test::SimulatedTeam;
@@ -99,4 +99,4 @@ TEST(GyroCheck, SaysNothingAboutARobotThatSeesNobody) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::gyro_check_test

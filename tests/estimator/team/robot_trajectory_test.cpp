@@ -6,7 +6,7 @@
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::robot_trajectory_test {
 namespace {
 
 using test::largest_difference;
@@ -116,4 +116,4 @@ TEST(RobotTrajectory, NoiseIsThatOfRepeatedDraws) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::robot_trajectory_test

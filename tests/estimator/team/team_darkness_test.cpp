@@ -7,7 +7,7 @@
 #include "tests/support/simulated_team.hpp"
 #include "tests/support/team_solution.hpp"
 
-namespace crepes {
+namespace crepes::team_darkness_test {
 namespace {
 
 using test::find;
@@ -70,4 +70,4 @@ TEST(TeamDarkness, RangesLocateTheTeamForARobotThatSeesNobody) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_darkness_test

@@ -13,7 +13,7 @@
 #include "tests/support/simulated_team.hpp"
 #include "tests/support/team_solution.hpp"
 
-namespace crepes {
+namespace crepes::team_faults_test {
 namespace {
 
 using test::error_of;
@@ -437,4 +437,4 @@ TEST(TeamFaults, ARobotThatStartsAtAWrongPlaceMovesNobody) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_faults_test

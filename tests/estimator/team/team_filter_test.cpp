@@ -11,7 +11,7 @@
 #include "tests/support/simulated_team.hpp"
 #include "tests/support/team_solution.hpp"
 
-namespace crepes {
+namespace crepes::team_filter_test {
 namespace {
 
 using test::error_of;
@@ -238,4 +238,4 @@ TEST(TeamFilter, TheSameIntervalsGiveTheSameBits) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_filter_test

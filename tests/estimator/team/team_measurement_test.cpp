@@ -7,7 +7,7 @@
 #include "estimator/core/so3.hpp"
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::team_measurement_test {
 namespace {
 
 using test::RandomGeometry;
@@ -188,4 +188,4 @@ TEST(TeamMeasurement, ARangeAboutAnUnknownDirectionCountsLess) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_measurement_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/simulated_belief.hpp"
 
-namespace crepes {
+namespace crepes::team_memory_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -90,4 +90,4 @@ TEST(TeamMemory, AnImuInDoubtIsAsUncertainAsANewOneAndItsErrorsAreTheBestGuess) 
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_memory_test

@@ -5,7 +5,7 @@
 #include "tests/support/random_geometry.hpp"
 #include "tests/support/simulated_belief.hpp"
 
-namespace crepes {
+namespace crepes::team_place_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -71,4 +71,4 @@ TEST(TeamPlace, APoseOfAStrangerHasTheBiasesOfAnyImu) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_place_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::team_prediction_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -104,4 +104,4 @@ TEST_F(TeamPrediction, TakesTheNeighborAtItsOwnClock) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_prediction_test

@@ -10,7 +10,7 @@
 #include "tests/support/simulated_team.hpp"
 #include "tests/support/team_solution.hpp"
 
-namespace crepes {
+namespace crepes::team_size_test {
 namespace {
 
 using test::error_of;
@@ -116,4 +116,4 @@ TEST(TeamSize, RobotsBeyondItsSizeAreHonestOverSeeds) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_size_test

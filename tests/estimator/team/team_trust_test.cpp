@@ -4,7 +4,7 @@
 
 #include "tests/support/simulated_belief.hpp"
 
-namespace crepes {
+namespace crepes::team_trust_test {
 namespace {
 
 using test::kSelf;
@@ -272,4 +272,4 @@ TEST_F(TrustOfFour, NamesWhatCalibrationsAndRangesShow) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_trust_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/random_geometry.hpp"
 
-namespace crepes {
+namespace crepes::team_update_test {
 namespace {
 
 using test::RandomGeometry;
@@ -142,4 +142,4 @@ TEST(TeamUpdate, ManyReadingsOfFewStatesCorrectAllStates) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_update_test

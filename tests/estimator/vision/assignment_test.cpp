@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-namespace crepes {
+namespace crepes::assignment_test {
 namespace {
 
 double total(const std::vector<std::optional<std::size_t>>& column_of,
@@ -84,4 +84,4 @@ TEST(Assignment, FindsTheSameSumFromBothSidesWhenEverythingCouldBeEverything) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::assignment_test

@@ -8,7 +8,7 @@
 #include "estimator/vision/codebook.hpp"
 #include "tests/support/blinking.hpp"
 
-namespace crepes {
+namespace crepes::blink_tracker_swarm_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -144,4 +144,4 @@ TEST_P(BlinkTrackerSwarm, KeepsTwentyCrossingBoardsApart) {
 INSTANTIATE_TEST_SUITE_P(Seeds, BlinkTrackerSwarm, testing::Range(1U, 9U));
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::blink_tracker_swarm_test

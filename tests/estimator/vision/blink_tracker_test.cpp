@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-namespace crepes {
+namespace crepes::blink_tracker_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -466,4 +466,4 @@ TEST(BlinkTracker, TurnsWhatARollingShutterSawToTheStampOfTheFrame) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::blink_tracker_test

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-namespace crepes {
+namespace crepes::camera_model_test {
 namespace {
 
 CameraCalibration fisheye(double xi = -0.1723, double alpha = 0.5931) {
@@ -315,4 +315,4 @@ TEST(CameraModel, RefusesDistortionOfADoubleSphere) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::camera_model_test

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <set>
 
-namespace crepes {
+namespace crepes::codebook_test {
 namespace {
 
 std::string shifted(const std::string& pattern, std::size_t shift) {
@@ -140,4 +140,4 @@ TEST(Codebook, CountsMovedEdgesLessThanAddedFlashes) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::codebook_test

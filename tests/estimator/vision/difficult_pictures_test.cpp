@@ -5,7 +5,7 @@
 
 #include "tests/study/vision_scene.hpp"
 
-namespace crepes::study {
+namespace crepes::study::difficult_pictures_test {
 namespace {
 
 /// A scene of vision_study, as short as it can be.
@@ -68,4 +68,4 @@ TEST(ForeignBoards, AreNotNamed) {
 }
 
 }  // namespace
-}  // namespace crepes::study
+}  // namespace crepes::study::difficult_pictures_test

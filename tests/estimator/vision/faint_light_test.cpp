@@ -9,7 +9,7 @@
 
 #include "estimator/vision/spot_detector.hpp"
 
-namespace crepes {
+namespace crepes::faint_light_test {
 namespace {
 
 /// Gray noise, and the images of points on it.
@@ -146,4 +146,4 @@ TEST(FaintLight, IsLeftToAThresholdThatIsConfigured) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::faint_light_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::hidden_lights_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -88,4 +88,4 @@ TEST(HiddenLights, AreForgottenAfterAWhileAndBounded) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::hidden_lights_test

@@ -9,7 +9,7 @@
 
 #include "estimator/vision/spot_detector.hpp"
 
-namespace crepes {
+namespace crepes::hot_pixel_map_test {
 namespace {
 
 constexpr int kWidth = 160;
@@ -114,4 +114,4 @@ TEST(HotPixelMap, BeginsAnewWithPicturesOfAnotherSize) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::hot_pixel_map_test

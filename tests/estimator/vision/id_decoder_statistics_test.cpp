@@ -5,7 +5,7 @@
 #include "estimator/vision/codebook.hpp"
 #include "tests/support/blinking.hpp"
 
-namespace crepes {
+namespace crepes::id_decoder_statistics_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -202,4 +202,4 @@ TEST_F(IdDecoderStatistics, ReadsLongSlotsAtLowFrameRates) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::id_decoder_statistics_test

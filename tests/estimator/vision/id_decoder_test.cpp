@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-namespace crepes {
+namespace crepes::id_decoder_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -394,4 +394,4 @@ TEST(IdDecoder, ReadsABoardAgainOnceABladeStopsInFrontOfIt) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::id_decoder_test

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-namespace crepes {
+namespace crepes::id_library_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -91,4 +91,4 @@ TEST(IdLibrary, RefusesCodesThatAreNoneAndSaysWhose) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::id_library_test

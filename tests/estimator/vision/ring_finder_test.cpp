@@ -8,7 +8,7 @@
 #include "estimator/vision/spot_detector.hpp"
 #include "tests/support/ring_scene.hpp"
 
-namespace crepes {
+namespace crepes::ring_finder_test {
 namespace {
 
 using test::random_board;
@@ -161,4 +161,4 @@ TEST(RingFinder, TakesRobotsFarAwayForNoRing) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::ring_finder_test

@@ -9,7 +9,7 @@
 
 #include "estimator/vision/arc_joiner.hpp"
 
-namespace crepes {
+namespace crepes::ring_model_test {
 namespace {
 
 /// A board as a lens without distortion shows it.
@@ -117,4 +117,4 @@ TEST(FitEllipse, RefusesHyperbolas) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::ring_model_test

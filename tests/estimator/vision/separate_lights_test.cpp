@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace crepes {
+namespace crepes::separate_lights_test {
 namespace {
 
 /// Gaussian lights on black.
@@ -73,4 +73,4 @@ TEST(SeparateLights, LeavesOutALightThatTheBorderCuts) {
 TEST(SeparateLights, FindsNothingInTheDark) { EXPECT_TRUE(Scene().lights().empty()); }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::separate_lights_test

@@ -11,7 +11,7 @@
 #include "estimator/core/so3.hpp"
 #include "tests/support/ring_scene.hpp"
 
-namespace crepes {
+namespace crepes::spot_detector_test {
 namespace {
 
 using test::Optics;
@@ -414,4 +414,4 @@ TEST(SpotDetector, OfThePaperSaysWhenOpenCvFails) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::spot_detector_test

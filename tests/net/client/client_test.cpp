@@ -11,7 +11,7 @@
 #include "net/subscription/subscription_json.hpp"
 #include "net/udp_socket.hpp"
 
-namespace crepes::client {
+namespace crepes::client::client_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -302,4 +302,4 @@ TEST(ClientConnection, RefusesAnAddressThatIsNone) {
 }
 
 }  // namespace
-}  // namespace crepes::client
+}  // namespace crepes::client::client_test

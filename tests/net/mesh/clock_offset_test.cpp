@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace crepes {
+namespace crepes::clock_offset_test {
 namespace {
 
 struct Network {
@@ -345,4 +345,4 @@ TEST(ClockOffset, IsUnknownWhileOnlyOneWayWorks) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::clock_offset_test

@@ -17,7 +17,7 @@
 #include "net/mesh/packet_seal.hpp"
 #include "net/mesh/packet_signature.hpp"
 
-namespace crepes {
+namespace crepes::locked_key_test {
 namespace {
 
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
@@ -96,4 +96,4 @@ TEST(LockedKey, LeavesNothingOfItsCopies) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::locked_key_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::loss_meter_test {
 namespace {
 
 TEST(LossMeter, FollowsWhatIsMissing) {
@@ -36,4 +36,4 @@ TEST(LossMeter, WhatIsNotForwardedIsNotLost) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::loss_meter_test

@@ -4,7 +4,7 @@
 
 #include <set>
 
-namespace crepes {
+namespace crepes::mesh_counters_test {
 namespace {
 
 using Totals = std::vector<std::pair<std::string, std::uint64_t>>;
@@ -57,4 +57,4 @@ TEST(MeshCounters, RefusalsAreThoseThatAreCalledSo) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::mesh_counters_test

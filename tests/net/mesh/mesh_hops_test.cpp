@@ -10,7 +10,7 @@
 
 #include "net/mesh/peer_link.hpp"
 
-namespace crepes {
+namespace crepes::mesh_hops_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -162,4 +162,4 @@ TEST(MeshHops, ClocksAcrossHopsAreKnown) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::mesh_hops_test

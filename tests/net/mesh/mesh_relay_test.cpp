@@ -6,7 +6,7 @@
 #include <chrono>
 #include <vector>
 
-namespace crepes {
+namespace crepes::mesh_relay_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -150,4 +150,4 @@ TEST(MeshRelay, MarksAboutFourDatagramsASecond) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::mesh_relay_test

@@ -5,7 +5,7 @@
 
 #include "net/mesh/peer_message.hpp"
 
-namespace crepes {
+namespace crepes::packet_seal_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -73,4 +73,4 @@ TEST(PacketSeal, HidesThatTwoDatagramsHaveEqualContents) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::packet_seal_test

@@ -6,7 +6,7 @@
 #include "net/mesh/packet_seal.hpp"
 #include "net/mesh/peer_message.hpp"
 
-namespace crepes {
+namespace crepes::packet_signature_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -114,4 +114,4 @@ TEST(RobotKeys, AreRefusedAsWhatNoRobotHas) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::packet_signature_test

@@ -11,7 +11,7 @@
 #include <random>
 #include <set>
 
-namespace crepes {
+namespace crepes::peer_link_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -487,4 +487,4 @@ TEST(SequenceWindow, CountsLossesButNotLateDatagrams) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::peer_link_test

@@ -18,7 +18,7 @@
 #include "net/mesh/peer_message_code.hpp"
 #include "net/mesh/wire_codes.hpp"
 
-namespace crepes {
+namespace crepes::peer_message_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -488,4 +488,4 @@ TEST(PeerMessage, OmitsAndCountsWhatCannotBeEncoded) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::peer_message_test

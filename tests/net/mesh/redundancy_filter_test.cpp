@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::redundancy_filter_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -41,4 +41,4 @@ TEST(RedundancyFilter, RemembersABoundedNumberWhateverTheStamps) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::redundancy_filter_test

@@ -6,7 +6,7 @@
 
 #include "net/mesh/peer_message.hpp"
 
-namespace crepes {
+namespace crepes::send_pacing_test {
 namespace {
 
 TEST(SendPacing, RepeatsUntilOneInFiveHundredIsLost) {
@@ -129,4 +129,4 @@ TEST(SendPacing, DividesTheAirAmongPeersByTheirDatagrams) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::send_pacing_test

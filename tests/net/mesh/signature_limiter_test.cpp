@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-namespace crepes {
+namespace crepes::signature_limiter_test {
 namespace {
 
 using std::chrono::microseconds;
@@ -78,4 +78,4 @@ TEST(SignatureLimiter, ForgetsTheAddressOfASenderThatWasSilentForLongest) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::signature_limiter_test

@@ -12,7 +12,7 @@
 
 #include "net/mesh/peer_link.hpp"
 
-namespace crepes {
+namespace crepes::signed_link_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -344,4 +344,4 @@ TEST(SignedLink, IsNotMovedByAHundredThousandForgedDatagramsASecond) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::signed_link_test

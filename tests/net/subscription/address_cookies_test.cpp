@@ -5,7 +5,7 @@
 #include <chrono>
 #include <set>
 
-namespace crepes {
+namespace crepes::address_cookies_test {
 namespace {
 
 using std::chrono::seconds;
@@ -72,4 +72,4 @@ TEST(KeyedHash, DependsOnEveryPartOfItsInput) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::address_cookies_test

@@ -11,7 +11,7 @@
 #include "net/subscription/subscription_json.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::pose_push_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -117,4 +117,4 @@ TEST(PosePush, SendsTheSamePosesAsToSubscribers) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::pose_push_test

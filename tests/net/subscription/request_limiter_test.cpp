@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-namespace crepes {
+namespace crepes::request_limiter_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -75,4 +75,4 @@ TEST(RequestLimiter, ReservesTokensForThisMachineDuringRemoteFloods) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::request_limiter_test

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <random>
 
-namespace crepes {
+namespace crepes::subscriber_table_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -217,4 +217,4 @@ TEST(SubscriberTable, CountsTheRequestsOfASubscriberByThemselves) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::subscriber_table_test

@@ -13,7 +13,7 @@
 
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::subscription_json_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -372,4 +372,4 @@ TEST(SubscriptionJson, AnswersWithItsVersionAndLease) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::subscription_json_test

@@ -6,7 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-namespace crepes {
+namespace crepes::subscription_service_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -224,4 +224,4 @@ TEST_F(Service, SendsOneErrorASecondAtMost) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::subscription_service_test

@@ -13,7 +13,7 @@
 #include "net/subscription/subscription_json.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::team_json_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -201,4 +201,4 @@ TEST(TeamJson, HasOnlyDocumentedKeys) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::team_json_test

@@ -10,7 +10,7 @@
 #include "drivers/base/text_file.hpp"
 #include "tests/support/simulated_grid.hpp"
 
-namespace crepes {
+namespace crepes::calibrate_grid_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -106,4 +106,4 @@ TEST_F(CalibrateGrid, ReadsTheSizeOfTheGrid) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::calibrate_grid_test

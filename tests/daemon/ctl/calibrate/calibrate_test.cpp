@@ -32,7 +32,7 @@
 #include "tests/support/calibration_recording.hpp"
 #include "tests/support/calibration_swarm.hpp"
 
-namespace crepes {
+namespace crepes::calibrate_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -540,4 +540,4 @@ TEST_F(CalibrateSwarm, WritesNothingFromFiveSeconds) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::calibrate_test

@@ -7,7 +7,7 @@
 
 #include "drivers/base/scratch_directory.hpp"
 
-namespace crepes {
+namespace crepes::coverage_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -57,4 +57,4 @@ TEST_F(CoverageFileTest, SaysWhereItCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::coverage_file_test

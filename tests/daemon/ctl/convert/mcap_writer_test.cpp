@@ -5,7 +5,7 @@
 #include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
 
-namespace crepes {
+namespace crepes::mcap_writer_test {
 namespace {
 
 std::string written(const std::function<void(McapWriter&)>& fill) {
@@ -52,4 +52,4 @@ TEST(McapWriter, ReportsADiskThatTakesNothing) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::mcap_writer_test

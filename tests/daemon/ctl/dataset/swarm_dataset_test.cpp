@@ -4,7 +4,7 @@
 
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 
-namespace crepes {
+namespace crepes::swarm_dataset_test {
 namespace {
 
 constexpr std::size_t kImu = 20;
@@ -240,4 +240,4 @@ TEST(SwarmDataset, RefusesAConfigurationOfAnotherRobot) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::swarm_dataset_test

@@ -6,7 +6,7 @@
 
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 
-namespace crepes {
+namespace crepes::truth_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -85,4 +85,4 @@ TEST(Trajectory, NamesFileAndLineOfABadRow) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::truth_test

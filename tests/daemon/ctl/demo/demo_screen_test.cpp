@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-namespace crepes {
+namespace crepes::demo_screen_test {
 namespace {
 
 constexpr ScreenFormat kTerminal{.columns = 80, .is_interactive = true};
@@ -64,4 +64,4 @@ TEST(DemoScreen, NamesNoKeysInAFile) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::demo_screen_test

@@ -4,7 +4,7 @@
 
 #include "config/reading/config_file.hpp"
 
-namespace crepes {
+namespace crepes::demo_swarm_test {
 namespace {
 
 TEST(DemoSwarm, GivesEveryRobotAValidConfiguration) {
@@ -20,4 +20,4 @@ TEST(DemoSwarm, GivesEveryRobotAValidConfiguration) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::demo_swarm_test

@@ -10,7 +10,7 @@
 #include "daemon/ctl/demo/formation_score.hpp"
 #include "drivers/base/scratch_directory.hpp"
 
-namespace crepes {
+namespace crepes::steered_swarm_test {
 namespace {
 
 TEST(VelocityCommand, IsReadAsItIsDocumented) {
@@ -118,4 +118,4 @@ TEST(FormationScore, MeasuresFromTheLeader) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::steered_swarm_test

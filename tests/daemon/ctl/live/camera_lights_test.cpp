@@ -8,7 +8,7 @@
 #include "drivers/base/scratch_directory.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::camera_lights_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -55,4 +55,4 @@ TEST_F(CameraLightsTest, LeaveFormerFragmentsIfAPartIsRefused) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::camera_lights_test

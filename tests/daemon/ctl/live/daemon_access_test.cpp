@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace crepes {
+namespace crepes::daemon_access_test {
 namespace {
 
 TEST(DaemonAccess, TurnsAPoseIntoTheToolsOwn) {
@@ -45,4 +45,4 @@ TEST(DaemonAccess, NamesWhyADaemonDoesNotAnswer) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::daemon_access_test

@@ -8,7 +8,7 @@
 
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::pose_advice_test {
 namespace {
 
 TEST(PoseAdvice, AndTheDocumentHaveEveryReason) {
@@ -30,4 +30,4 @@ TEST(PoseAdvice, IsEmptyWithAPoseAndForUnknownReasons) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::pose_advice_test

@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-namespace crepes {
+namespace crepes::progress_bar_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -43,4 +43,4 @@ TEST(ProgressBar, WritesTimesInTwoUnitsAtMost) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::progress_bar_test

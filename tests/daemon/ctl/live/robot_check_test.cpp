@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace crepes {
+namespace crepes::robot_check_test {
 namespace {
 
 using Sensor = client::Status::Sensor;
@@ -196,4 +196,4 @@ TEST(RobotCheck, SaysInWordsWhereANeighborIs) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::robot_check_test

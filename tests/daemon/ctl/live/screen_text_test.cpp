@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace crepes {
+namespace crepes::screen_text_test {
 namespace {
 
 constexpr ScreenFormat kColors{.columns = 80, .has_color = true};
@@ -46,4 +46,4 @@ TEST(ScreenText, DropsDecimalsBeforeDigits) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::screen_text_test

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace crepes {
+namespace crepes::sources_test {
 namespace {
 
 client::Status status_with(std::uint64_t fused, std::uint64_t gated, std::uint64_t reports) {
@@ -52,4 +52,4 @@ TEST(Sources, BeginAnewWithADaemonThatDid) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::sources_test

@@ -8,7 +8,7 @@
 #include "daemon/ctl/live/own_board.hpp"
 #include "daemon/ctl/setup/led.hpp"
 
-namespace crepes {
+namespace crepes::walk_around_test {
 namespace {
 
 /// Of a neighbor at a place, leaning about x.
@@ -137,4 +137,4 @@ TEST(OwnBoard, IsComparedWithTheLibrary) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::walk_around_test

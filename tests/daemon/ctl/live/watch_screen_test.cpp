@@ -8,7 +8,7 @@
 #include <numbers>
 #include <sstream>
 
-namespace crepes {
+namespace crepes::watch_screen_test {
 namespace {
 
 using std::chrono::seconds;
@@ -235,4 +235,4 @@ TEST(WatchScreen, SaysSinceWhenTheDaemonIsSilent) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::watch_screen_test

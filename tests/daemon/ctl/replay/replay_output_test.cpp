@@ -13,7 +13,7 @@
 #include "drivers/dataset/record_file.hpp"
 #include "drivers/dataset/team_record_file.hpp"
 
-namespace crepes {
+namespace crepes::replay_output_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -357,4 +357,4 @@ TEST(ReplayReport, RefusesWhatIsNoReport) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::replay_output_test

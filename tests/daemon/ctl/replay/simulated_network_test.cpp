@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace crepes {
+namespace crepes::simulated_network_test {
 namespace {
 
 constexpr int kDatagrams = 200'000;
@@ -71,4 +71,4 @@ TEST(SimulatedNetwork, LosesNothingWithoutLoss) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::simulated_network_test

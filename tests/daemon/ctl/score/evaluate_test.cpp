@@ -11,7 +11,7 @@
 #include "drivers/dataset/pose_file.hpp"
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 
-namespace crepes {
+namespace crepes::evaluate_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -344,4 +344,4 @@ TEST_F(Evaluate, SaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::evaluate_test

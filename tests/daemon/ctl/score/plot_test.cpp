@@ -11,7 +11,7 @@
 #include "daemon/ctl/score/svg_chart.hpp"
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 
-namespace crepes {
+namespace crepes::plot_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -215,4 +215,4 @@ TEST_F(Plot, SaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::plot_test

@@ -9,7 +9,7 @@
 #include "estimator/vision/id_library.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::codebook_test {
 namespace {
 
 constexpr const char* kTheRest = R"(robot: {id: 1}
@@ -92,4 +92,4 @@ TEST(CodebookCommand, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::codebook_test

@@ -13,7 +13,7 @@
 #include "tests/support/fake_iio.hpp"
 #include "tests/support/gige_camera.hpp"
 
-namespace crepes {
+namespace crepes::devices_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -102,4 +102,4 @@ TEST_F(Devices, OfTheKernelAreFoundToo) {
 TEST_F(Devices, MayBeNone) { EXPECT_EQ(list_devices(options_), "no camera\nno serial port\n"); }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::devices_test

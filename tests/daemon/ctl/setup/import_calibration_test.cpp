@@ -9,7 +9,7 @@
 #include "drivers/base/text_file.hpp"
 #include "tests/support/places.hpp"
 
-namespace crepes {
+namespace crepes::import_calibration_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -240,4 +240,4 @@ TEST(ImportCalibration, RefusesTheSameCameraOrImuTwice) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::import_calibration_test

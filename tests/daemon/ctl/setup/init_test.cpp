@@ -16,7 +16,7 @@
 #include "estimator/vision/camera_model.hpp"
 #include "tests/support/fake_iio.hpp"
 
-namespace crepes {
+namespace crepes::init_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -267,4 +267,4 @@ TEST(RobotPlan, TurnsTheCameraByRotationsAlone) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::init_test

@@ -7,7 +7,7 @@
 #include "tests/support/hex.hpp"
 #include "tests/support/witmotion_sensor.hpp"
 
-namespace crepes {
+namespace crepes::setup_witmotion_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -52,4 +52,4 @@ TEST(SetupWitMotion, ReportsThatNothingAnswers) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::setup_witmotion_test

@@ -8,7 +8,7 @@
 
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 
-namespace crepes {
+namespace crepes::spots_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -271,4 +271,4 @@ TEST_F(Pictures, AreNotDrawnWhereNothingCanBeWritten) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::spots_test

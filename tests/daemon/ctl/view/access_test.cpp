@@ -4,7 +4,7 @@
 
 #include "daemon/ctl/view/listen_address.hpp"
 
-namespace crepes {
+namespace crepes::access_test {
 namespace {
 
 const AccessPolicy kOpen{.token = "", .names = {"robot1", "robot1.local"}};
@@ -105,4 +105,4 @@ TEST(ListenAddress, PutsIpv6IntoBracketsInAUrl) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::access_test

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-namespace crepes {
+namespace crepes::camera_picture_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -82,4 +82,4 @@ TEST(CameraPicture, ShowsTheLightAndWhoMayChangeIt) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::camera_picture_test

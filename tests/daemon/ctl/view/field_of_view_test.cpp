@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-namespace crepes {
+namespace crepes::field_of_view_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -59,4 +59,4 @@ TEST(FieldOfView, IsNullForAFaultyCalibration) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::field_of_view_test

@@ -14,7 +14,7 @@
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/base/unique_fd.hpp"
 
-namespace crepes {
+namespace crepes::http_server_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -144,4 +144,4 @@ TEST(HttpServer, LeavesAReplyThatIsOnItsWayAlone) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::http_server_test

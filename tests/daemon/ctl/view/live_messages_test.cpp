@@ -8,7 +8,7 @@
 #include "daemon/ctl/view/view_json.hpp"
 #include "net/subscription/subscription_json.hpp"
 
-namespace crepes {
+namespace crepes::live_messages_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -137,4 +137,4 @@ TEST(ViewJson, LeavesOutWhatIsNotANumber) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::live_messages_test

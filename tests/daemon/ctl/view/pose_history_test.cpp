@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-namespace crepes {
+namespace crepes::pose_history_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -43,4 +43,4 @@ TEST(PoseHistory, HasNothingWhereItLost) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::pose_history_test

@@ -9,7 +9,7 @@
 #include "drivers/dataset/record_file.hpp"
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 
-namespace crepes {
+namespace crepes::recorded_feed_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -131,4 +131,4 @@ TEST(PageFiles, HaveNoScriptOrStyleInlineAndNothingFromElsewhere) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::recorded_feed_test

@@ -5,7 +5,7 @@
 #include <Eigen/LU>
 #include <random>
 
-namespace crepes {
+namespace crepes::arrow_system_test {
 namespace {
 
 constexpr int kState = ArrowSystem::kState;
@@ -93,4 +93,4 @@ TEST(ArrowSystem, RefusesWhatIsNotPositiveDefinite) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::arrow_system_test

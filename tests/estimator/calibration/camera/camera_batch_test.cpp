@@ -9,7 +9,7 @@
 #include "estimator/core/constants.hpp"
 #include "tests/support/calibration_recording.hpp"
 
-namespace crepes {
+namespace crepes::camera_batch_test {
 namespace {
 
 const ImuNoise kNoise;
@@ -137,4 +137,4 @@ TEST(CameraBatch, RefusesWithoutBoards) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::camera_batch_test

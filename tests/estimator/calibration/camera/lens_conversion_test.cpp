@@ -6,7 +6,7 @@
 #include "estimator/core/constants.hpp"
 #include "estimator/vision/camera_model.hpp"
 
-namespace crepes {
+namespace crepes::lens_conversion_test {
 namespace {
 
 CameraModel kannala_brandt(const KannalaBrandtFit& fit) {
@@ -51,4 +51,4 @@ TEST(LensConversion, KeepsTheCenterAndTheShapeOfPixels) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::lens_conversion_test

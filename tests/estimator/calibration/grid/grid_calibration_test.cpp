@@ -7,7 +7,7 @@
 
 #include "tests/support/simulated_grid.hpp"
 
-namespace crepes {
+namespace crepes::grid_calibration_test {
 namespace {
 
 using simulated::SeenGrid;
@@ -152,4 +152,4 @@ TEST(GridCalibration, NamesThePicturesInWhichItFoundNoGrid) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::grid_calibration_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/simulated_grid.hpp"
 
-namespace crepes {
+namespace crepes::grid_order_test {
 namespace {
 
 using simulated::five_by_seven;
@@ -111,4 +111,4 @@ TEST(GridOrder, TakesNoGridOfAnotherSizeForHalfOfOne) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::grid_order_test

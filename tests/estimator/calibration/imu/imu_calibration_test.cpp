@@ -7,7 +7,7 @@
 #include "estimator/calibration/imu/allan_deviation.hpp"
 #include "tests/support/calibration_recording.hpp"
 
-namespace crepes {
+namespace crepes::imu_calibration_test {
 namespace {
 
 const ImuNoise kNoise;
@@ -124,4 +124,4 @@ TEST(Allan, HasNothingToSayOfAFewReadings) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::imu_calibration_test

@@ -8,7 +8,7 @@
 #include "estimator/calibration/range/robust_mean.hpp"
 #include "tests/support/calibration_recording.hpp"
 
-namespace crepes {
+namespace crepes::range_calibration_test {
 namespace {
 
 constexpr double kNoise_m = 0.05;
@@ -189,4 +189,4 @@ TEST(RangeCalibration, TakesTheLatePathLimitOfTheRobotThatMeasured) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::range_calibration_test

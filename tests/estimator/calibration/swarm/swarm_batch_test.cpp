@@ -7,7 +7,7 @@
 #include "estimator/core/constants.hpp"
 #include "tests/support/calibration_swarm.hpp"
 
-namespace crepes {
+namespace crepes::swarm_batch_test {
 namespace {
 
 const ImuNoise kSwarmNoise;
@@ -145,4 +145,4 @@ TEST(SwarmBatch, NamesARobotWithoutAPoseToStartFrom) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::swarm_batch_test

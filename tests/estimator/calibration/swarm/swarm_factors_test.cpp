@@ -6,7 +6,7 @@
 #include "tests/support/calibration_swarm.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 
-namespace crepes {
+namespace crepes::swarm_factors_test {
 namespace {
 
 struct TwoRobots {
@@ -90,4 +90,4 @@ TEST(SwarmFactors, ClocksTurnStampsIntoCommonTimeAndBack) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::swarm_factors_test

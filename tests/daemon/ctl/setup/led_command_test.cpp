@@ -17,7 +17,7 @@
 #include "tests/support/places.hpp"
 #include "tests/support/ram_flash.hpp"
 
-namespace crepes {
+namespace crepes::led_command_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -192,4 +192,4 @@ TEST(LedSettings, RefuseWhatABoardCannotDo) {
 }
 
 }  // namespace
-}  // namespace crepes
+}  // namespace crepes::led_command_test
