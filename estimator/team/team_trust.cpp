@@ -114,15 +114,45 @@ Witnesses witnesses(const Robots& robots, const IsExcluded& is_excluded) {
   return witnesses;
 }
 
-/// It contradicts most of the robots that it sees, at least two, and nobody contradicts the place
-/// of the robot that carries it.
-bool is_turned(const Robots& robots, RobotId observer, const TeamCamera& camera) {
+/// Whether another camera than `observer`'s contradicts the place of `id`.
+bool others_contradict(const Robots& robots, RobotId observer, RobotId id) {
+  const auto all =
+      witnesses(robots, [&](RobotId witness, const TeamCamera&) { return witness == observer; });
+  const auto found = all.find(id);
+  return found != all.end() && found->second.gated > 0.0;
+}
+
+/// It contradicts most of the robots that it sees, at least two since one may itself be in the
+/// wrong place.
+bool contradicts_most(const TeamCamera& camera) {
   const auto seen = std::ranges::count_if(camera.agreement, [](const auto& entry) {
     return entry.second.fused + entry.second.gated > 1.0;
   });
   const auto contradicted = std::ranges::count_if(
       camera.agreement, [](const auto& entry) { return entry.second.is_contradiction(); });
-  if (contradicted < 2 || 2 * contradicted <= seen) return false;
+  return contradicted >= 2 && 2 * contradicted > seen;
+}
+
+/// The rule for a camera that was found turned before. It contradicts a robot that no other camera
+/// contradicts, of late more often than it agrees with all others: what it agreed with while it was
+/// turned says nothing for it now.
+bool contradicts_more(const Robots& robots, RobotId observer, const TeamCamera& camera) {
+  double agreed = 0.0;
+  double contradicted = 0.0;
+  for (const auto& [neighbor, agreement] : camera.agreement) {
+    if (!agreement.is_contradiction()) {
+      agreed += agreement.fused;
+    } else if (!others_contradict(robots, observer, neighbor)) {
+      contradicted += agreement.gated;
+    }
+  }
+  return contradicted > agreed;
+}
+
+/// Nobody contradicts the place of the robot that carries it.
+bool is_turned(const Robots& robots, RobotId observer, const TeamCamera& camera, bool was_turned) {
+  if (!contradicts_most(camera) && !(was_turned && contradicts_more(robots, observer, camera)))
+    return false;
   const auto all = witnesses(robots, [](RobotId, const TeamCamera&) { return false; });
   const auto of_observer = all.find(observer);
   return of_observer == all.end() || of_observer->second.gated == 0.0;
@@ -251,7 +281,7 @@ bool TeamTrust::is_everybody_strained(Timestamp now) const {
 
 std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBelief& belief) {
   const Witnesses all = witnesses(belief.robots, [&](RobotId observer, const TeamCamera& camera) {
-    return is_turned(belief.robots, observer, camera);
+    return is_turned(belief.robots, observer, camera, verdicts_.contains(observer));
   });
   // A robot that was away may have been repaired.
   const auto is_away = [&](const auto& entry) { return interval.member(entry.first) == nullptr; };
@@ -283,7 +313,7 @@ std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamB
   for (const auto& [id, robot] : belief.robots) {
     if (is_strained(id, belief.stamp)) continue;
     for (const TeamCamera& camera : robot.cameras) {
-      const bool contradicts = is_turned(belief.robots, id, camera);
+      const bool contradicts = is_turned(belief.robots, id, camera, verdicts_.contains(id));
       // What a camera that may be turned has learned of late may be what strained the team.
       const bool is_settling = is_realigned(id) || (camera.is_free && verdicts_.contains(id));
       const MisalignmentTest test =
