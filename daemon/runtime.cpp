@@ -37,7 +37,7 @@ Runtime::Runtime(Config config, const Clock& machine)
       recorder_settings_(config_) {
   if (config_.sim.enabled) open_simulation();
   for (const CameraConfig& camera : config_.cameras) {
-    cameras_.emplace_back(config_.vision, camera.device.light);
+    cameras_.emplace_back(config_.vision, camera.device.light_settings());
     picture_taps_.emplace_back();
   }
   active_config_ = config_;
@@ -58,6 +58,7 @@ Runtime::Runtime(Config config, const Clock& machine)
         .publish_status = [this](EstimatorStatus status) { outputs_.push(std::move(status)); },
         .sight =
             [this](PictureRobots sighting) {
+              cameras_[sighting.camera].boards.push(sighting);
               if (!config_.recording.socket.empty()) sightings_.push(std::move(sighting));
             },
         .late_frames = late_frames_};
@@ -131,7 +132,9 @@ void Runtime::update_settings() {
   uwb_settings_.update(uwb_sensor_settings(active_config_));
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     cameras_[i].settings.update(active_config_.vision);
-    cameras_[i].light.update(active_config_.cameras[i].device.light);
+    const LightSettings light = active_config_.cameras[i].device.light_settings();
+    cameras_[i].light_settings.update(light);
+    cameras_[i].light.update(light);
   }
   recorder_settings_.update(active_config_);
 }
@@ -184,6 +187,9 @@ void Runtime::start_camera(std::size_t index, const EventSink& sense) {
     const VisionStage stage{.camera_name = name,
                             .is_calibrated = is_calibrated,
                             .settings = queues.settings,
+                            .light_settings = queues.light_settings,
+                            .light = queues.light,
+                            .boards = queues.boards,
                             .frames = queues.frames,
                             .recycled = queues.recycled,
                             .tap = tap,

@@ -53,10 +53,12 @@ class Runtime {
 
  private:
   struct CameraQueues {
-    CameraQueues(const VisionConfig& vision, const CameraLight& initial)
-        : settings(vision), light(initial) {}
+    CameraQueues(const VisionConfig& vision, const LightSettings& initial)
+        : settings(vision), light_settings(initial), light(initial) {}
     LiveSettings<VisionConfig> settings;
-    LiveLight light;
+    LiveSettings<LightSettings> light_settings;  // for the vision stage
+    LiveLight light;                             // for the camera
+    PictureRobotsQueue boards{16, Overflow::kDropOldest};
     FrameQueue frames{1, Overflow::kDropOldest};    // only the newest picture matters
     FrameQueue recycled{2, Overflow::kDropOldest};  // buffers on their way back to the camera
   };

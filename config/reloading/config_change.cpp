@@ -76,7 +76,7 @@ void walk_settings(Config& config, OnSetting on_setting) {
   config.visit(walk);
 }
 
-/// Takes over exposure and gain of every camera that both have, whatever else of it waits for a
+/// Takes over the light of every camera that both have, whatever else of it waits for a
 /// restart. Adds the keys that change.
 void change_lights(const std::vector<CameraConfig>& wanted, std::vector<CameraConfig>& cameras,
                    std::vector<std::string>& live) {
@@ -90,6 +90,8 @@ void change_lights(const std::vector<CameraConfig>& wanted, std::vector<CameraCo
     if (before.exposure_us != light.exposure_us)
       live.push_back(fmt::format("cameras[{}].exposure_us", i));
     if (before.gain != light.gain) live.push_back(fmt::format("cameras[{}].gain", i));
+    if (std::exchange(cameras[i].device.exposure, same->device.exposure) != same->device.exposure)
+      live.push_back(fmt::format("cameras[{}].exposure", i));
   }
 }
 

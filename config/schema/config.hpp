@@ -61,7 +61,7 @@ struct Config {
     v.section("robot", robot, Change::kRestart, "this robot");
     v.section("swarm", swarm, Change::kLive, "members of the swarm; the same on all robots");
     v.list("cameras", cameras, Change::kRestart,
-           "this robot's cameras; exposure_us and gain are live");
+           "this robot's cameras; exposure, exposure_us and gain are live");
     v.section("imu", imu, Change::kLive, "inertial sensor");
     v.section("uwb", uwb, Change::kLive, "ranging module");
     v.section("vision", vision, Change::kLive, "spots, tracks and IDs");

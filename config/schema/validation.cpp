@@ -181,6 +181,8 @@ void check_driver(const std::string& key, const CameraConfig& camera, RuleFaults
   if (camera.device.light.exposure_us &&
       *camera.device.light.exposure_us >= kMicroseconds / camera.calibration.rate_hz)
     faults.push_back({key + ".exposure_us", "is longer than a frame at rate_hz"});
+  if (camera.device.exposure == ExposureControl::kAuto && !camera.device.light.exposure_us)
+    faults.push_back({key + ".exposure", "auto needs exposure_us, the longest exposure"});
   const bool is_kernels = camera.device.driver == CameraDriver::kV4l2 ||
                           camera.device.driver == CameraDriver::kLibcamera;
   if (is_kernels && camera.device.trigger == CameraTrigger::kHardware)

@@ -50,6 +50,18 @@ class CameraDevice final : public Device {
 
 }  // namespace
 
+CameraLight LiveLight::receive() {
+  if (const auto newest = settings_.receive()) {
+    newest_ = *newest;
+    automatic_us_.reset();
+  }
+  if (const auto exposure_us = exposures_us_.try_pop()) automatic_us_ = exposure_us;
+  CameraLight light = newest_.light;
+  if (newest_.exposure == ExposureControl::kAuto && automatic_us_)
+    light.exposure_us = automatic_us_;
+  return light;
+}
+
 Sensor camera_sensor(const std::string& name, const OpenCamera& open, LiveLight& light,
                      const Clock& clock, FrameQueue& frames, FrameQueue& recycled) {
   Sensor sensor;

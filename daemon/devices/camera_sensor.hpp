@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "daemon/devices/sensor.hpp"
@@ -16,25 +17,27 @@ namespace crepes {
 using FrameQueue = BoundedQueue<Frame>;
 using OpenCamera = std::function<Result<std::unique_ptr<Camera>>(const CameraLight&)>;
 
-/// A camera's exposure and gain: the main thread changes them, the camera's thread follows.
+/// A camera's light: the main thread changes the settings, the vision thread the exposure where
+/// that is automatic, the camera's thread follows.
 class LiveLight {
  public:
-  explicit LiveLight(const CameraLight& initial) : settings_(initial) {}
+  explicit LiveLight(const LightSettings& initial) : settings_(initial) {}
 
   /// For the main thread.
-  void update(const CameraLight& wanted) { settings_.update(wanted); }
+  void update(const LightSettings& wanted) { settings_.update(wanted); }
+  /// For the vision thread. Without effect on an exposure that is fixed.
+  void expose(double exposure_us) { exposures_us_.push(exposure_us); }
 
   /// For the camera's thread, as is the rest.
-  [[nodiscard]] bool has_update() const { return settings_.has_update(); }
+  [[nodiscard]] bool has_update() const { return settings_.has_update() || !exposures_us_.empty(); }
   /// The newest light.
-  [[nodiscard]] const CameraLight& receive() {
-    if (const auto newest = settings_.receive()) light_ = *newest;
-    return light_;
-  }
+  [[nodiscard]] CameraLight receive();
 
  private:
-  LiveSettings<CameraLight> settings_;
-  CameraLight light_;
+  LiveSettings<LightSettings> settings_;
+  BoundedQueue<double> exposures_us_{1, Overflow::kDropOldest};
+  LightSettings newest_;
+  std::optional<double> automatic_us_;
 };
 
 /// Pushes the camera's frames to `frames`, and returns the frames in `recycled` to the camera. A

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/stages/auto_exposure.hpp"
 #include "daemon/stages/health_report.hpp"
 #include "estimator/vision/spot_detector.hpp"
 
@@ -108,8 +109,15 @@ class Delays {
   std::vector<Duration> delays_;
 };
 
+void append_exposure(const AutoExposure& exposure, Totals& counts) {
+  const std::optional<double> exposure_us = exposure.exposure_us();
+  if (!exposure_us) return;
+  counts.emplace_back("auto_exposure_us", static_cast<std::uint64_t>(*exposure_us));
+  counts.emplace_back("longest_exposure_us", static_cast<std::uint64_t>(exposure.longest_us()));
+}
+
 SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::uint64_t failures,
-                       Delays& delays, SpotLevels& levels) {
+                       Delays& delays, SpotLevels& levels, const AutoExposure& exposure) {
   const auto [median_us, p99_us] = delays.percentiles_since_last_call();
   SensorTotals totals{.faults = {{"failures", failures}},
                       .counts = {{"delay_p50_us", median_us},
@@ -122,6 +130,7 @@ SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::ui
                                  {"faint", rejected.faint},
                                  {"surplus", rejected.surplus}}};
   levels.append_since_last_call(totals.counts);
+  append_exposure(exposure, totals.counts);
   return totals;
 }
 
@@ -134,10 +143,12 @@ void run_vision(const VisionStage& stage, const StageContext& context,
   Rejected rejected;
   Delays delays;
   SpotLevels levels;
+  AutoExposure exposure{LightSettings{}};
   std::uint64_t failures = 0;
   while (!stop.stop_requested()) {
     context.iterations.add();
     if (const auto settings = stage.settings.receive()) detector.emplace(*settings);
+    if (const auto settings = stage.light_settings.receive()) exposure = AutoExposure(*settings);
     std::optional<Frame> frame = stage.frames.pop_for(milliseconds{100}, stop);
     if (!frame) continue;
     const Detection found =
@@ -145,12 +156,16 @@ void run_vision(const VisionStage& stage, const StageContext& context,
     stage.sink(SpotFrame{frame->stamp, frame->camera, {found.spots.begin(), found.spots.end()}});
     delays.add(context.clock.now() - frame->arrival);
     levels.add(found.spots);
+    while (const auto seen = stage.boards.try_pop()) exposure.add(seen->bearings);
+    if (const auto exposure_us = exposure.step(frame->stamp, {.background = found.background * 1.0,
+                                                              .threshold = found.threshold * 1.0}))
+      stage.light.expose(*exposure_us);
     health.count(1);
     rejected += found.rejected;
     failures += found.failure.empty() ? 0 : 1;
     if (health.is_due()) {
       health.publish(std::string(diagnosis_of(found, stage.is_calibrated)),
-                     totals_of(found, rejected, failures, delays, levels));
+                     totals_of(found, rejected, failures, delays, levels, exposure));
     }
     if (stage.tap.requests.try_pop()) stage.tap.pictures.push(picture_of(*frame, found));
     stage.recycled.push(std::move(*frame));

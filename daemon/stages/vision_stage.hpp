@@ -8,6 +8,7 @@
 #include "daemon/stages/live_settings.hpp"
 #include "daemon/stages/picture_tap.hpp"
 #include "daemon/stages/stage_context.hpp"
+#include "drivers/camera/camera_light.hpp"
 #include "estimator/vision/vision_config.hpp"
 
 namespace crepes {
@@ -17,6 +18,9 @@ struct VisionStage {
   std::string camera_name;
   bool is_calibrated;
   LiveSettings<VisionConfig>& settings;
+  LiveSettings<LightSettings>& light_settings;
+  LiveLight& light;
+  PictureRobotsQueue& boards;  ///< that were identified in this camera's pictures
   FrameQueue& frames;
   FrameQueue& recycled;
   PictureTap& tap;

@@ -30,6 +30,7 @@ struct CameraDeviceConfig {
   std::string folder;
   std::string id;
   CameraLight light;
+  ExposureControl exposure = ExposureControl::kFixed;
   std::array<int, 2> offset{};
   CameraTrigger trigger = CameraTrigger::kFree;
   std::string trigger_source = "Line1";
@@ -38,6 +39,7 @@ struct CameraDeviceConfig {
   std::string library = "libMVSDK.so";
 
   [[nodiscard]] bool operator==(const CameraDeviceConfig&) const = default;
+  [[nodiscard]] LightSettings light_settings() const { return {light, exposure}; }
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -50,6 +52,8 @@ struct CameraDeviceConfig {
             "omitted: the only device");
     v.field("exposure_us", light.exposure_us, Bounds{1, 100000},
             "exposure time, shorter than a frame; if omitted: the device's setting (live)");
+    v.choice("exposure", exposure, kExposureControls,
+             "fixed; auto: exposure_us at most, and shorter while boards are near (live)");
     v.field("gain", light.gain, Bounds{0, 1000},
             "in the device's own unit (aravis: usually dB); if omitted: the device's setting "
             "(live)");

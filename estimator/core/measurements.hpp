@@ -51,6 +51,7 @@ struct BasicBearing {
   Eigen::Vector3d p_B_C = Eigen::Vector3d::Zero();  ///< the camera's optical center in the body [m]
   double sigma_rad = 0.0;                           ///< one sigma across the direction
   Naming how = Naming::kRead;                       ///< those of a report are read
+  double peak = 0.0;                                ///< gray levels; reports do not say
 };
 
 /// The lever arms that readings of a pair refer to: rings of LEDs and antennas, in each one's body.

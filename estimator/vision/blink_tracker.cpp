@@ -141,6 +141,7 @@ void BlinkTracker::unproject(const SpotFrame& frame, Timestamp stamp) {
     sightings_.push_back({.u_B = T_B_C_.q * *u_C,
                           .radius_rad = std::sqrt(spot.area_px2 / std::numbers::pi) * px_rad,
                           .px_rad = px_rad,
+                          .peak = spot.peak,
                           .exposed = exposure_of(spot.v_px, stamp)});
     Sighting& sighting = sightings_.back();
     if (row_delay_s_ != 0.0 && !imu_.empty())
@@ -361,7 +362,8 @@ void BlinkTracker::name(Track& track, Timestamp stamp, std::vector<Bearing>& bea
                         .u_B = track.seen.u_B,
                         .p_B_C = T_B_C_.p,
                         .sigma_rad = config_.bearing_sigma_px * track.seen.px_rad,
-                        .how = read ? Naming::kRead : Naming::kPredicted};
+                        .how = read ? Naming::kRead : Naming::kPredicted,
+                        .peak = track.seen.peak};
   bearings.push_back(bearing);
   if (!read) track.predicted.push_back(bearing);
 }

@@ -66,6 +66,7 @@ class BlinkTracker {
     Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
     double radius_rad = 0.0;  ///< of the blob
     double px_rad = 0.0;      ///< what a pixel subtends here
+    double peak = 0.0;        ///< gray levels
     Timestamp exposed{};      ///< middle of its row's exposure, body time
   };
   struct Track {

@@ -96,8 +96,12 @@ std::string lights_table(const client::Status& status, const CameraLights& light
   std::vector<std::vector<std::string>> rows{{"camera", "exposure us", "gain", "background",
                                               "threshold", "faintest", "brightest", "lights"}};
   for (const auto& [camera, light] : lights.all()) {
-    std::vector<std::string> row{camera, setting(light.exposure_us), setting(light.gain)};
     const client::Status::Sensor* const spots = spots_of(status, camera);
+    const std::uint64_t automatic_us = spots == nullptr ? 0 : level(*spots, "auto_exposure_us");
+    std::vector<std::string> row{
+        camera,
+        automatic_us == 0 ? setting(light.exposure_us) : fmt::format("{} auto", automatic_us),
+        setting(light.gain)};
     for (const char* name : {"background", "threshold", "faintest", "brightest", "spots"})
       row.push_back(spots == nullptr ? "-" : std::to_string(level(*spots, name)));
     rows.push_back(std::move(row));
@@ -117,6 +121,8 @@ Json lights_json(const client::Status& status, const CameraLights& lights) {
     if (const client::Status::Sensor* const spots = spots_of(status, camera)) {
       for (const char* name : {"background", "threshold", "faintest", "brightest", "spots"})
         one[name] = level(*spots, name);
+      if (const std::uint64_t automatic_us = level(*spots, "auto_exposure_us"); automatic_us > 0)
+        one["auto_exposure_us"] = automatic_us;
     }
     json["cameras"].push_back(std::move(one));
   }

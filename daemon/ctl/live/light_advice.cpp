@@ -21,7 +21,10 @@ std::string light_advice(const client::Status::Totals& counts) {
     return "put another robot's board in view, at the longest distance that you need";
   if (total("spots") > kClutter)
     return "lamps, windows or mirrors are in view: shorten exposure_us";
-  if (total("brightest") < kWhite) return "no board is white: lengthen exposure_us, or raise gain";
+  const bool is_automatic = total("auto_exposure_us") > 0;
+  if (is_automatic && total("auto_exposure_us") < total("longest_exposure_us")) return "";
+  if (total("brightest") < kWhite && !is_automatic)
+    return "no board is white: lengthen exposure_us, or raise gain";
   if (total("faintest") < total("threshold") + kMargin)
     return "the faintest light is nearly lost: if it is a board, lengthen exposure_us; if not, "
            "shorten it";

@@ -40,6 +40,7 @@ class PickyCamera final : public Camera {
 class CameraSensor : public testing::Test {
  protected:
   static CameraLight exposure(double us) { return {.exposure_us = us, .gain = {}}; }
+  static LightSettings fixed(double us) { return {exposure(us), ExposureControl::kFixed}; }
 
   std::unique_ptr<Device> open() { return sensor_.open().value(); }
 
@@ -47,7 +48,7 @@ class CameraSensor : public testing::Test {
   ManualClock clock_;
   FrameQueue frames_{1, Overflow::kDropOldest};
   FrameQueue recycled_{1, Overflow::kDropOldest};
-  LiveLight light_{exposure(500)};
+  LiveLight light_{fixed(500)};
   Sensor sensor_ = camera_sensor(
       "cam0",
       [this](const CameraLight& light) -> Result<std::unique_ptr<Camera>> {
@@ -62,7 +63,7 @@ TEST_F(CameraSensor, ChangesTheLightOfACameraThatRuns) {
   ASSERT_TRUE(device->read_once(0ms));
   EXPECT_TRUE(log_.set.empty());
 
-  light_.update(exposure(300));
+  light_.update(fixed(300));
   ASSERT_TRUE(device->read_once(0ms));
   ASSERT_TRUE(device->read_once(0ms));
 
@@ -71,19 +72,19 @@ TEST_F(CameraSensor, ChangesTheLightOfACameraThatRuns) {
 
 TEST_F(CameraSensor, GoesOnWithTheLightThatItHasWhereOneIsRefused) {
   const auto device = open();
-  light_.update(exposure(2000));
+  light_.update(fixed(2000));
 
   EXPECT_EQ(device->read_once(0ms).value(), 1U);
   EXPECT_EQ(device->diagnosis(), "exposure_us: too long");
 
-  light_.update(exposure(400));
+  light_.update(fixed(400));
   EXPECT_EQ(device->read_once(0ms).value(), 1U);
   EXPECT_EQ(device->diagnosis(), std::nullopt);
 }
 
 TEST_F(CameraSensor, OpensACameraThatReturnsWithTheNewestLight) {
   static_cast<void>(open());
-  light_.update(exposure(300));
+  light_.update(fixed(300));
 
   static_cast<void>(open());
 
