@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace crepes {
@@ -65,8 +64,9 @@ double AutoExposure::next_exposure(Timestamp now, const PictureLevels& levels) {
   const double shortest_us = longest_us_ / kLongToShort;
   if (resumed_us_) {
     next_trial_ = now + kTrialPeriod;
-    return std::clamp(exposure_us_ * least_factor(levels),
-                      *std::exchange(resumed_us_, std::nullopt), longest_us_);
+    const double before = *std::exchange(resumed_us_, std::nullopt);
+    if (peaks_.empty()) return longest_us_;
+    return std::clamp(exposure_us_ * least_factor(levels), before, longest_us_);
   }
   if (now >= next_trial_ && exposure_us_ < longest_us_ && levels.background < kBright) {
     window_end_ = now + kTrial;
@@ -90,12 +90,12 @@ double AutoExposure::factor(const PictureLevels& levels) const {
   return std::clamp(std::max(wanted, least_factor(levels)), 1.0 / kStep, kStep);
 }
 
-/// By which it must be multiplied, or more, for the faintest board; 0 if there is none. Light above
-/// the background is proportional to the exposure.
+/// By which it must be multiplied, or more, for the faintest board; 0 if there is none, or if even
+/// the faintest is white. Light above the background is proportional to the exposure.
 double AutoExposure::least_factor(const PictureLevels& levels) const {
-  if (peaks_.empty()) return 0.0;
-  double faintest = std::numeric_limits<double>::infinity();
+  double faintest = kWhite;
   for (const auto& [robot, peak] : peaks_) faintest = std::min(faintest, peak);
+  if (faintest >= kWhite) return 0.0;
   const double least = levels.threshold + kMargin - levels.background;
   return least / std::max(1.0, faintest - levels.background);
 }

@@ -421,10 +421,11 @@ TEST(ConfigFile, ReportsAllFaultsAtOnceInOrderOfLines) {
 }
 
 TEST(ConfigFile, NamesEveryRequiredKeyOfAnEmptyMapping) {
-  EXPECT_EQ(faults_of("{}"),
-            "f:1: robot.id: is missing: this robot's id; must be one of swarm.members\n"
-            "f:1: swarm.members: is missing: all robots of the swarm, this one included\n"
-            "f:1: cameras: is missing: this robot's cameras; exposure_us and gain are live");
+  EXPECT_EQ(
+      faults_of("{}"),
+      "f:1: robot.id: is missing: this robot's id; must be one of swarm.members\n"
+      "f:1: swarm.members: is missing: all robots of the swarm, this one included\n"
+      "f:1: cameras: is missing: this robot's cameras; exposure, exposure_us and gain are live");
 }
 
 TEST(ConfigFile, RefusesTextThatIsNoConfiguration) {
@@ -468,6 +469,8 @@ TEST(ConfigFile, RefusesWhatACamerasDriverCannotDo) {
   EXPECT_EQ(with("exposure_us: 5000"),
             "f:10: cameras[0].exposure_us: is longer than a frame at rate_hz");
   EXPECT_EQ(with("exposure_us: 4999"), "");
+  EXPECT_EQ(with("exposure: auto"),
+            "f:10: cameras[0].exposure: auto needs exposure_us, the longest exposure");
   EXPECT_EQ(with("rolling_shutter_us_per_row: -4.9"),
             "f:10: cameras[0].rolling_shutter_us_per_row: all rows together take longer than a "
             "frame at rate_hz");

@@ -68,7 +68,7 @@ class NthSetting {
  private:
   /// Of a camera, exposure and gain change while it runs.
   void name_change_in(const std::string& key) {
-    const bool is_light = key_ == "exposure_us" || key_ == "gain";
+    const bool is_light = key_ == "exposure" || key_ == "exposure_us" || key_ == "gain";
     key_ = is_light ? prefix_ + key + "[0]." + key_ : prefix_ + key;
     if (is_light) when_ = Change::kLive;
   }
