@@ -170,7 +170,7 @@ void check_keys(const Config& config, RuleFaults& faults) {
       [](const MemberConfig& m) { return m.public_key.value_or(""); }, faults);
 }
 
-constexpr double kMostArm_m = 5.0;  // as of the members' lever arms
+constexpr double kMostArm = 5.0;  // m, as of the members' lever arms
 
 void check_driver(const std::string& key, const CameraConfig& camera, RuleFaults& faults) {
   constexpr double kMicroseconds = 1e6;
@@ -198,9 +198,10 @@ void check_driver(const std::string& key, const CameraConfig& camera, RuleFaults
 void check_rows(const std::string& key, const CameraCalibration& camera, RuleFaults& faults) {
   const double readout_s =
       1e-6 * std::abs(camera.rolling_shutter_us_per_row) * camera.resolution[1];
-  if (readout_s > 1.0 / camera.rate_hz)
+  if (readout_s > 1.0 / camera.rate_hz) {
     faults.push_back({key + ".rolling_shutter_us_per_row",
                       "all rows together take longer than a frame at rate_hz"});
+  }
 }
 
 void check_cameras(const std::vector<CameraConfig>& cameras, RuleFaults& faults) {
@@ -216,7 +217,7 @@ void check_cameras(const std::vector<CameraConfig>& cameras, RuleFaults& faults)
     for (CalibrationFault& fault : calibration_faults(cameras[i].calibration))
       faults.push_back({fmt::format("{}.{}", key, fault.key), std::move(fault.reason)});
     const Eigen::Vector3d& arm = cameras[i].calibration.T_cam_imu.p;
-    if (!(arm.cwiseAbs().maxCoeff() <= kMostArm_m))
+    if (!(arm.cwiseAbs().maxCoeff() <= kMostArm))
       faults.push_back({key + ".T_cam_imu", "moves by more than 5 m: the unit is metres"});
     check_rows(key, cameras[i].calibration, faults);
     check_driver(key, cameras[i], faults);

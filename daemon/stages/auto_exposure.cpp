@@ -83,10 +83,11 @@ double AutoExposure::factor(const PictureLevels& levels) const {
   double brightest = 0.0;
   for (const auto& [robot, peak] : peaks_) brightest = std::max(brightest, peak);
   double wanted = 1.0;
-  if (brightest >= kWhite)
+  if (brightest >= kWhite) {
     wanted = 1.0 / kStep;
-  else if (brightest < kDim)
+  } else if (brightest < kDim) {
     wanted = (kTarget - levels.background) / (brightest - levels.background);
+  }
   return std::clamp(std::max(wanted, least_factor(levels)), 1.0 / kStep, kStep);
 }
 

@@ -1,11 +1,10 @@
-#include "daemon/ctl/setup/led.hpp"
-
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <span>
 #include <thread>
 
+#include "daemon/ctl/setup/led.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/led_board/led_line.hpp"
 #include "drivers/sim/pseudo_terminal.hpp"
