@@ -13,10 +13,10 @@ std::string light_advice(const client::Status::Totals& counts) {
     const auto found = counts.find(name);
     return found == counts.end() ? std::uint64_t{0} : found->second;
   };
-  if (total("background") > kBright)
+  if (total("background") > kBright) {
     return "the picture is too bright: shorten exposure_us (crepesctl exposure), check the "
-           "infrared "
-           "filter";
+           "infrared filter";
+  }
   if (total("brightest") == 0)
     return "put another robot's board in view, at the longest distance that you need";
   if (total("spots") > kClutter)
@@ -25,9 +25,10 @@ std::string light_advice(const client::Status::Totals& counts) {
   if (is_automatic && total("auto_exposure_us") < total("longest_exposure_us")) return "";
   if (total("brightest") < kWhite && !is_automatic)
     return "no board is white: lengthen exposure_us, or raise gain";
-  if (total("faintest") < total("threshold") + kMargin)
+  if (total("faintest") < total("threshold") + kMargin) {
     return "the faintest light is nearly lost: if it is a board, lengthen exposure_us; if not, "
            "shorten it";
+  }
   return "";
 }
 
