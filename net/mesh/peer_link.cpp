@@ -177,9 +177,10 @@ Pace PeerLink::pace(Timestamp now) const {
 /// Share of the channel's time that forwarding took in the last second.
 double PeerLink::forwarded_air(Timestamp now) const {
   double air_s = 0.0;
-  for (const auto& [at, bytes] : forwarded_)
+  for (const auto& [at, bytes] : forwarded_) {
     if (now - at < kForwardedAge)
       air_s += airtime(1.0, static_cast<double>(bytes), settings_.broadcasts);
+  }
   return air_s / to_seconds(kForwardedAge);
 }
 
