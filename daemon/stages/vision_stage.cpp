@@ -148,7 +148,11 @@ void run_vision(const VisionStage& stage, const StageContext& context,
   while (!stop.stop_requested()) {
     context.iterations.add();
     if (const auto settings = stage.settings.receive()) detector.emplace(*settings);
-    if (const auto settings = stage.light_settings.receive()) exposure = AutoExposure(*settings);
+    if (const auto settings = stage.light_settings.receive()) {
+      exposure = AutoExposure(*settings);
+      // What was chosen by the settings before may still be on its way.
+      if (const auto exposure_us = exposure.exposure_us()) stage.light.expose(*exposure_us);
+    }
     std::optional<Frame> frame = stage.frames.pop_for(milliseconds{100}, stop);
     if (!frame) continue;
     const Detection found =
@@ -157,8 +161,9 @@ void run_vision(const VisionStage& stage, const StageContext& context,
     delays.add(context.clock.now() - frame->arrival);
     levels.add(found.spots);
     while (const auto seen = stage.boards.try_pop()) exposure.add(seen->bearings);
-    if (const auto exposure_us = exposure.step(frame->stamp, {.background = found.background * 1.0,
-                                                              .threshold = found.threshold * 1.0}))
+    const PictureLevels picture{.background = static_cast<double>(found.background),
+                                .threshold = static_cast<double>(found.threshold)};
+    if (const auto exposure_us = exposure.step(frame->stamp, picture))
       stage.light.expose(*exposure_us);
     health.count(1);
     rejected += found.rejected;
