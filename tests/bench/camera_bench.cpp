@@ -38,9 +38,9 @@ double cpu_s() {
       RingRenderer::make(world, RobotId{1}, config.swarm, config.cameras.at(0).calibration, 0)
           .value();
   const GigeCamera camera(
-      [&](std::uint8_t* pixels, int /*width*/, int /*height*/) {
+      [&](const GigeCamera::Picture& picture) {
         Frame frame = renderer.render(to_seconds(clock.now().time_since_epoch()));
-        std::ranges::copy(frame.pixels, pixels);
+        std::ranges::copy(frame.pixels, picture.pixels);
         renderer.recycle(std::move(frame));
       },
       lost_packets);
@@ -110,10 +110,11 @@ int main(int argc, char** argv) {
   const ::pid_t camera = ::fork();
   if (camera == 0) crepes::be_the_camera(config, lost_packets);
   crepes::CameraConfig& settings = config.cameras.at(0);
-  settings.device = crepes::GigeCamera::kId;
-  settings.exposure_us = 500;
-  settings.packet_size = 9000;
-  settings.latency_ms = 0.0;
+  settings.device.driver = crepes::CameraDriver::kAravis;
+  settings.device.id = crepes::GigeCamera::kId;
+  settings.device.light.exposure_us = 500;
+  settings.device.packet_size = 9000;
+  settings.device.latency_ms = 0.0;
   const int code = crepes::measure(settings, duration_s);
   ::kill(camera, SIGKILL);
   ::waitpid(camera, nullptr, 0);

@@ -19,8 +19,8 @@ constexpr Duration kPatience = 20s;
 
 /// Another grey each time, and noise enough to be alive.
 GigeCamera::Paint changing_picture() {
-  return [turn = 0](std::uint8_t* pixels, int width, int height) mutable {
-    std::memset(pixels, 20 + ++turn % 100, static_cast<std::size_t>(width * height));
+  return [turn = 0](const GigeCamera::Picture& picture) mutable {
+    std::memset(picture.pixels, 20 + ++turn % 100, picture.size());
   };
 }
 
@@ -115,8 +115,8 @@ TEST_F(AravisCameraTest, KeepsAFramesMemoryThoughTheCameraIsClosed) {
 
 TEST_F(AravisCameraTest, HandsOnTheNewestWhenItFellBehind) {
   std::atomic<int> painted = 0;
-  const GigeCamera device([&, paint = changing_picture()](std::uint8_t* p, int w, int h) {
-    paint(p, w, h);
+  const GigeCamera device([&, paint = changing_picture()](const GigeCamera::Picture& picture) {
+    paint(picture);
     ++painted;
     painted.notify_one();
   });

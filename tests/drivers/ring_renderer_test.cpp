@@ -8,6 +8,7 @@
 
 #include "drivers/sim/sim_camera.hpp"
 #include "estimator/vision/spot_detector.hpp"
+#include "tests/support/forward_camera.hpp"
 #include "tests/support/manual_clock.hpp"
 
 namespace crepes::ring_renderer_test {
@@ -26,17 +27,6 @@ SwarmConfig swarm_of(int count) {
     swarm.members.push_back(member);
   }
   return swarm;
-}
-
-CameraCalibration forward_camera() {
-  CameraCalibration camera;
-  camera.name = "cam0";
-  camera.intrinsics = {-0.1723, 0.5931, 316.6, 316.5, 638.2, 513.0};
-  camera.resolution = {1280, 1024};
-  Eigen::Matrix3d R_C_B;
-  R_C_B << 0, -1, 0, 0, 0, -1, 1, 0, 0;
-  camera.T_cam_imu = {{0.0, 0.01, -0.06}, Eigen::Quaterniond(R_C_B)};
-  return camera;
 }
 
 SimConfig config_of(SimScenario scenario) {

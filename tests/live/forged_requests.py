@@ -149,12 +149,15 @@ def main():
 
         before = len(wire.answers)
         long_watch = json.dumps({"class": "WATCH", "pad": "x" * 300}).encode()
-        for source, port in ((DAEMON, PORT), (DAEMON, 5000), ("10.9.255.255", 5000), ("255.255.255.255", 5000),
-                             ("224.0.0.1", 5000), ("239.255.255.250", 1900), ("0.0.0.0", 5000),
-                             ("127.0.0.1", 5000), ("10.9.0.7", 0), ("10.9.0.7", PORT)):
+        nobodies = ((DAEMON, PORT), (DAEMON, 5000), ("10.9.255.255", 5000), ("255.255.255.255", 5000),
+                    ("224.0.0.1", 5000), ("239.255.255.250", 1900), ("0.0.0.0", 5000), ("127.0.0.1", 5000),
+                    ("10.9.0.7", 0), ("10.9.0.7", PORT))
+        for source, port in nobodies:
             wire.send(source, port, long_watch)
         wire.listen(0.7)
-        expect(f"nobody's addresses were answered: {wire.answers[before:]}", len(wire.answers) == before)
+        # A busy machine may still be answering the hosts of before.
+        to_nobody = [answer for answer in wire.answers[before:] if answer[0] in dict(nobodies)]
+        expect(f"nobody's addresses were answered: {to_nobody}", not to_nobody)
 
         # Nothing but an honest echo opens the door; then poses' greeting comes.
         time.sleep(1.0)

@@ -55,24 +55,27 @@ class LiveCamera : public LiveDaemon {
     CameraConfig& camera = real_.cameras.front();
     camera.device.driver = CameraDriver::kAravis;
     camera.device.id = GigeCamera::kAddress;
-    camera.device.light.exposure_us = 500;
+    camera.device.light.exposure_us = kExposure_us;
     camera.device.packet_size = 9000;
     camera.device.latency_ms = 1.0;
   }
 
-  /// Shows what robot 1 sees at the time of each picture.
+  /// Shows what robot 1 sees at the time of each picture, in the light of its exposure.
   std::unique_ptr<GigeCamera> plug_camera_in() {
     auto renderer = RingRenderer::make(*world_, RobotId{1}, simulated_.swarm,
                                        simulated_.cameras.front().calibration, 0);
     EXPECT_TRUE(renderer) << renderer.error().message;
     auto drawn = std::make_shared<RingRenderer>(std::move(*renderer));
-    return std::make_unique<GigeCamera>([this, drawn](std::uint8_t* pixels, int width, int height) {
+    return std::make_unique<GigeCamera>([this, drawn](const GigeCamera::Picture& picture) {
+      drawn->set_brightness(picture.exposure_us / kExposure_us);
       Frame frame = drawn->render(clock_.world_s());
-      ASSERT_EQ(frame.pixels.size(), static_cast<std::size_t>(width * height));
-      std::ranges::copy(frame.pixels, pixels);
+      ASSERT_EQ(frame.pixels.size(), picture.size());
+      std::ranges::copy(frame.pixels, picture.pixels);
       drawn->recycle(std::move(frame));
     });
   }
+
+  static constexpr double kExposure_us = 500.0;
 
   static bool is_well(const Json& status) {
     const Json camera = sensor_of(status, "cam0");
@@ -104,6 +107,27 @@ TEST_F(LiveCamera, LocatesANeighborThroughAGigEVisionCamera) {
     const PoseError error = error_of(pose, simulated_);
     return pose["mode"] == "direct" && error.position_m < 0.5 && error.angle_rad < 0.17;
   }));
+}
+
+TEST_F(LiveCamera, ShortensAnAutomaticExposureAndGoesOnReadingIds) {
+  const auto camera = plug_camera_in();
+  real_.cameras.front().device.exposure = ExposureControl::kAuto;
+  const Runtime runtime(real_, machine_);
+  Client client(real_);
+
+  const auto bearings = [](const Json& status) {
+    return status.value("/neighbors/0/measurements/bearing/no_state"_json_pointer, 0U);
+  };
+  unsigned before = 0;
+  EXPECT_TRUE(client.await_status([&](const Json& status) {
+    const Json counts = sensor_of(status, "cam0 spots").value("counts", Json::object());
+    before = bearings(status);
+    return counts.value("longest_exposure_us", 0.0) == kExposure_us &&
+           counts.value("auto_exposure_us", kExposure_us) < 0.8 * kExposure_us &&
+           counts.value("brightest", 255) < 250;
+  }));
+  EXPECT_TRUE(client.await_status(
+      [&](const Json& status) { return bearings(status) > before + (kIsSlow ? 20 : 200); }));
 }
 
 TEST_F(LiveCamera, ReportsWhatIsWrongWithTheCameraAndRecovers) {

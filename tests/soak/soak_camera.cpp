@@ -50,10 +50,10 @@ CameraConfig SoakCamera::config() const {
 
 void SoakCamera::plug() {
   if (is_gige_) {
-    gige_ = std::make_unique<GigeCamera>(
-        [grey = std::uint8_t{0}](std::uint8_t* pixels, int width, int height) mutable {
-          std::fill_n(pixels, width * height, static_cast<std::uint8_t>(++grey % kPictures));
-        });
+    gige_ = std::make_unique<GigeCamera>([grey = std::uint8_t{0}](
+                                             const GigeCamera::Picture& picture) mutable {
+      std::fill_n(picture.pixels, picture.size(), static_cast<std::uint8_t>(++grey % kPictures));
+    });
   } else {
     fs::rename(folder_.string() + ".away", folder_);
   }

@@ -50,8 +50,17 @@ inline bool enter_own_network() {
 /// Plugged in from construction to destruction; serves one reader at the rate that it asks for.
 class GigeCamera {
  public:
-  /// Writes the next picture, of as many pixels, on a thread of the camera.
-  using Paint = std::function<void(std::uint8_t* pixels, int width, int height)>;
+  /// To be painted: `width` times `height` gray levels, row by row.
+  struct Picture {
+    std::uint8_t* pixels = nullptr;
+    int width = 0;
+    int height = 0;
+    double exposure_us = 0.0;  ///< as set by the reader
+
+    [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(width * height); }
+  };
+  /// Writes the next picture, on a thread of the camera.
+  using Paint = std::function<void(const Picture& picture)>;
 
   explicit GigeCamera(Paint paint, double lost_packets = 0.0)
       : paint_(std::move(paint)),
@@ -72,13 +81,15 @@ class GigeCamera {
   static constexpr const char* kId = "Aravis-Fake-GV01";
 
  private:
-  static void paint_on(ArvBuffer* buffer, void* paint, guint32 /*exposure_us*/, guint32 /*gain*/,
+  static void paint_on(ArvBuffer* buffer, void* paint, guint32 exposure_us, guint32 /*gain*/,
                        ArvPixelFormat /*format*/) {
     std::size_t size = 0;
     auto* pixels =
         static_cast<std::uint8_t*>(const_cast<void*>(arv_buffer_get_data(buffer, &size)));
-    (*static_cast<Paint*>(paint))(pixels, arv_buffer_get_image_width(buffer),
-                                  arv_buffer_get_image_height(buffer));
+    (*static_cast<Paint*>(paint))({.pixels = pixels,
+                                   .width = arv_buffer_get_image_width(buffer),
+                                   .height = arv_buffer_get_image_height(buffer),
+                                   .exposure_us = static_cast<double>(exposure_us)});
   }
 
   Paint paint_;

@@ -12,6 +12,7 @@
 #include "drivers/sim/ring_renderer.hpp"
 #include "estimator/vision/blink_tracker.hpp"
 #include "estimator/vision/spot_detector.hpp"
+#include "tests/support/forward_camera.hpp"
 
 namespace crepes::auto_exposure_test {
 namespace {
@@ -157,17 +158,6 @@ SwarmConfig two_robots() {
     swarm.members.push_back(member);
   }
   return swarm;
-}
-
-CameraCalibration forward_camera() {
-  CameraCalibration camera;
-  camera.name = "cam0";
-  camera.intrinsics = {-0.1723, 0.5931, 316.6, 316.5, 638.2, 513.0};
-  camera.resolution = {1280, 1024};
-  Eigen::Matrix3d R_C_B;
-  R_C_B << 0, -1, 0, 0, 0, -1, 1, 0, 0;
-  camera.T_cam_imu = {{0.0, 0.01, -0.06}, Eigen::Quaterniond(R_C_B)};
-  return camera;
 }
 
 /// What rendered pictures, the detector and the tracker make of it.

@@ -19,9 +19,7 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-void black(std::uint8_t* pixels, int width, int height) {
-  std::memset(pixels, 0, static_cast<std::size_t>(width * height));
-}
+void black(const GigeCamera::Picture& picture) { std::memset(picture.pixels, 0, picture.size()); }
 
 class Devices : public testing::Test {
  protected:
