@@ -44,8 +44,11 @@ class Clients : public LiveDaemon {
     }
     const Timestamp end = machine_.now() + kPatience;
     std::vector<std::string> lines;
-    while (lines.size() < enough && !child->exit_reason() && machine_.now() < end) {
+    bool more = true;
+    while (lines.size() < enough && more) {
       ::poll(nullptr, 0, 20);
+      // Asked before its lines are read, for what it writes last it writes just before its end.
+      more = !child->exit_reason() && machine_.now() < end;
       std::istringstream text(read_text_file(log).value_or(""));
       lines.clear();
       for (std::string line; std::getline(text, line) && !text.eof();) lines.push_back(line);
