@@ -167,7 +167,10 @@ void ImuGuard::believe(const ImuSample& sample) {
     correct_force(sample);
     reference_ = Reference{sample, reference_->last};
   } else {
-    if (force_.isZero()) force_ = sample.accel_mps2;
+    if (force_.isZero() || angle_between(sample.accel_mps2, force_) > kMostTurned) {
+      force_ = sample.accel_mps2;
+      since_ = sample.stamp;
+    }
     reference_ = Reference{sample, std::nullopt};
   }
   has_refused_ = false;
@@ -299,8 +302,9 @@ bool ImuGuard::held_are_plausible() const {
   const Eigen::Vector3d force = 0.5 * (early + late);
   if (force.norm() < kLeastForce || force.norm() > kMostForce) return false;
   if (angle_between(turn.conjugate() * early, late) > kMostContradiction) return false;
+  const Timestamp last = reference_->last.stamp;
   return angle_between(late, force_) <= kMostTurned ||
-         held_.front().stamp - reference_->last.stamp > kOutdated;
+         held_.front().stamp - last > std::min(kOutdated, last - since_);
 }
 
 void ImuGuard::restart_from_held() {

@@ -48,6 +48,8 @@ struct PerSensor {
 ///
 /// A change that no robot makes within a sample (unit, swapped axes) is not believed when it stays.
 /// Samples are believed again when they return, or when a fifth of a second of them is plausible.
+/// Where their gravity contradicts the samples before, those that have lasted longer are believed,
+/// and after five seconds the new ones in any case.
 class ImuGuard {
  public:
   /// The samples that predict the next one.
@@ -102,8 +104,9 @@ class ImuGuard {
   InnovationScale gyro_;
   InnovationScale accel_;
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  ///< smoothed specific force, body axes
-  bool has_refused_ = false;                         ///< since the last sample that was believed
-  bool has_jumped_ = false;  ///< the held samples must be plausible to be believed
+  Timestamp since_{};         ///< the first of the samples whose forces agree
+  bool has_refused_ = false;  ///< since the last sample that was believed
+  bool has_jumped_ = false;   ///< the held samples must be plausible to be believed
   bool gyro_has_jumped_ = false;
   bool accel_has_jumped_ = false;
 

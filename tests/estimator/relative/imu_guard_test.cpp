@@ -198,7 +198,7 @@ TEST(ImuGuard, LosesFewSamplesWhenRotorsStart) {
   }
 }
 
-/// A fault of half a second, and how long after it samples are believed again.
+/// A fault of a second, and how long after it samples are believed again.
 void expect_return(const Motion& motion, const NamedDamage& damage, std::uint64_t seed) {
   auto samples = samples_of(motion, seed, 6 * kSecond);
   constexpr std::size_t kBegin = 3 * kSecond;
@@ -233,6 +233,28 @@ TEST(ImuGuard, SwappedAxesAreNotBelieved) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed)
     for (const std::size_t motion : {0U, 1U})
       expect_return(kMotions.at(motion), kSmallDamages[1], seed);
+}
+
+TEST(ImuGuard, OfTwoSeriesThatContradictEachOtherTheLongerIsBelieved) {
+  constexpr std::size_t kGap = 2 * kSecond;
+  constexpr std::size_t kBegin = 3 * kSecond;  // of swapped axes, the first after a gap
+  for (const std::size_t swapped : {kSecond / 3, kSecond}) {
+    const std::size_t end = kBegin + swapped;
+    auto samples = samples_of(kMotions[0], 1, end + 6 * kSecond);
+    std::for_each(samples.begin() + kBegin, samples.begin() + end, swap_axes);
+    samples.erase(samples.begin() + kGap, samples.begin() + kBegin);
+    const Timestamp right = samples.at(kGap + swapped).stamp;
+    const Duration lasted = samples.at(kGap + swapped - 1).stamp - samples.at(kGap).stamp;
+    ImuGuard guard;
+
+    const auto believed = believed_of(guard, samples);
+
+    const auto back = std::ranges::find_if(
+        believed, [&](const ImuSample& sample) { return sample.stamp >= right; });
+    ASSERT_NE(back, believed.end());
+    EXPECT_GE(back->stamp - right, lasted - 20ms);
+    EXPECT_LE(back->stamp - right, lasted + 20ms);
+  }
 }
 
 TEST(ImuGuard, GarbageIsNotBelieved) {
