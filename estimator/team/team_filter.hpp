@@ -25,8 +25,8 @@ namespace crepes {
 /// keyframe.
 ///
 /// A new robot is on probation for a second: until its measurements agree with the others, they
-/// correct nobody but itself. A camera that contradicts the others is realigned by them; if it
-/// still does, it is left out.
+/// correct nobody but itself, and while they contradict it, it has no pose. A camera that
+/// contradicts the others is realigned by them; if it still does, it is left out.
 /// `TeamSettings::max_robots` are estimated jointly, those that are best connected with each other.
 /// Robots beyond are located through them.
 /// A gyroscope that was found false has spoilt all calibrations. They are taken from a belief of

@@ -16,6 +16,7 @@ constexpr Duration kVerdictLife = std::chrono::seconds{20};  // then a camera is
 constexpr int kRefusedAt = 4;  // convictions: realigned, as calibrated, realigned, refused
 constexpr Duration kProbation = std::chrono::seconds{1};
 constexpr Duration kLateProbation = std::chrono::seconds{3};
+constexpr double kAgreed = 4.0;    // times what contradicts
 constexpr int kMostDoublings = 5;  // of a probation, that is 32 s
 constexpr Duration kLossMemory = std::chrono::seconds{10};
 constexpr double kDoubtPerLoss = 4.0;
@@ -35,7 +36,7 @@ constexpr Duration kGyroRecord = std::chrono::seconds{60};  // then it is as goo
 constexpr Duration kStrained = std::chrono::seconds{2};     // by a false gyroscope
 constexpr int kLeastRefused = 3;                            // pairs
 
-/// How many cameras agree with each robot's place, and how many contradict it.
+/// How many cameras or bearings agree with each robot's place, and how many contradict it.
 using Witnesses = std::map<RobotId, Agreement>;
 using Robots = std::map<RobotId, TeamRobot>;
 
@@ -112,6 +113,22 @@ Witnesses witnesses(const Robots& robots, const IsExcluded& is_excluded) {
     }
   }
   return witnesses;
+}
+
+/// The bearings of each robot and to it.
+Witnesses bearings_of(const Robots& robots) {
+  Witnesses all;
+  for (const auto& [id, robot] : robots) {
+    for (const TeamCamera& camera : robot.cameras) {
+      for (const auto& [neighbor, agreement] : camera.agreement) {
+        for (const RobotId end : {id, neighbor}) {
+          all[end].fused += agreement.fused;
+          all[end].gated += agreement.gated;
+        }
+      }
+    }
+  }
+  return all;
 }
 
 /// Whether another camera than `observer`'s contradicts the place of `id`.
@@ -408,21 +425,12 @@ bool TeamTrust::has_misled(RobotId robot, Timestamp now) const {
 }
 
 void TeamTrust::end_probations(TeamBelief& belief) const {
-  std::map<RobotId, Agreement> all;
-  for (const auto& [id, robot] : belief.robots) {
-    for (const TeamCamera& camera : robot.cameras) {
-      for (const auto& [neighbor, agreement] : camera.agreement) {
-        for (const RobotId end : {id, neighbor}) {
-          all[end].fused += agreement.fused;
-          all[end].gated += agreement.gated;
-        }
-      }
-    }
-  }
+  const Witnesses all = bearings_of(belief.robots);
   for (auto& [id, robot] : belief.robots) {
-    const Agreement& agreement = all[id];
+    const auto agreement = all.find(id);
     const bool is_long_enough = belief.stamp - robot.since >= probation(id, belief.stamp);
-    if (is_long_enough && agreement.fused > 4.0 * agreement.gated + 2.0 &&
+    if (is_long_enough && agreement != all.end() &&
+        agreement->second.fused > kAgreed * agreement->second.gated + 2.0 &&
         !is_placed_by_its_own_ranges(belief, id))
       robot.is_trusted = true;
   }
@@ -460,6 +468,13 @@ std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief, const Pr
     calibrations.push_back(std::move(one));
   }
   return calibrations;
+}
+
+bool is_plausible(const TeamBelief& belief, RobotId id) {
+  if (belief.stamp <= belief.robots.at(id).since) return false;
+  const Witnesses all = bearings_of(belief.robots);
+  const auto agreement = all.find(id);
+  return agreement == all.end() || agreement->second.fused >= kAgreed * agreement->second.gated;
 }
 
 std::vector<TeamFault> faults_of(const TeamBelief& belief,

@@ -83,6 +83,10 @@ class TeamTrust {
   std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
 };
 
+/// Whether the bearings of a robot and to it agree with its place, four in five of them. False in
+/// the interval in which it started: they are yet to come.
+[[nodiscard]] bool is_plausible(const TeamBelief& belief, RobotId id);
+
 /// The calibration of each robot. A camera is turned if its misalignment is significant and beyond
 /// what a calibration leaves.
 [[nodiscard]] std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief,

@@ -436,5 +436,36 @@ TEST(TeamFaults, ARobotThatStartsAtAWrongPlaceMovesNobody) {
   }
 }
 
+// A robot that has just started has no estimates yet, and another one sends a false one of it: at
+// its own place, or turned.
+TEST(TeamFaults, ARobotThatStartsByAFalseEstimateHasNoPoseUntilItsBearingsAgree) {
+  constexpr RobotId kLiar{3};
+  constexpr RobotId kStarted{4};
+  const Pose kBeside{{0.05, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
+  const Pose kTurned{{0.0, 0.0, 0.0}, so3_exp(Eigen::Vector3d(0.0, 0.0, 2.4))};
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      std::erase_if(interval.edges, [&](const RelativePoseEdge& edge) {
+        return edge.from == kStarted || (edge.to == kStarted && edge.from != kLiar);
+      });
+      for (RelativePoseEdge& edge : interval.edges) {
+        if (edge.to != kStarted) continue;
+        edge.T_from_to.pose = seed % 2 == 0 ? kBeside : edge.T_from_to.pose * kTurned;
+      }
+    };
+    TeamFilter filter;
+    int published = 0;
+    for (double t = 0.0; t < 3.0; t += kIntervalSeconds) {
+      for (const TeamPose& pose : filter.step(team.next()).poses) {
+        EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 40.0)
+            << seed << " at " << t << ": " << pose.neighbor.value;
+        published += pose.neighbor == kStarted ? 0 : 1;
+      }
+    }
+    EXPECT_GT(published, 10) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace crepes::team_faults_test
