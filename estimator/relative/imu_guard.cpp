@@ -143,9 +143,10 @@ void ImuGuard::compare(const ImuSample& sample) {
   }
   // The scale learns from refused samples too: a vibration that begins must not be refused for
   // long.
-  if (reference_ && !has_jumped_)
+  if (reference_ && !has_jumped_) {
     update_sigmas(
         innovation(sample, held_count_ > 0 ? reference_of_held(held_count_ - 1) : *reference_));
+  }
   const bool is_in_doubt = held_count_ > 0 || has_jumped_;
   if (reference_ && is_in_doubt) {
     judge(sample);
