@@ -8,6 +8,7 @@
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
+#include "estimator/team/team_faults.hpp"
 #include "estimator/team/team_update.hpp"
 
 namespace crepes {

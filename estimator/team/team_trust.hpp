@@ -87,14 +87,4 @@ class TeamTrust {
 /// the interval in which it started: they are yet to come.
 [[nodiscard]] bool is_plausible(const TeamBelief& belief, RobotId id);
 
-/// The calibration of each robot. A camera is turned if its misalignment is significant and beyond
-/// what a calibration leaves.
-[[nodiscard]] std::vector<RobotCalibration> calibrations_of(const TeamBelief& belief,
-                                                            const Priors& priors);
-
-/// Faults to report: cameras that are turned or refused, robots of which most ranges are refused,
-/// and wrong clocks. `calibrations` are those of `belief`.
-[[nodiscard]] std::vector<TeamFault> faults_of(const TeamBelief& belief,
-                                               const std::vector<RobotCalibration>& calibrations);
-
 }  // namespace crepes

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "estimator/team/team_faults.hpp"
 #include "tests/support/simulated_belief.hpp"
 
 namespace crepes::team_trust_test {
