@@ -209,6 +209,22 @@ TEST_F(TrustOfFour, ProbationEndsWhenMostAgreeForASecond) {
   EXPECT_TRUE(robot.is_trusted);
 }
 
+TEST_F(TrustOfFour, ARobotIsPlausibleFromItsSecondIntervalOnWhileMostOfItsBearingsAgree) {
+  TeamRobot& robot = belief_.robots.at(kAccused);
+  robot.since = belief_.stamp;
+  EXPECT_FALSE(is_plausible(belief_, kAccused));
+  wait(100ms);
+  EXPECT_TRUE(is_plausible(belief_, kAccused));
+
+  // It sees others where they are, so half of its bearings agree.
+  contradict_its_place(kAccused);
+  EXPECT_FALSE(is_plausible(belief_, kAccused));
+  EXPECT_TRUE(is_plausible(belief_, kSecond));
+
+  for (auto& [id, other] : belief_.robots) other.cameras[0].agreement.clear();
+  EXPECT_TRUE(is_plausible(belief_, kAccused));  // nobody sees it
+}
+
 TEST_F(TrustOfFour, ARobotThatItsOwnRangesPlacedStaysOnProbation) {
   TeamRobot& robot = belief_.robots.at(kAccused);
   robot.is_trusted = false;
