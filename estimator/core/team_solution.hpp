@@ -25,6 +25,7 @@ struct TeamPose {
   Covariance covariance = Covariance::Zero();
   Timestamp last_sighting{};  ///< when anybody saw it, or it anybody, or ranges located it
   Duration clock_ahead{};     ///< its sensors' stamps are so much ahead of this robot's
+  bool needs_witness = false;  ///< not to be used unless another estimate of it agrees
 
   [[nodiscard]] Matrix6d pose_covariance() const {
     Matrix6d of_pose;

@@ -1,7 +1,6 @@
 #include "estimator/graph/pose_graph.hpp"
 
 #include <ceres/autodiff_cost_function.h>
-#include <ceres/autodiff_manifold.h>
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
@@ -15,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/graph/pose_manifold.hpp"
 #include "estimator/graph/relative_pose_factor.hpp"
 #include "estimator/graph/spanning_tree.hpp"
 #include "estimator/graph/team_velocity.hpp"
@@ -82,9 +82,7 @@ std::unique_ptr<ceres::Problem> build(const GraphProblem& input, const GraphConf
                                       Nodes& nodes) {
   auto problem = std::make_unique<ceres::Problem>();
   for (auto& [robot, x] : nodes) {
-    problem->AddParameterBlock(
-        x.data(), kPoseParameters,
-        owned_by_ceres<ceres::AutoDiffManifold<RightPerturbation, kPoseParameters, 6>>());
+    problem->AddParameterBlock(x.data(), kPoseParameters, owned_by_ceres<PoseManifold>());
   }
   problem->SetParameterBlockConstant(nodes.at(input.self).data());
   for (const RelativePoseEdge& edge : input.edges) {

@@ -128,10 +128,13 @@ void PosePublisher::update_team(Timestamp now, const RobotState& self, const Rob
 
 std::optional<NeighborPose> PosePublisher::published() const {
   if (!team_pose_) return graph_corrected_pose();
-  if (!pose_ || pose_->mode == PoseMode::kPredicted) return team_pose_;
+  const bool needs_witness = team_->pose.needs_witness;
+  if (!pose_ || pose_->mode == PoseMode::kPredicted)
+    return needs_witness ? graph_corrected_pose() : team_pose_;
   const Vector6d d = pose_difference(pose_->T_B_N.pose, team_pose_->T_B_N.pose);
   const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
   if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return team_pose_;
+  if (needs_witness) return graph_corrected_pose();
   // One of the two is wrong, and nothing shows which.
   NeighborPose doubtful = *pose_;
   doubtful.T_B_N.covariance += d * d.transpose();

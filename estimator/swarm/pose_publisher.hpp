@@ -52,8 +52,8 @@ class PosePublisher {
   [[nodiscard]] std::optional<NeighborEstimate> estimate() const;
   /// The team's pose if there is one and it agrees with the filter's. If they contradict each
   /// other, the filter's, with a covariance that contains the difference; none if that is too
-  /// uncertain. Without a team's pose the filter's, with the paper's graph's correction, if a
-  /// recent one exists.
+  /// uncertain. Without a team's pose, or with one that needs a witness and has none, the filter's,
+  /// with the paper's graph's correction, if a recent one exists.
   [[nodiscard]] std::optional<NeighborPose> published() const;
 
  private:

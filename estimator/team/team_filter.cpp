@@ -358,9 +358,9 @@ void TeamFilter::report(const TeamInterval& interval, bool are_placed,
     // one.
     const bool is_new = !robot.is_trusted || !are_placed;
     if (robot.motion_index < 0 || (is_new && has_own_edge(interval, id))) continue;
+    TeamPose& pose = solution.poses.emplace_back(belief_.team_pose(id, *interval.member(id)));
     // The estimate that it started from may be false.
-    if (!robot.is_trusted && !is_plausible(belief_, id)) continue;
-    solution.poses.push_back(belief_.team_pose(id, *interval.member(id)));
+    pose.needs_witness = !robot.is_trusted && !is_plausible(belief_, id);
   }
   std::ranges::sort(solution.poses, {}, &TeamPose::neighbor);
   solution.calibrations = calibrations_of(belief_, interval.settings.priors);

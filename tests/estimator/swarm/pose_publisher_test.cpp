@@ -18,11 +18,12 @@ class TeamPublisher : public testing::Test {
   TeamPublisher() { self_.imu = neighbor_.imu = imu_at_rest(1000); }
 
   /// The team's pose at `ms`, seen by anybody at `sighted_ms`.
-  void add(int ms, int sighted_ms, double sigma_m = 0.05) {
+  void add(int ms, int sighted_ms, double sigma_m = 0.05, bool needs_witness = false) {
     TeamPose pose{.neighbor = kNeighbor, .T_B_N = kTruth};
     pose.covariance.diagonal().head<3>().setConstant(sigma_m * sigma_m);
     pose.covariance.diagonal().segment<6>(3).setConstant(1e-4);
     pose.last_sighting = at_ms(sighted_ms);
+    pose.needs_witness = needs_witness;
     publisher_.add_team_pose({at_ms(ms), pose, {}, {}});
   }
   [[nodiscard]] std::optional<NeighborPose> at(int now_ms, const LastContact& last = {}) {
@@ -84,6 +85,11 @@ TEST_F(TeamPublisher, DoesNotPublishWhatIsTooUncertain) {
   EXPECT_FALSE(at(1000));
 }
 
+TEST_F(TeamPublisher, APoseThatNeedsAWitnessIsNotPublishedAlone) {
+  add(900, 900, 0.05, true);
+  EXPECT_FALSE(at(1000));
+}
+
 TEST_F(TeamPublisher, PublishesNothingWithoutASolution) { EXPECT_FALSE(at(1000)); }
 
 /// With a filter of its own that knows the same place, or another one.
@@ -107,6 +113,20 @@ TEST_F(TeamAndFilter, TheTeamsPoseReplacesAFiltersThatAgrees) {
   ASSERT_TRUE(pose);
   EXPECT_LT((pose->T_B_N.pose.p - kTruth.p).norm(), 1e-6);
   EXPECT_LT(std::sqrt(pose->T_B_N.covariance(0, 0)), 0.1);
+}
+
+TEST_F(TeamAndFilter, AFilterIsAWitnessOnlyIfItAgrees) {
+  add(900, 900, 0.05, true);
+  const Pose nearby{{kDistance + 0.1, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
+  const auto agreed = with_filter_at(nearby);
+  ASSERT_TRUE(agreed);
+  EXPECT_LT((agreed->T_B_N.pose.p - kTruth.p).norm(), 1e-6);
+
+  const Pose elsewhere{{kDistance + 3.0, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
+  const auto disputed = with_filter_at(elsewhere);
+  ASSERT_TRUE(disputed);
+  EXPECT_LT((disputed->T_B_N.pose.p - elsewhere.p).norm(), 1e-6);
+  EXPECT_LT(std::sqrt(disputed->T_B_N.covariance(0, 0)), 0.5) << "it has nothing to doubt it by";
 }
 
 }  // namespace
