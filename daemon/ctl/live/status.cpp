@@ -38,7 +38,7 @@ std::string sensors_of(const client::Status& status) {
     rows.push_back({sensor.name, sensor.rate_hz > 0 ? fixed(sensor.rate_hz, 1) : "-",
                     sensor.ok ? "ok" : what, text_of(sensor.faults), text_of(sensor.counts)});
   }
-  return text_table(rows);
+  return text_table(rows, LastColumn::kWords);
 }
 
 std::string neighbors_of(const client::Status& status) {
@@ -61,7 +61,7 @@ std::string neighbors_of(const client::Status& status) {
     row.push_back(neighbor.reason);
     rows.push_back(std::move(row));
   }
-  return text_table(rows);
+  return text_table(rows, LastColumn::kWords);
 }
 
 /// What to do where there is no pose, once for each reason.
@@ -101,18 +101,16 @@ std::string faults_of(const client::Status& status) {
   return text;
 }
 
-/// "0.123 +- 0.010", or as many as there are components; "-" without an estimate.
+/// "0.123 +- 0.010", of a vector all components and the largest sigma; "-" without an estimate.
 std::string text_of(const std::map<std::string, client::Status::Estimate>& estimates,
                     const std::string& key, int digits, double unit = 1.0) {
   const auto found = estimates.find(key);
   if (found == estimates.end()) return "-";
-  const auto numbers = [&](const std::vector<double>& values) {
-    std::string text;
-    for (const double value : values)
-      text += (text.empty() ? "" : " ") + fixed(unit * value, digits);
-    return text;
-  };
-  return numbers(found->second.value) + " +- " + numbers(found->second.sigma);
+  std::string text;
+  for (const double value : found->second.value) text += fixed(unit * value, digits) + " ";
+  const auto& sigmas = found->second.sigma;
+  const auto largest = std::ranges::max_element(sigmas);
+  return text + "+- " + (largest == sigmas.end() ? "-" : fixed(unit * *largest, digits));
 }
 
 std::string text_of(const std::map<std::string, client::Status::Residual>& residuals,
@@ -127,7 +125,7 @@ std::string text_of(const std::map<std::string, client::Status::Residual>& resid
 std::string team_of(const client::Status& status) {
   if (!status.team || status.team->robots.empty()) return "";
   Rows residuals{{"team", "trusted", "bearing NIS (fused / refused)", "range NIS", "gyro NIS"}};
-  Rows calibrations{{"team", "camera turned deg", "antenna m", "clock ms", "gyro bias deg/s",
+  Rows calibrations{{"team", "camera off deg", "antenna cm", "clock ms", "gyro bias deg/s",
                      "accelerometer bias m/s2"}};
   for (const client::Status::TeamRobot& robot : status.team->robots) {
     const std::string name = robot.name.empty() ? std::to_string(robot.robot) : robot.name;
@@ -138,10 +136,10 @@ std::string team_of(const client::Status& status) {
     for (const client::Status::Camera& camera : robot.cameras)
       cameras += (cameras.empty() ? "" : ", ") + text_of(camera.estimates, "turned_deg", 2);
     calibrations.push_back({name, cameras.empty() ? "-" : cameras,
-                            text_of(robot.calibration, "antenna_delay_m", 3),
+                            text_of(robot.calibration, "antenna_delay_m", 1, 100.0),
                             text_of(robot.calibration, "clock_ms", 1),
                             text_of(robot.calibration, "gyro_bias_radps", 2, kDegPerRad),
-                            text_of(robot.calibration, "accel_bias_mps2", 3)});
+                            text_of(robot.calibration, "accel_bias_mps2", 2)});
   }
   return text_table(residuals) + "\n" + text_table(calibrations) + "\n";
 }
