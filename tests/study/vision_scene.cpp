@@ -107,6 +107,12 @@ class Stage {
 };
 
 /// Frames that are lost in bursts of a mean length of 8.
+VisionConfig config_of(const VisionScene& scene) {
+  VisionConfig config;
+  config.detector = scene.detector;
+  return config;
+}
+
 std::vector<bool> lost_frames(const VisionScene& scene, std::size_t count) {
   constexpr double kEnd = 1.0 / 8.0;
   const double begin = kEnd * scene.lost_share / (1.0 - scene.lost_share);
@@ -144,7 +150,7 @@ class Trial {
         ours_(library_of(patterns(false))),
         blinking_(library_of(patterns(scene.is_foreign))),
         renderer_(model_, scene.effects, scene.seed),
-        detector_(VisionConfig{}),
+        detector_(config_of(scene)),
         tracker_(camera_, model_, VisionConfig{}, ours_) {
     std::mt19937 random(static_cast<unsigned>(scene.seed + 7));
     std::uniform_real_distribution<double> any(0.0, 1.0);

@@ -10,6 +10,7 @@
 #include "drivers/sim/board_renderer.hpp"
 #include "estimator/core/camera_calibration.hpp"
 #include "estimator/core/swarm_config.hpp"
+#include "estimator/vision/vision_config.hpp"
 
 namespace crepes::study {
 
@@ -29,6 +30,7 @@ struct VisionScene {
   double duration_s = 4.0;
   double score_from_s = 1.0;
   std::uint64_t seed = 1;
+  SpotDetectorKind detector = SpotDetectorKind::kFast;
   /// Whether the board is hidden; no one is if this is empty.
   std::function<bool(std::size_t board, double t_s)> is_hidden{};
 };

@@ -382,8 +382,40 @@ TEST(SpotDetector, OfThePaperFindsTheSameBoard) {
   const Detection found = detector.detect(scene.read());
 
   ASSERT_EQ(found.spots.size(), 1U);
-  EXPECT_LT(off(found.spots[0], board), 2.5);  // its circles have whole-pixel centers
+  EXPECT_LT(off(found.spots[0], board), 1.0);
   EXPECT_TRUE(found.failure.empty());
+}
+
+TEST(SpotDetector, OfThePaperFindsAllOfManySmallBoards) {
+  const CameraModel camera = small_fisheye();
+  RingScene scene(camera, {}, 4);
+  std::vector<Eigen::Vector2d> boards;
+  for (const double range_m : {2.0, 3.0, 4.5, 6.0}) {
+    const Eigen::Vector2d at(40.0 * range_m, 30.0 + 30.0 * range_m);
+    boards.push_back(scene.add_ring(facing_board(camera, at, range_m)));
+  }
+  VisionConfig config;
+  config.detector = SpotDetectorKind::kHough;
+  SpotDetector detector{config};
+
+  const Detection found = detector.detect(scene.read());
+
+  EXPECT_EQ(found.spots.size(), boards.size());
+  for (const Eigen::Vector2d& board : boards) {
+    const bool is_found =
+        std::ranges::any_of(found.spots, [&](const Spot& s) { return off(s, board) < 2.0; });
+    EXPECT_TRUE(is_found) << board.transpose();
+  }
+}
+
+TEST(SpotDetector, OfThePaperTakesNoWindowForABoard) {
+  const auto pixels = picture(
+      640, 480, [](int u, int v) { return u > 100 && u < 400 && v > 100 && v < 400 ? 255 : 10; });
+  VisionConfig config;
+  config.detector = SpotDetectorKind::kHough;
+  SpotDetector detector{config};
+
+  EXPECT_TRUE(detector.detect({pixels.data(), 640, 480, 640}).spots.empty());
 }
 
 /// OpenCV without memory.

@@ -1,5 +1,5 @@
 // What detector and tracker make of difficult pictures:
-// vision_study [seeds=FIRST-LAST] [NAME_PART...]
+// vision_study [seeds=FIRST-LAST] [detector=hough] [NAME_PART...]
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -27,12 +27,13 @@ double per(std::size_t count, std::size_t all) {
 }
 
 /// One scene over all seeds: the share of all lit frames, and that of the worst seed.
-void print_scene(std::size_t index, Seeds seeds) {
+void print_scene(std::size_t index, Seeds seeds, SpotDetectorKind detector) {
   VisionScore sum;
   double worst = 100.0;
   std::string name;
   for (unsigned seed = seeds.first; seed <= seeds.last; ++seed) {
-    const VisionScene scene = vision_scenes(seed)[index];
+    VisionScene scene = vision_scenes(seed)[index];
+    scene.detector = detector;
     const VisionScore score = score_vision(scene);
     name = scene.name;
     worst = std::min(worst, score.right_percent());
@@ -97,11 +98,14 @@ Seeds seeds_of(std::string_view argument) {
 int main(int argc, char** argv) {
   using namespace crepes::study;
   Seeds seeds;
+  auto detector = crepes::SpotDetectorKind::kFast;
   std::vector<std::string_view> parts;
   for (int i = 1; i < argc; ++i) {
     const std::string_view argument = argv[i];
     if (argument.starts_with("seeds=")) {
       seeds = seeds_of(argument);
+    } else if (argument == "detector=hough") {
+      detector = crepes::SpotDetectorKind::kHough;
     } else {
       parts.push_back(argument);
     }
@@ -117,6 +121,6 @@ int main(int argc, char** argv) {
               "p99 px", "never", "ID s", "peaks", "board s");
   const std::vector<VisionScene> scenes = vision_scenes(seeds.first);
   for (std::size_t i = 0; i < scenes.size(); ++i)
-    if (is_wanted(scenes[i].name)) print_scene(i, seeds);
+    if (is_wanted(scenes[i].name)) print_scene(i, seeds, detector);
   return 0;
 }
