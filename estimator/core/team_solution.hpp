@@ -23,8 +23,8 @@ struct TeamPose {
   Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
   /// Of the motion, and of the IMUs' biases: gyroscope and accelerometer of B, then of N.
   Covariance covariance = Covariance::Zero();
-  Timestamp last_sighting{};  ///< when anybody saw it, or it anybody, or ranges located it
-  Duration clock_ahead{};     ///< its sensors' stamps are so much ahead of this robot's
+  Timestamp last_sighting{};   ///< when anybody saw it, or it anybody, or ranges located it
+  Duration clock_ahead{};      ///< its sensors' stamps are so much ahead of this robot's
   bool needs_witness = false;  ///< not to be used unless another estimate of it agrees
 
   [[nodiscard]] Matrix6d pose_covariance() const {
