@@ -63,7 +63,7 @@ TEST(TeamFilter, ModulesThatAllMeasureTooLongStayWithinTheCovariance) {
 }
 
 TEST(TeamFilter, ReachesARobotThatOnlyOthersSee) {
-  constexpr RobotId kHidden{3};
+  static constexpr RobotId kHidden{3};
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SimulatedTeam team(seed);
     team.sees = [](RobotId a, RobotId b) { return std::set{a, b} != std::set{kSelf, kHidden}; };
