@@ -16,6 +16,7 @@ namespace crepes {
 
 #if CERES_VERSION_MAJOR == 2 && CERES_VERSION_MINOR == 0
 
+/// `RightPerturbation` as Ceres 2.0 calls it.
 struct RightPlus {
   template <class T>
   bool operator()(const T* x, const T* delta, T* x_plus) const {
