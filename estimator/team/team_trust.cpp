@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "estimator/core/constants.hpp"
@@ -19,6 +20,7 @@ constexpr Duration kLateProbation = std::chrono::seconds{3};
 constexpr double kAgreed = 4.0;    // times what contradicts
 constexpr int kMostDoublings = 5;  // of a probation, that is 32 s
 constexpr Duration kLossMemory = std::chrono::seconds{10};
+constexpr int kMostRestarts = 2;
 constexpr double kDoubtPerLoss = 4.0;
 constexpr double kTurnedChi2 = 25.0;  // exceeded by one right camera in 65,000
 // Sigmas of a turned camera about the axis of its turn, and across.
@@ -165,6 +167,25 @@ bool is_turned(const Robots& robots, RobotId observer, const TeamCamera& camera,
   return of_observer == all.end() || of_observer->second.gated == 0.0;
 }
 
+/// It agrees with nobody, and other cameras confirm the place of each robot that it contradicts. So
+/// its own attitude is wrong, which no other camera can show.
+bool is_alone(const Robots& robots, RobotId observer, const TeamCamera& camera) {
+  const auto others =
+      witnesses(robots, [&](RobotId witness, const TeamCamera&) { return witness == observer; });
+  bool contradicts = false;
+  for (const auto& [neighbor, agreement] : camera.agreement) {
+    if (agreement.is_contradiction()) {
+      contradicts = true;
+      const auto found = others.find(neighbor);
+      if (found == others.end() || found->second.fused == 0.0 || found->second.gated > 0.0)
+        return false;
+    } else if (agreement.fused > 1.0) {
+      return false;
+    }
+  }
+  return contradicts;
+}
+
 bool is_contradicted(const Robots& robots, const Witnesses& all, RobotId id) {
   const auto found = all.find(id);
   if (found == all.end() || found->second.gated == 0.0) return false;
@@ -232,16 +253,26 @@ bool TeamTrust::is_everybody_strained(Timestamp now) const {
 }
 
 std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBelief& belief) {
-  const Witnesses all = witnesses(belief.robots, [&](RobotId observer, const TeamCamera& camera) {
-    return is_turned(belief.robots, observer, camera, verdicts_.contains(observer));
-  });
   // A robot that was away may have been repaired.
   const auto is_away = [&](const auto& entry) { return interval.member(entry.first) == nullptr; };
   std::erase_if(verdicts_, is_away);
   std::erase_if(gyro_doubts_, is_away);
   std::erase_if(losses_, is_away);
+  std::erase_if(restarts_, is_away);
   std::erase_if(misled_by_, is_away);
   review_verdicts(interval, belief);
+  const auto is_turned_of = [&](RobotId id, const TeamCamera& camera) {
+    return is_turned(belief.robots, id, camera, verdicts_.contains(id));
+  };
+  // Its attitude may have gone wrong, as by a gyroscope that was false for a moment, and it is
+  // restarted. This robot's own attitude is known by definition.
+  const auto is_alone_of = [&](RobotId id, const TeamCamera& camera) {
+    return id != belief.self && recent(restarts_, id, belief.stamp) < kMostRestarts &&
+           is_alone(belief.robots, id, camera) && !is_turned_of(id, camera);
+  };
+  const Witnesses all = witnesses(belief.robots, [&](RobotId id, const TeamCamera& camera) {
+    return is_turned_of(id, camera) || is_alone_of(id, camera);
+  });
   std::vector<RobotId> lost;
   for (const auto& [id, robot] : belief.robots) {
     // Its camera was left out for long enough.
@@ -250,9 +281,13 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
     if (is_tried_again) lost.push_back(id);
     if (is_tried_again || id == belief.self) continue;
     const double variance = belief.P.diagonal().segment<3>(robot.motion_index).sum();
-    const bool is_wrong = is_contradicted(belief.robots, all, id);
-    if (is_wrong) losses_[id] = {belief.stamp, recent_losses(id, belief.stamp) + 1};
-    if (is_wrong || interval.member(id) == nullptr || !(variance < kMaxPosition * kMaxPosition))
+    const bool has_imu = interval.member(id) != nullptr;
+    const bool is_wrong = has_imu && is_contradicted(belief.robots, all, id);
+    const bool is_restarted =
+        has_imu && std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
+    if (is_wrong) count(losses_, id, belief.stamp);
+    if (is_restarted) count(restarts_, id, belief.stamp);
+    if (is_wrong || is_restarted || !has_imu || !(variance < kMaxPosition * kMaxPosition))
       lost.push_back(id);
   }
   return lost;
@@ -319,13 +354,19 @@ bool TeamTrust::is_realigned(RobotId robot) const {
 }
 
 double TeamTrust::doubt(RobotId robot, Timestamp now) const {
-  return std::pow(kDoubtPerLoss, std::min(recent_losses(robot, now), 2));
+  const int steps = std::max(std::min(recent(losses_, robot, now), 2),
+                             std::min(recent(restarts_, robot, now), 1));
+  return std::pow(kDoubtPerLoss, steps);
 }
 
-int TeamTrust::recent_losses(RobotId robot, Timestamp now) const {
-  const auto found = losses_.find(robot);
-  const bool is_recent = found != losses_.end() && now - found->second.last < kLossMemory;
+int TeamTrust::recent(const std::map<RobotId, Losses>& all, RobotId robot, Timestamp now) {
+  const auto found = all.find(robot);
+  const bool is_recent = found != all.end() && now - found->second.last < kLossMemory;
   return is_recent ? found->second.count : 0;
+}
+
+void TeamTrust::count(std::map<RobotId, Losses>& all, RobotId robot, Timestamp now) {
+  all[robot] = {now, recent(all, robot, now) + 1};
 }
 
 bool TeamTrust::is_misled(const TeamBelief& belief) {

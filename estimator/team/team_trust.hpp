@@ -16,7 +16,9 @@ class TeamTrust {
  public:
   /// Robots that must be removed from the belief: they have no IMU, are too uncertain, or are
   /// contradicted by most cameras that see them. In a tie, the robot that came last is removed.
-  /// Also robots whose camera was refused for so long that it is tried again.
+  /// Also robots whose camera agrees with nobody and contradicts only whom other cameras confirm,
+  /// twice in ten seconds: their attitude is wrong. Also robots whose camera was refused for so
+  /// long that it is tried again.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
   /// Robots whose gyroscope has contradicted for some intervals what their cameras see.
@@ -75,9 +77,12 @@ class TeamTrust {
   [[nodiscard]] bool is_realigned(RobotId robot) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] Duration probation(RobotId robot, Timestamp now) const;
-  [[nodiscard]] int recent_losses(RobotId robot, Timestamp now) const;
+  [[nodiscard]] static int recent(const std::map<RobotId, Losses>& all, RobotId robot,
+                                  Timestamp now);
+  static void count(std::map<RobotId, Losses>& all, RobotId robot, Timestamp now);
 
-  std::map<RobotId, Losses> losses_;
+  std::map<RobotId, Losses> losses_;    ///< in the wrong place
+  std::map<RobotId, Losses> restarts_;  ///< with a wrong attitude
   std::map<RobotId, Verdict> verdicts_;
   std::map<RobotId, GyroDoubt> gyro_doubts_;
   std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found

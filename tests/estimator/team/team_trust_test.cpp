@@ -84,6 +84,39 @@ TEST_F(TrustOfFour, ARobotIsLessCertainEachTimeItIsLostAndLikeOthersLater) {
   EXPECT_EQ(trust_.doubt(kAccused, belief_.stamp + 11s), 1.0);
 }
 
+TEST_F(TrustOfFour, ACameraThatAgreesWithNobodyIsNoWitnessAndItsRobotIsLost) {
+  camera_of(kAccused).agreement = {{kSecond, kContradicts}};
+  camera_of(kThird).agreement = {{kSecond, kAgrees}};
+  for (const RobotId other : {kSelf, kSecond}) camera_of(other).agreement.clear();
+  EXPECT_EQ(lost(), Ids{kAccused});
+}
+
+TEST_F(TrustOfFour, ACameraThatAgreesWithNobodyRestartsItsRobotTwiceInTenSeconds) {
+  camera_of(kAccused).agreement = {{kSecond, kContradicts}};
+  for (const RobotId other : {kSelf, kSecond}) camera_of(other).agreement.clear();
+  for (int restart = 1; restart <= 2; ++restart) {
+    EXPECT_EQ(lost(), Ids{kAccused});
+    EXPECT_EQ(trust_.doubt(kAccused, belief_.stamp), 4.0);
+  }
+  EXPECT_NE(lost(), Ids{kAccused});
+  wait(11s);
+  EXPECT_EQ(lost(), Ids{kAccused});
+}
+
+TEST_F(TrustOfFour, ACameraThatContradictsTwoIsTurnedAndItsRobotStays) {
+  contradict_what_it_sees(kAccused);
+  EXPECT_TRUE(lost().empty());
+  EXPECT_EQ(turned(), Ids{kAccused});
+}
+
+TEST_F(TrustOfFour, ACameraIsAWitnessIfItAgreesWithSomebodyOrNobodyConfirmsWhatItSees) {
+  camera_of(kAccused).agreement[kSecond] = kContradicts;
+  EXPECT_TRUE(lost().empty());
+  camera_of(kAccused).agreement = {{kSecond, kContradicts}};
+  for (const RobotId other : {kSelf, kThird}) camera_of(other).agreement.erase(kSecond);
+  EXPECT_EQ(lost(), Ids{kSecond});
+}
+
 TEST_F(TrustOfFour, ARobotThatWasAwayIsForgotten) {
   contradict_its_place(kAccused);
   EXPECT_EQ(lost(), Ids{kAccused});
