@@ -20,7 +20,7 @@ constexpr Duration kLateProbation = std::chrono::seconds{3};
 constexpr double kAgreed = 4.0;    // times what contradicts
 constexpr int kMostDoublings = 5;  // of a probation, that is 32 s
 constexpr Duration kLossMemory = std::chrono::seconds{10};
-constexpr int kMostRestarts = 2;
+constexpr int kMostRestarts = 2;  // of an attitude, within kLossMemory
 constexpr double kDoubtPerLoss = 4.0;
 constexpr double kTurnedChi2 = 25.0;  // exceeded by one right camera in 65,000
 // Sigmas of a turned camera about the axis of its turn, and across.
