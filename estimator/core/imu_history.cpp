@@ -143,6 +143,12 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
           .accel_innovation_density = sum.accel_innovation_density};
 }
 
+Duration ImuHistory::extrapolated(Timestamp from, Timestamp to) const {
+  if (from == to) return Duration{0};
+  const auto [first, last] = std::minmax(from, to);
+  return from_seconds(mean(first, last).extrapolated * to_seconds(last - first));
+}
+
 Eigen::Quaterniond ImuHistory::rotation(Timestamp from, Timestamp to) const {
   if (to < from) return rotation(to, from).conjugate();
   Eigen::Quaterniond q_from_to = Eigen::Quaterniond::Identity();

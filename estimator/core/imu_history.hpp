@@ -55,6 +55,10 @@ class ImuHistory {
   /// Mean over [from, to], from < to; there must be a sample.
   [[nodiscard]] ImuMean mean(Timestamp from, Timestamp to) const;
 
+  /// The part of the time between two instants, in either order, that no sample covers. There must
+  /// be a sample.
+  [[nodiscard]] Duration extrapolated(Timestamp from, Timestamp to) const;
+
   /// The body's rotation R_from_to between two instants, in either order, by the gyroscope alone.
   /// There must be a sample.
   [[nodiscard]] Eigen::Quaterniond rotation(Timestamp from, Timestamp to) const;

@@ -19,9 +19,13 @@ double distance2(const GaussianPose& from, const Pose& to) {
 }  // namespace
 
 double log_likelihood_ratio(const Fusion& fusion, MeasurementKind kind) {
-  if (fusion.verdict != Verdict::kFused) return 0.0;  // clutter under both hypotheses
+  if (fusion.verdict != Verdict::kFused && fusion.verdict != Verdict::kGated) return 0.0;
   const bool is_range = kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange;
-  return fusion.log_likelihood - std::log(is_range ? kFalseRangeDensity : kFalseBearings);
+  const double ratio =
+      fusion.log_likelihood - std::log(is_range ? kFalseRangeDensity : kFalseBearings);
+  // What is gated was not used, but it still tells filters apart: else the least likely one would
+  // gain on all others by a noisy reading that it alone admits.
+  return fusion.verdict == Verdict::kFused ? ratio : std::max(0.0, ratio);
 }
 
 GaussianSum::GaussianSum(const NeighborTrack& whole) {

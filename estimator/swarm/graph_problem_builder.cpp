@@ -21,12 +21,6 @@ bool is_of_swarm(RobotId robot, const SwarmConfig& swarm) {
   return std::ranges::find(swarm.members, robot, &MemberConfig::id) != swarm.members.end();
 }
 
-bool is_covered(const ImuHistory& imu, Timestamp from, Timestamp to) {
-  if (to < from) std::swap(from, to);
-  if (from == to) return true;
-  return imu.mean(from, to).extrapolated * to_seconds(to - from) <= to_seconds(kMaxExtrapolation);
-}
-
 // The estimate propagated to `stamp`. Its position covariance turns with the observer's axes.
 RelativePoseEdge propagated_edge(RobotId from, const NeighborEstimate& estimate,
                                  const ImuHistory& imu_from, const ImuHistory& imu_to,
@@ -70,8 +64,9 @@ GraphProblem GraphProblemBuilder::build(Timestamp stamp, RobotId self,
     if (std::chrono::abs(stamp - estimate.stamp) > kMaxEstimateAge) continue;
     const ImuHistory* imu_from = imu_of(pair.first);
     const ImuHistory* imu_to = imu_of(pair.second);
-    if (imu_from == nullptr || imu_to == nullptr || !is_covered(*imu_from, estimate.stamp, stamp) ||
-        !is_covered(*imu_to, estimate.stamp, stamp))
+    if (imu_from == nullptr || imu_to == nullptr ||
+        imu_from->extrapolated(estimate.stamp, stamp) > kMaxExtrapolation ||
+        imu_to->extrapolated(estimate.stamp, stamp) > kMaxExtrapolation)
       continue;
     problem.edges.push_back(propagated_edge(pair.first, estimate, *imu_from, *imu_to, stamp));
   }

@@ -35,11 +35,13 @@ struct RobotState {
   }
 
   /// The tilt propagated by the gyroscope to `t`, at most a second away. Empty without tilt or
-  /// samples.
+  /// samples, and where samples are missing for long: how far the robot turned there is unknown.
   [[nodiscard]] std::optional<Tilt> tilt_at(Timestamp t) const {
     constexpr Duration kMaxPropagation = std::chrono::seconds{1};
+    constexpr Duration kMaxExtrapolation = std::chrono::milliseconds{100};
     if (!tilt || imu.empty()) return std::nullopt;
     if (t > tilt->stamp + kMaxPropagation || t < tilt->stamp - kMaxPropagation) return std::nullopt;
+    if (imu.extrapolated(tilt->stamp, t) > kMaxExtrapolation) return std::nullopt;
     Tilt propagated = *tilt;
     propagated.stamp = t;
     propagated.up_B = imu.rotation(tilt->stamp, t).conjugate() * tilt->up_B;

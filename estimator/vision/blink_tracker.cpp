@@ -11,6 +11,8 @@ namespace {
 constexpr std::size_t kMaxTracks = 512;
 constexpr int kEstablishedHits = 5;
 constexpr double kRateSigma = 1.0;     // of a new track [rad/s]
+constexpr int kJitterMemory = 100;     // spots
+constexpr int kKnownJitter = 10;       // spots that the configured sigma counts for
 constexpr double kAccelDensity = 3.0;  // of a neighbor's direction [rad/s^2/sqrt(Hz)]
 constexpr double kGyroSigma = 0.02;    // what the gyro leaves of own rotation [rad/s]
 constexpr double kGateSigmas = 4.0;
@@ -32,6 +34,8 @@ constexpr double kSpeedSigma = 0.5;          // m/s
 constexpr double kMostExpectedSigma = 0.04;  // rad; less certain, it says little
 constexpr double kExpectedReach = 3.0;       // sigmas; other lights so near make it ambiguous
 constexpr Duration kOldestPhase = std::chrono::seconds{30};
+
+double square(double x) { return x * x; }
 
 /// Squared chord, which is the squared angle for directions that are near.
 double distance2(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -307,14 +311,29 @@ bool BlinkTracker::is_another(const Track& track, const Sighting& sighting, Time
   return track.is_ambiguous || distance2(track.u_B, sighting.u_B) > reach * reach;
 }
 
+/// A dim spot's center scatters more than a bright one's.
+double BlinkTracker::sigma_px(const Track& track) const {
+  return std::max(config_.bearing_sigma_px, std::sqrt(track.jitter_px2));
+}
+
+/// By the scatter about the predicted direction that the prediction does not explain.
+void BlinkTracker::learn_jitter(const Eigen::Vector3d& residual, double px_rad,
+                                Track& track) const {
+  constexpr double kMost = 9.0;  // times what is expected; beyond, it is another light
+  const double shown = (0.5 * residual.squaredNorm() - track.variance) / square(px_rad);
+  const double credible = std::clamp(shown, 0.0, kMost * square(sigma_px(track)));
+  track.jitter_px2 +=
+      (credible - track.jitter_px2) / std::min(kKnownJitter + track.hits, kJitterMemory);
+}
+
 void BlinkTracker::observe(Track& track, const Sighting& sighting, Timestamp stamp) {
   const bool was_assigned = track.evidence.assigned.has_value();
   if (was_assigned && is_another(track, sighting, stamp)) track.evidence.forget();
-  const double noise = std::pow(config_.bearing_sigma_px * sighting.px_rad, 2);
-  const double S = track.variance + noise;
+  const double S = track.variance + square(sigma_px(track) * sighting.px_rad);
   const double gain = track.variance / S;
   const double rate_gain = track.covariance / S;
   const Eigen::Vector3d residual = sighting.u_B - track.u_B;
+  learn_jitter(residual, sighting.px_rad, track);
   track.u_B = (track.u_B + gain * residual).normalized();
   track.rate_B += rate_gain * residual;
   track.rate_B -= track.u_B * track.u_B.dot(track.rate_B);
@@ -361,7 +380,7 @@ void BlinkTracker::name(Track& track, Timestamp stamp, std::vector<Bearing>& bea
                         .neighbor = *id,
                         .u_B = track.seen.u_B,
                         .p_B_C = T_B_C_.p,
-                        .sigma_rad = config_.bearing_sigma_px * track.seen.px_rad,
+                        .sigma_rad = sigma_px(track) * track.seen.px_rad,
                         .how = read ? Naming::kRead : Naming::kPredicted,
                         .peak = track.seen.peak};
   bearings.push_back(bearing);
@@ -433,7 +452,8 @@ void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp,
   }
   track.u_B = sighting.u_B;
   track.seen_B = sighting.u_B;
-  track.variance = std::pow(config_.bearing_sigma_px * sighting.px_rad, 2);
+  track.jitter_px2 = square(config_.bearing_sigma_px);
+  track.variance = track.jitter_px2 * square(sighting.px_rad);
   track.rate_variance = kRateSigma * kRateSigma;
   track.seen = sighting;
   track.last_seen = stamp;

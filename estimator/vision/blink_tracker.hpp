@@ -77,8 +77,9 @@ class BlinkTracker {
     double variance = 0.0;                               ///< of the direction, per axis [rad^2]
     double covariance = 0.0;
     double rate_variance = 0.0;
-    Timestamp exposed{};  ///< of its row in the frame at hand
-    Sighting seen;        ///< the latest
+    double jitter_px2 = 0.0;  ///< of its spots' centers, variance per axis
+    Timestamp exposed{};      ///< of its row in the frame at hand
+    Sighting seen;            ///< the latest
     Timestamp last_seen{};
     Duration unseen{};          ///< in frames since; those that were lost do not count
     bool is_ambiguous = false;  ///< since then it may have been in a spot with another
@@ -104,6 +105,8 @@ class BlinkTracker {
   [[nodiscard]] bool is_established(const Track& track) const;
   [[nodiscard]] bool hides_another(std::size_t track, const Pairing& sighting_of) const;
   [[nodiscard]] bool is_hidden(const Track& track) const;
+  [[nodiscard]] double sigma_px(const Track& track) const;
+  void learn_jitter(const Eigen::Vector3d& residual, double px_rad, Track& track) const;
   void observe(Track& track, const Sighting& sighting, Timestamp stamp);
   [[nodiscard]] bool is_another(const Track& track, const Sighting& sighting,
                                 Timestamp stamp) const;

@@ -40,7 +40,8 @@ struct VisionConfig {
     v.field("max_area_px2", max_area_px2, Bounds{10, 4e6}, "larger spots are taken for the sun");
     v.field("max_spots", max_spots, Bounds{1, 4096},
             "maximum number of spots per frame; the brightest are kept");
-    v.field("bearing_sigma_px", bearing_sigma_px, Bounds{0.01, 10}, "one sigma of a spot's center");
+    v.field("bearing_sigma_px", bearing_sigma_px, Bounds{0.01, 10},
+            "least sigma of a spot's center; one that jitters has more");
     v.field("gate_px", gate_px, Bounds{1, 100},
             "a spot farther from a track's prediction does not belong to the track");
     v.field("track_timeout_ms", track_timeout_ms, Bounds{10, 5000},

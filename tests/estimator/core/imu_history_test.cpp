@@ -138,6 +138,18 @@ TEST(ImuHistory, CallsGuessedWhatNoSampleCovers) {
   EXPECT_NEAR(imu.mean(Timestamp{1s}, Timestamp{2s}).gyro_radps.x(), 3.0, 1e-12);
 }
 
+TEST(ImuHistory, SumsTheTimeThatNoSampleCovers) {
+  ImuHistory imu;
+  imu.push(sample_at(100ms));
+  imu.push(sample_at(110ms));
+  imu.push(sample_at(210ms));
+
+  EXPECT_EQ(imu.extrapolated(Timestamp{100ms}, Timestamp{110ms}), 0ms);
+  EXPECT_EQ(imu.extrapolated(Timestamp{110ms}, Timestamp{110ms}), 0ms);
+  for (const auto& [from, to] : {std::pair{105ms, 160ms}, std::pair{160ms, 105ms}})
+    EXPECT_NEAR(to_seconds(imu.extrapolated(Timestamp{from}, Timestamp{to})), 0.05, 1e-9);
+}
+
 TEST(ImuHistory, RotationBackUndoesRotationForth) {
   RandomGeometry random(2);
   ImuHistory imu;

@@ -97,6 +97,25 @@ TEST(GaussianSum, AGatedReadingHasNoScore) {
   EXPECT_NEAR(association.score, 0.0, 1e-12);
 }
 
+TEST(GaussianSum, ANoisyReadingDoesNotMakeAnUnlikelyPartLikely) {
+  const Pose beside{{kDistance, 0.02, 0.0}, Eigen::Quaterniond::Identity()};
+  Matrix6d narrow = covariance();
+  narrow.topLeftCorner<3, 3>() = 1e-6 * Eigen::Matrix3d::Identity();
+  GaussianSum sum(
+      std::vector{track_at(at_ms(0), {kTruth, narrow}), track_at(at_ms(0), {beside, narrow})});
+  for (int i = 0; i < 3; ++i) fuse(sum, bearing(at_ms(0), 0.001));
+
+  // Barely gated by the likely part. The other one admits it.
+  const auto verdict_at = [](GaussianSum copy, double azimuth_rad) {
+    return fuse(copy, bearing(at_ms(0), azimuth_rad)).fusion.verdict;
+  };
+  double azimuth_rad = 0.0;
+  while (verdict_at(sum, azimuth_rad) == Verdict::kFused) azimuth_rad += 1e-4;
+  fuse(sum, bearing(at_ms(0), azimuth_rad));
+
+  EXPECT_LT(sum.heaviest().pose().pose.p.y(), 0.01);
+}
+
 TEST(GaussianSum, IsCompatibleWithANearPoseButNotWithAMirrorImage) {
   const GaussianSum sum = sum_of({kTruth});
   const Pose image{{0.0, kDistance, 0.0}, so3_exp({0.0, 0.0, 0.5 * std::numbers::pi})};
@@ -105,14 +124,19 @@ TEST(GaussianSum, IsCompatibleWithANearPoseButNotWithAMirrorImage) {
   EXPECT_FALSE(sum.is_compatible_with(sum_of({image})));
 }
 
-TEST(LogLikelihoodRatio, ComparesAFusedReadingWithClutterAndIgnoresOthers) {
+TEST(LogLikelihoodRatio, ComparesAReadingWithClutterAndIsNeverNegativeForAGatedOne) {
   Fusion fusion{.verdict = Verdict::kFused};
   fusion.log_likelihood = 5.0;
 
   EXPECT_GT(log_likelihood_ratio(fusion, MeasurementKind::kBearing), 5.0);
   EXPECT_GT(log_likelihood_ratio(fusion, MeasurementKind::kRange),
             log_likelihood_ratio(fusion, MeasurementKind::kBearing));
+  const double fused = log_likelihood_ratio(fusion, MeasurementKind::kBearing);
   fusion.verdict = Verdict::kGated;
+  EXPECT_EQ(log_likelihood_ratio(fusion, MeasurementKind::kBearing), fused);
+  fusion.log_likelihood = -20.0;  // more likely clutter
+  EXPECT_EQ(log_likelihood_ratio(fusion, MeasurementKind::kBearing), 0.0);
+  fusion.verdict = Verdict::kSkipped;
   EXPECT_EQ(log_likelihood_ratio(fusion, MeasurementKind::kBearing), 0.0);
 }
 

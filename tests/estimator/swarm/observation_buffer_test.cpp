@@ -158,6 +158,20 @@ TEST_F(Sighted, SaysWhatIsMissing) {
   EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kTiltUnknown);
 }
 
+TEST_F(Sighted, ATiltIsNotCarriedAcrossMissingSamples) {
+  buffer_.add_own_bearing(own(kNow));
+  add_range(kNow);
+  neighbor_.tilt->stamp = kNow - 300ms;
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kNone);
+
+  neighbor_.imu = {};
+  for (std::size_t i = 0; i < pair_.imu_N.size(); ++i) {
+    const ImuSample& sample = pair_.imu_N[i];
+    if (sample.stamp < kNow - 250ms || sample.stamp > kNow - 100ms) neighbor_.imu.push(sample);
+  }
+  EXPECT_EQ(reason(peer(kNow)), NoPoseReason::kTiltUnknown);
+}
+
 TEST_F(Sighted, AnOutlierAmongRangesDoesNotPass) {
   buffer_.add_own_bearing(own(kNow));
   add_range(kNow - 20ms);

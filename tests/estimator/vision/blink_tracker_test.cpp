@@ -55,7 +55,7 @@ class BlinkTrackerTest : public testing::Test {
 
     SpotFrame frame;
     frame.stamp = now_;
-    std::normal_distribution<double> noise(0.0, 0.2);
+    std::normal_distribution<double> noise(0.0, jitter_px_);
     for (std::size_t i = 0; i < boards_.size(); ++i) {
       const Board& board = boards_[i];
       if (board.code < 3 && !library_.entries()[board.code].code.is_lit(body.time_since_epoch() +
@@ -104,6 +104,7 @@ class BlinkTrackerTest : public testing::Test {
   std::vector<Board> boards_;
   std::vector<ExpectedBoard> expected_;
   double yaw_rate_radps_ = 0.0;
+  double jitter_px_ = 0.2;
   Eigen::Quaterniond q_W_B_ = Eigen::Quaterniond::Identity();
   Timestamp now_{100s};
   SpotFrame frame_;
@@ -123,6 +124,22 @@ TEST_F(BlinkTrackerTest, GivesBearingsInBodyAxesAndBodyTime) {
   EXPECT_LT((bearings[0].p_B_C - Eigen::Vector3d(0.06, 0.0, 0.01)).norm(), 1e-12);
   EXPECT_LT(error_of(bearings[0], 0), 5.0 * bearings[0].sigma_rad);
   EXPECT_NEAR(bearings[0].sigma_rad, 0.3 / 317.0, 0.4 / 317.0);
+}
+
+TEST_F(BlinkTrackerTest, ASpotThatJittersMoreThanConfiguredHasALargerSigma) {
+  boards_ = {{0, [](double) { return Eigen::Vector3d(5.0, 1.0, 0.3); }}};
+  const auto sigma_rad = [&](double jitter_px) {
+    jitter_px_ = jitter_px;
+    double last = 0.0;
+    for (int i = 0; i < 600; ++i)
+      for (const Bearing& bearing : step()) last = bearing.sigma_rad;
+    return last;
+  };
+
+  const double as_configured = sigma_rad(0.1);
+
+  EXPECT_NEAR(sigma_rad(0.5), 2.5 * as_configured, 0.5 * as_configured);
+  EXPECT_NEAR(sigma_rad(0.1), as_configured, 0.01 * as_configured);
 }
 
 TEST_F(BlinkTrackerTest, KeepsItsBoardsWhileItTurnsFiveHundredDegreesASecond) {
