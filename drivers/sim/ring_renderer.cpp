@@ -17,6 +17,7 @@ namespace {
 constexpr double kRingRadius = 0.03;  // m
 constexpr int kLeds = 6;
 constexpr double kExposure = 0.0005;             // s
+constexpr double kHalfField = radians(92.5);     // of the lens, whatever the sensor's size
 constexpr double kBlur = 0.8;                    // px, one sigma of an LED's image
 constexpr double kPeakAtOneMeter = 7500.0;       // grey levels of one LED; pixels saturate at 255
 constexpr double kFaintest = 0.3;                // grey levels; fainter light is ignored
@@ -98,7 +99,12 @@ std::optional<Eigen::Vector2d> RingRenderer::project_ring(RobotId neighbor, doub
 std::optional<Eigen::Vector2d> RingRenderer::project(const Eigen::Vector3d& p_W, double t_s) const {
   const Pose T_W_B = world_.T_W_B(robot_, t_s);
   if (world_.is_occluded(T_W_B * T_C_B_.inverse().p, p_W)) return std::nullopt;
-  const auto uv = model_.project(T_C_B_ * (T_W_B.inverse() * p_W));
+  return image_of(T_C_B_ * (T_W_B.inverse() * p_W));
+}
+
+std::optional<Eigen::Vector2d> RingRenderer::image_of(const Eigen::Vector3d& p_C) const {
+  if (p_C.z() < std::cos(kHalfField) * p_C.norm()) return std::nullopt;
+  const auto uv = model_.project(p_C);
   return uv && model_.contains(*uv) ? uv : std::nullopt;
 }
 
@@ -155,8 +161,8 @@ std::vector<RingRenderer::Blob> RingRenderer::blobs_of(const Board& board, doubl
     if (forward <= 0.0) continue;
     const double peak = lit * brightness_ * kPeakAtOneMeter * (0.3 + 0.7 * forward) /
                         std::max(p_C.squaredNorm(), 0.01);
-    const auto uv = model_.project(p_C);
-    if (uv && model_.contains(*uv) && peak > kFaintest) blobs.push_back({*uv, peak});
+    if (peak <= kFaintest) continue;
+    if (const auto uv = image_of(p_C)) blobs.push_back({*uv, peak});
   }
   return blobs;
 }

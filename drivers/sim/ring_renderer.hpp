@@ -79,6 +79,8 @@ class RingRenderer {
   RingRenderer(const SimWorld& world, RobotId robot, CameraModel model,
                const CameraCalibration& camera, std::uint8_t index);
 
+  /// Where a point in the camera appears. Empty outside the lens's field of view or the sensor.
+  [[nodiscard]] std::optional<Eigen::Vector2d> image_of(const Eigen::Vector3d& p_C) const;
   /// When the rows of the board's image are exposed in the frame of `t_s`.
   [[nodiscard]] double exposure_s(const Board& board, double t_s) const;
   [[nodiscard]] std::vector<Blob> blobs_of(const Board& board, double t_s) const;
