@@ -143,6 +143,14 @@ Association HypothesisSet::fuse(std::span<const Measurement> candidates, const I
                                 const ImuHistory& imu_N) {
   const Timestamp stamp = candidates.front().stamp;
   const MeasurementKind kind = candidates.front().kind;
+  // After a pause, readings of seconds come at once, and nothing is pruned between them.
+  if (stamp - hypotheses_.front().sum.heaviest().last_sighting() > kDivergenceTime) {
+    advance_to(stamp, imu_B, imu_N);
+    if (must_start_anew()) {
+      clear();
+      return {.fusion{.verdict = Verdict::kNoState}};
+    }
+  }
   CorrectionBudget& corrections = budget(kind);
   Association of_leader{.fusion{.verdict = Verdict::kSkipped}};
   for (Hypothesis& hypothesis : hypotheses_) {
@@ -181,8 +189,11 @@ void HypothesisSet::prune() {
   };
   hypotheses_.erase(std::remove_if(hypotheses_.begin() + 1, hypotheses_.end(), has_lost),
                     hypotheses_.end());
-  const bool starts_anew = settings_.traits.fuses_single_readings && is_lost(leader.sum.heaviest());
-  if ((!leader.confirmed && is_past_probation(leader)) || starts_anew) clear();
+  if ((!leader.confirmed && is_past_probation(leader)) || must_start_anew()) clear();
+}
+
+bool HypothesisSet::must_start_anew() const {
+  return settings_.traits.fuses_single_readings && is_lost(hypotheses_.front().sum.heaviest());
 }
 
 bool HypothesisSet::is_unambiguous() const {

@@ -59,7 +59,8 @@ class HypothesisSet {
   /// Propagates all hypotheses to `to`.
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Corrects each hypothesis with the most likely reading of a group of alternatives, the leader
-  /// first, as far as the budget allows. Returns the leader's association.
+  /// first, as far as the budget allows. Returns the leader's association. If the leader became
+  /// uncertain out of sight since its last reading, all are deleted.
   Association fuse(std::span<const Measurement> candidates, const ImuHistory& imu_B,
                    const ImuHistory& imu_N);
   /// Selects the leader and deletes hypotheses that lost or became equal to the leader.
@@ -87,6 +88,8 @@ class HypothesisSet {
     void add_score(MeasurementKind kind, double log_likelihood_ratio);
     [[nodiscard]] double score() const { return bearing_score + peer_bearing_score; }
   };
+  /// Whether the leader became so uncertain out of sight that a mutual sighting says more.
+  [[nodiscard]] bool must_start_anew() const;
   [[nodiscard]] bool is_explained(Timestamp stamp, const MutualInitialization& first) const;
   [[nodiscard]] Hypothesis make(GaussianSum sum);
   [[nodiscard]] CorrectionBudget& budget(MeasurementKind kind) {

@@ -147,6 +147,19 @@ TEST(Hypotheses, ATrackThatBecameUncertainOutOfSightIsDropped) {
   EXPECT_TRUE(hypotheses.empty());
 }
 
+TEST(Hypotheses, AReadingAfterALongPauseDoesNotMakeAnUncertainTrackCertain) {
+  HypothesisSet hypotheses(settings(), kMounting);
+  ASSERT_TRUE(hypotheses.initialize(at_ms(0), sighting()));
+  feed(hypotheses, 10, 20);
+  const ImuHistory imu = imu_at_rest(30000);
+  const Measurement z = bearing(at_ms(30000));
+
+  const Association association = hypotheses.fuse({&z, 1}, imu, imu);
+
+  EXPECT_EQ(association.fusion.verdict, Verdict::kNoState);
+  EXPECT_TRUE(hypotheses.empty());
+}
+
 TEST(Hypotheses, AnExplainedSightingStartsNoRival) {
   HypothesisSet hypotheses(settings(), kMounting);
   ASSERT_TRUE(hypotheses.initialize(at_ms(0), sighting()));
