@@ -144,7 +144,7 @@ Association HypothesisSet::fuse(std::span<const Measurement> candidates, const I
   const Timestamp stamp = candidates.front().stamp;
   const MeasurementKind kind = candidates.front().kind;
   // After a pause, readings of seconds come at once, and nothing is pruned between them.
-  if (stamp - hypotheses_.front().sum.heaviest().last_sighting() > kDivergenceTime) {
+  if (stamp - this->stamp() > kDivergenceTime) {
     advance_to(stamp, imu_B, imu_N);
     if (must_start_anew()) {
       clear();

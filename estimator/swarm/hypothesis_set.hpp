@@ -60,7 +60,7 @@ class HypothesisSet {
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Corrects each hypothesis with the most likely reading of a group of alternatives, the leader
   /// first, as far as the budget allows. Returns the leader's association. If the leader became
-  /// uncertain out of sight since its last reading, all are deleted.
+  /// uncertain in a pause before the reading, all are deleted.
   Association fuse(std::span<const Measurement> candidates, const ImuHistory& imu_B,
                    const ImuHistory& imu_N);
   /// Selects the leader and deletes hypotheses that lost or became equal to the leader.
