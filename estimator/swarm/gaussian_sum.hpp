@@ -15,7 +15,8 @@ struct Association {
   double score = 0.0;      ///< log likelihood ratio: the chosen one is true, or all are clutter
 };
 
-/// ln of the likelihood of a reading given the filter, over its likelihood as clutter.
+/// ln of the likelihood of a reading given the filter, over its likelihood as clutter. At least
+/// zero for a gated reading; zero for one that was not compared.
 [[nodiscard]] double log_likelihood_ratio(const Fusion& fusion, MeasurementKind kind);
 
 /// A weighted bank of filters (Alspach and Sorenson 1972). They differ in what the first reading

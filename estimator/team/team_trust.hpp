@@ -17,8 +17,8 @@ class TeamTrust {
   /// Robots that must be removed from the belief: they have no IMU, are too uncertain, or are
   /// contradicted by most cameras that see them. In a tie, the robot that came last is removed.
   /// Also robots whose camera agrees with nobody and contradicts only whom other cameras confirm,
-  /// twice in ten seconds: their attitude is wrong. Also robots whose camera was refused for so
-  /// long that it is tried again.
+  /// at most twice in ten seconds: their attitude is wrong. Also robots whose camera was refused
+  /// for so long that it is tried again.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
   /// Robots whose gyroscope has contradicted for some intervals what their cameras see.
