@@ -144,13 +144,11 @@ Association HypothesisSet::fuse(std::span<const Measurement> candidates, const I
   const Timestamp stamp = candidates.front().stamp;
   const MeasurementKind kind = candidates.front().kind;
   // After a pause, readings of seconds come at once, and nothing is pruned between them.
-  if (stamp - this->stamp() > kDivergenceTime) {
+  if (!empty() && stamp - this->stamp() > kDivergenceTime) {
     advance_to(stamp, imu_B, imu_N);
-    if (must_start_anew()) {
-      clear();
-      return {.fusion{.verdict = Verdict::kNoState}};
-    }
+    if (must_start_anew()) clear();
   }
+  if (empty()) return {.fusion{.verdict = Verdict::kNoState}};
   CorrectionBudget& corrections = budget(kind);
   Association of_leader{.fusion{.verdict = Verdict::kSkipped}};
   for (Hypothesis& hypothesis : hypotheses_) {

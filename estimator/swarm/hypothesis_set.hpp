@@ -59,8 +59,8 @@ class HypothesisSet {
   /// Propagates all hypotheses to `to`.
   void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
   /// Corrects each hypothesis with the most likely reading of a group of alternatives, the leader
-  /// first, as far as the budget allows. Returns the leader's association. If the leader became
-  /// uncertain in a pause before the reading, all are deleted.
+  /// first, as far as the budget allows. If the leader became uncertain in a pause before the
+  /// reading, all are deleted. Returns the leader's association; `kNoState` if there is no leader.
   Association fuse(std::span<const Measurement> candidates, const ImuHistory& imu_B,
                    const ImuHistory& imu_N);
   /// Selects the leader and deletes hypotheses that lost or became equal to the leader.

@@ -118,10 +118,11 @@ void Neighbor::fuse_released(Timestamp now, const RobotState& self) {
       TrackInitiator::initialize(group, self.imu, body_.imu, hypotheses_, outcomes());
       continue;
     }
-    const bool usable = can_move && !is_late && !hypotheses_.empty();
+    const bool usable = can_move && !is_late;
     const Association association = usable ? hypotheses_.fuse(group, self.imu, body_.imu)
                                            : Association{.fusion{.verdict = Verdict::kNoState}};
-    const Fusion other{.verdict = usable ? Verdict::kGated : Verdict::kNoState};
+    const bool is_compared = usable && !hypotheses_.empty();
+    const Fusion other{.verdict = is_compared ? Verdict::kGated : Verdict::kNoState};
     for (std::size_t i = 0; i < group.size(); ++i)
       outcomes().add(first.stamp, first.kind, i == association.chosen ? association.fusion : other,
                      reading_of(group[i]));
