@@ -131,6 +131,8 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   if (count == 0) return std::nullopt;
   std::vector<const Bearing*> sorted = sight.bearings;
   std::ranges::stable_sort(sorted, {}, &Bearing::stamp);
+  // An ID seen twice at once is a robot and its mirror image: either may be lost from view.
+  if (std::ranges::adjacent_find(sorted, {}, &Bearing::stamp) != sorted.end()) return std::nullopt;
   const std::span all(sorted);
   const Half first{all.first(count)};
   const Half second{all.last(count)};

@@ -76,6 +76,29 @@ TEST(GyroCheck, ATurnedCameraIsNoContradiction) {
   }
 }
 
+// The robot sees the images of all others in the floor, and loses sight of the robots themselves.
+TEST(GyroCheck, MirrorImagesThatRemainAloneAreNoContradiction) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      const Timestamp middle = interval.from + (interval.to - interval.from) / 2;
+      std::vector<TeamBearing> images;
+      for (TeamBearing& b : interval.bearings) {
+        if (b.observer != kOther) continue;
+        TeamBearing image = b;
+        image.bearing.u_B = (b.bearing.u_B - 0.5 * Eigen::Vector3d::UnitZ()).normalized();
+        if (b.bearing.stamp < middle)
+          images.push_back(image);
+        else
+          b = image;
+      }
+      interval.bearings.insert(interval.bearings.end(), images.begin(), images.end());
+    };
+    for (const auto& [robot, check] : Scene(team).checks())
+      EXPECT_FALSE(check.contradiction) << seed << ", robot " << robot.value;
+  }
+}
+
 // One robot that moves otherwise than expected is that robot's affair.
 TEST(GyroCheck, OneNeighborAloneProvesNothing) {
   SimulatedTeam team(1);
