@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -25,6 +26,9 @@ constexpr double kDarkSigma = 1.0;  // m
 constexpr std::size_t kLeastBeacons = 3;
 constexpr double kLeastSpread = 0.05;
 constexpr double kMostDoubt = 0.7;  // m; sigma of its place; beyond, a range is no plane
+
+// NIS by which the likeliest of a robot and its mirror images is told from the next: odds of 90.
+constexpr double kClearly = 9.0;
 
 bool is_inside(const TeamInterval& interval, Timestamp stamp) {
   return stamp > interval.from && stamp <= interval.to;
@@ -186,6 +190,26 @@ class MeanResidual {
   TeamResidual residual_;
 };
 
+/// Of a robot or its image in a mirror.
+struct Candidate {
+  const Bearing* bearing = nullptr;
+  Eigen::Vector2d residual = Eigen::Vector2d::Zero();
+  double nis = std::numeric_limits<double>::infinity();
+};
+
+/// Of bearings with one stamp.
+struct Likeliest {
+  Candidate best{};
+  bool is_clear = true;  ///< no other is nearly as likely
+
+  void add(const Candidate& next) {
+    is_clear = !best.bearing || (is_clear && next.nis - best.nis > kClearly) ||
+               best.nis - next.nis > kClearly;
+    if (!best.bearing || next.nis < best.nis) best = next;
+  }
+};
+
+/// Of a robot and its mirror images in one frame, the likeliest remains; none if that is not clear.
 TeamResidual gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
   TeamResidual found{.observer = sight.observer,
                      .neighbor = sight.neighbor,
@@ -199,16 +223,21 @@ TeamResidual gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
   }
   const Eigen::Matrix2d S = model->row().covariance(scene.instant.covariance());
   const Eigen::LLT<Eigen::Matrix2d> factors(S);
-  Agreement& agreement = camera.agreement[sight.neighbor];
+  std::map<Timestamp, Likeliest> frames;
+  for (const Bearing* z : sight.bearings) {
+    Candidate candidate{.bearing = z};
+    if (const auto r = model->residual(pair, camera, z->u_B, scene.time_s(z->stamp)))
+      candidate = {z, *r, r->dot(factors.solve(*r))};
+    frames[z->stamp].add(candidate);
+  }
+  sight.bearings.clear();
   MeanResidual mean;
-  std::erase_if(sight.bearings, [&](const Bearing* z) {
-    const auto residual = model->residual(pair, camera, z->u_B, scene.time_s(z->stamp));
-    const bool fits =
-        residual && residual->dot(factors.solve(*residual)) <= scene.interval.settings.bearing_gate;
-    agreement.add(fits);
-    if (residual) mean.add(*residual, fits);
-    return !fits;
-  });
+  for (const auto& [stamp, frame] : frames) {
+    const bool fits = frame.best.nis <= scene.interval.settings.bearing_gate;
+    if (frame.is_clear || !fits) camera.agreement[sight.neighbor].add(fits);
+    if (std::isfinite(frame.best.nis)) mean.add(frame.best.residual, fits && frame.is_clear);
+    if (fits && frame.is_clear) sight.bearings.push_back(frame.best.bearing);
+  }
   return mean.of(found, S, 2);
 }
 

@@ -231,6 +231,19 @@ TEST(TeamStudy, ScoresATeamAgainstItsBound) {
   EXPECT_NEAR(static_cast<double>(trial->reached.gross_errors.all.poses), 12.0 * 150.0, 100.0);
 }
 
+// Floors mirror for seconds, so that robots are seen twice or only their images are.
+TEST(TeamStudy, MirrorImagesCostATeamNoPoses) {
+  const Swarm swarm = simulate_swarm(scenario("interference"), 5, 14.0);
+
+  const auto trial = run_team_trial(swarm, {});
+
+  ASSERT_TRUE(trial) << trial.error().message;
+  SCOPED_TRACE(table_of(std::vector{*trial}));
+  EXPECT_GT(trial->reached.worst_availability, 0.99);
+  EXPECT_EQ(trial->reached.gross_errors.all.share(), 0.0);
+  EXPECT_LT(trial->reached.position_rmse_m / trial->bound.position_rms_m, 2.5);
+}
+
 // A robot that broadcasts wrong estimates at a sigma of 1 mm moves the others through the pose
 // graph, and not through the team's filter.
 TEST(TeamStudy, ComparesTheHonestWithAndWithoutALiar) {
