@@ -10,11 +10,6 @@ namespace {
 
 constexpr std::size_t kMaxTracks = 512;
 constexpr int kEstablishedHits = 5;
-constexpr double kRateSigma = 1.0;     // of a new track [rad/s]
-constexpr int kJitterMemory = 100;     // spots
-constexpr int kKnownJitter = 10;       // spots that the configured sigma counts for
-constexpr double kAccelDensity = 3.0;  // of a neighbor's direction [rad/s^2/sqrt(Hz)]
-constexpr double kGyroSigma = 0.02;    // what the gyro leaves of own rotation [rad/s]
 constexpr double kGateSigmas = 4.0;
 constexpr double kMergePx = 3.0;            // beside the blobs' own radii
 constexpr double kMinLitProbability = 0.3;  // below it, the board is dark
@@ -34,8 +29,6 @@ constexpr double kSpeedSigma = 0.5;          // m/s
 constexpr double kMostExpectedSigma = 0.04;  // rad; less certain, it says little
 constexpr double kExpectedReach = 3.0;       // sigmas; other lights so near make it ambiguous
 constexpr Duration kOldestPhase = std::chrono::seconds{30};
-
-double square(double x) { return x * x; }
 
 /// Squared chord, which is the squared angle for directions that are near.
 double distance2(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -93,7 +86,7 @@ std::vector<Bearing> BlinkTracker::step(const SpotFrame& frame,
       ++counts_.merged_spots;
       unclear_.push_back(*sighting_of[t]);
       track.last_seen = stamp;
-      track.seen_B = track.u_B;
+      track.seen_B = track.light.u_B;
       track.unseen = {};
       track.is_ambiguous = true;
       continue;
@@ -126,7 +119,7 @@ Timestamp BlinkTracker::exposure_of(double v_px, Timestamp stamp) const {
 
 Timestamp BlinkTracker::exposure_of(const Track& track, Timestamp stamp) const {
   if (row_delay_s_ == 0.0) return stamp;
-  const auto uv = model_.project(T_C_B_.q * track.u_B);
+  const auto uv = model_.project(T_C_B_.q * track.light.u_B);
   return uv && model_.contains(*uv) ? exposure_of(uv->y(), stamp) : stamp;
 }
 
@@ -157,31 +150,23 @@ void BlinkTracker::unproject(const SpotFrame& frame, Timestamp stamp) {
   });
 }
 
-/// Constant rate beside own rotation:  u <- R_B1_B0 (u + rate dt), white acceleration of density
-/// kAccelDensity; the covariance is that of each of the two axes across u.
 void BlinkTracker::predict(Timestamp stamp) {
   if (!now_) now_ = stamp;
   const Eigen::Quaterniond R_now_before =
       imu_.empty() ? Eigen::Quaterniond::Identity() : imu_.rotation(stamp, *now_);
-  const double dt = to_seconds(stamp - *now_);
-  const double q = kAccelDensity * kAccelDensity;
+  const double dt_s = to_seconds(stamp - *now_);
   hidden_.rotate_frame(R_now_before);
   for (Track& track : tracks_) {
-    track.u_B = (R_now_before * (track.u_B + track.rate_B * dt)).normalized();
-    track.rate_B = R_now_before * track.rate_B;
+    track.light.predict(R_now_before, dt_s);
     track.seen_B = R_now_before * track.seen_B;
     track.steady_B = R_now_before * track.steady_B;
     const Duration absence = stamp - track.last_seen;
     if (absence > decoder_.longest_dark()) {  // a rate of a few frames would carry it astray
       const ExpectedLight* expected = expected_of(track);
-      track.u_B = expected != nullptr
-                      ? expected->u_B
-                      : (track.seen_B + to_seconds(absence) * track.steady_B).normalized();
+      track.light.u_B = expected != nullptr
+                            ? expected->u_B
+                            : (track.seen_B + to_seconds(absence) * track.steady_B).normalized();
     }
-    track.variance += dt * (2.0 * track.covariance + dt * track.rate_variance) +
-                      q * dt * dt * dt / 3.0 + std::pow(kGyroSigma * dt, 2);
-    track.covariance += dt * track.rate_variance + q * dt * dt / 2.0;
-    track.rate_variance += q * dt;
     track.exposed = exposure_of(track, stamp);
   }
   now_ = stamp;
@@ -243,7 +228,7 @@ bool BlinkTracker::is_alone(const Sighting& sighting, const Eigen::Vector3d& u_B
 
 double BlinkTracker::gate_of(const Track& track) const {
   return config_.gate_px * track.seen.px_rad + track.seen.radius_rad +
-         std::min(kGateSigmas * std::sqrt(track.variance),
+         std::min(kGateSigmas * std::sqrt(track.light.variance),
                   2.0 * config_.gate_px * track.seen.px_rad);
 }
 
@@ -261,12 +246,13 @@ const BlinkTracker::Pairing& BlinkTracker::assign() {
     const double newness = track.hits < kEstablishedHits ? kNewness : 0.0;
     const auto first = std::partition_point(
         sightings_.begin(), sightings_.end(),
-        [&](const Sighting& sighting) { return sighting.u_B.x() < track.u_B.x() - gate; });
-    for (auto it = first; it != sightings_.end() && it->u_B.x() <= track.u_B.x() + gate; ++it) {
-      const double d2 = distance2(track.u_B, it->u_B);
+        [&](const Sighting& sighting) { return sighting.u_B.x() < track.light.u_B.x() - gate; });
+    for (auto it = first; it != sightings_.end() && it->u_B.x() <= track.light.u_B.x() + gate;
+         ++it) {
+      const double d2 = distance2(track.light.u_B, it->u_B);
       if (d2 > gate * gate) continue;
       // A pixel's worth of model error: maneuvers, and centers that shift as LEDs come and go.
-      const double variance = track.variance + it->px_rad * it->px_rad;
+      const double variance = track.light.variance + it->px_rad * it->px_rad;
       const double density = std::log(2.0 * std::numbers::pi * variance * kNewSources);
       pairs_.push_back(
           {t, static_cast<std::size_t>(it - sightings_.begin()),
@@ -288,7 +274,8 @@ bool BlinkTracker::hides_another(std::size_t track, const Pairing& sighting_of) 
     if (t == track || sighting_of[t] || !is_established(other)) continue;
     const double lit = decoder_.lit_probability(other.evidence, other.exposed).value_or(1.0);
     const double reach = other.seen.radius_rad + sighting.radius_rad + kMergePx * sighting.px_rad;
-    if (lit > kMinLitProbability && distance2(other.u_B, sighting.u_B) < reach * reach) return true;
+    if (lit > kMinLitProbability && distance2(other.light.u_B, sighting.u_B) < reach * reach)
+      return true;
   }
   return false;
 }
@@ -297,7 +284,7 @@ bool BlinkTracker::hides_another(std::size_t track, const Pairing& sighting_of) 
 bool BlinkTracker::is_hidden(const Track& track) const {
   return std::any_of(unclear_.begin(), unclear_.end(), [&](std::size_t s) {
     const double reach = gate_of(track) + sightings_[s].radius_rad;
-    return distance2(sightings_[s].u_B, track.u_B) < reach * reach;
+    return distance2(sightings_[s].u_B, track.light.u_B) < reach * reach;
   });
 }
 
@@ -308,40 +295,16 @@ bool BlinkTracker::is_another(const Track& track, const Sighting& sighting, Time
   if (!last_lit || stamp - *last_lit <= decoder_.longest_dark()) return false;
   const double absence = to_seconds(stamp - *last_lit) / to_seconds(kShortAbsence);
   const double reach = kExpectedPx * std::max(1.0, absence) * sighting.px_rad;
-  return track.is_ambiguous || distance2(track.u_B, sighting.u_B) > reach * reach;
-}
-
-/// A dim spot's center scatters more than a bright one's.
-double BlinkTracker::sigma_px(const Track& track) const {
-  return std::max(config_.bearing_sigma_px, std::sqrt(track.jitter_px2));
-}
-
-/// By the scatter about the predicted direction that the prediction does not explain.
-void BlinkTracker::learn_jitter(const Eigen::Vector3d& residual, double px_rad,
-                                Track& track) const {
-  constexpr double kMost = 9.0;  // times what is expected; beyond, it is another light
-  const double shown = (0.5 * residual.squaredNorm() - track.variance) / square(px_rad);
-  const double credible = std::clamp(shown, 0.0, kMost * square(sigma_px(track)));
-  track.jitter_px2 +=
-      (credible - track.jitter_px2) / std::min(kKnownJitter + track.hits, kJitterMemory);
+  return track.is_ambiguous || distance2(track.light.u_B, sighting.u_B) > reach * reach;
 }
 
 void BlinkTracker::observe(Track& track, const Sighting& sighting, Timestamp stamp) {
   const bool was_assigned = track.evidence.assigned.has_value();
   if (was_assigned && is_another(track, sighting, stamp)) track.evidence.forget();
-  const double S = track.variance + square(sigma_px(track) * sighting.px_rad);
-  const double gain = track.variance / S;
-  const double rate_gain = track.covariance / S;
-  const Eigen::Vector3d residual = sighting.u_B - track.u_B;
-  learn_jitter(residual, sighting.px_rad, track);
-  track.u_B = (track.u_B + gain * residual).normalized();
-  track.rate_B += rate_gain * residual;
-  track.rate_B -= track.u_B * track.u_B.dot(track.rate_B);
-  track.rate_variance -= rate_gain * track.covariance;
-  track.covariance *= 1.0 - gain;
-  track.variance *= 1.0 - gain;
-  track.steady_B += std::max(kSteadyGain, 1.0 / (track.hits + 1)) * (track.rate_B - track.steady_B);
-  track.seen_B = track.u_B;
+  track.light.correct(sighting.u_B, sighting.px_rad, config_.bearing_sigma_px, track.hits);
+  track.steady_B +=
+      std::max(kSteadyGain, 1.0 / (track.hits + 1)) * (track.light.rate_B - track.steady_B);
+  track.seen_B = track.light.u_B;
   track.seen = sighting;
   track.last_seen = stamp;
   track.unseen = {};
@@ -376,19 +339,20 @@ void BlinkTracker::name(Track& track, Timestamp stamp, std::vector<Bearing>& bea
   const double lit =
       decoder_.lit_probability(track.evidence, track.seen.exposed).value_or(kLitProbability);
   if (!id || lit < kMinLitProbability) return;
-  const Bearing bearing{.stamp = stamp,
-                        .neighbor = *id,
-                        .u_B = track.seen.u_B,
-                        .p_B_C = T_B_C_.p,
-                        .sigma_rad = sigma_px(track) * track.seen.px_rad,
-                        .how = read ? Naming::kRead : Naming::kPredicted,
-                        .peak = track.seen.peak};
+  const Bearing bearing{
+      .stamp = stamp,
+      .neighbor = *id,
+      .u_B = track.seen.u_B,
+      .p_B_C = T_B_C_.p,
+      .sigma_rad = track.light.sigma_px(config_.bearing_sigma_px) * track.seen.px_rad,
+      .how = read ? Naming::kRead : Naming::kPredicted,
+      .peak = track.seen.peak};
   bearings.push_back(bearing);
   if (!read) track.predicted.push_back(bearing);
 }
 
 void BlinkTracker::observe_absence(Track& track) const {
-  const auto uv = model_.project(T_C_B_.q * track.u_B);
+  const auto uv = model_.project(T_C_B_.q * track.light.u_B);
   if (uv && model_.contains(*uv)) decoder_.observe_dark(track.evidence, track.exposed);
 }
 
@@ -450,11 +414,8 @@ void BlinkTracker::begin(const Sighting& sighting, Timestamp stamp,
     track.evidence = std::move(retired_.back());
     retired_.pop_back();
   }
-  track.u_B = sighting.u_B;
+  track.light = LightDirection::at(sighting.u_B, sighting.px_rad, config_.bearing_sigma_px);
   track.seen_B = sighting.u_B;
-  track.jitter_px2 = square(config_.bearing_sigma_px);
-  track.variance = track.jitter_px2 * square(sighting.px_rad);
-  track.rate_variance = kRateSigma * kRateSigma;
   track.seen = sighting;
   track.last_seen = stamp;
   track.hits = 1;

@@ -19,6 +19,7 @@
 #include "estimator/vision/hidden_lights.hpp"
 #include "estimator/vision/id_decoder.hpp"
 #include "estimator/vision/id_library.hpp"
+#include "estimator/vision/light_direction.hpp"
 #include "estimator/vision/vision_config.hpp"
 
 namespace crepes {
@@ -70,16 +71,11 @@ class BlinkTracker {
     Timestamp exposed{};      ///< middle of its row's exposure, body time
   };
   struct Track {
-    Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
-    Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();    ///< du/dt that own rotation leaves [1/s]
+    LightDirection light;
     Eigen::Vector3d seen_B = Eigen::Vector3d::UnitX();   ///< where it was last, turned since
-    Eigen::Vector3d steady_B = Eigen::Vector3d::Zero();  ///< rate_B over some 50 ms, less noisy
-    double variance = 0.0;                               ///< of the direction, per axis [rad^2]
-    double covariance = 0.0;
-    double rate_variance = 0.0;
-    double jitter_px2 = 0.0;  ///< of its spots' centers, variance per axis
-    Timestamp exposed{};      ///< of its row in the frame at hand
-    Sighting seen;            ///< the latest
+    Eigen::Vector3d steady_B = Eigen::Vector3d::Zero();  ///< its rate over some 50 ms, less noisy
+    Timestamp exposed{};                                 ///< of its row in the frame at hand
+    Sighting seen;                                       ///< the latest
     Timestamp last_seen{};
     Duration unseen{};          ///< in frames since; those that were lost do not count
     bool is_ambiguous = false;  ///< since then it may have been in a spot with another
@@ -105,8 +101,6 @@ class BlinkTracker {
   [[nodiscard]] bool is_established(const Track& track) const;
   [[nodiscard]] bool hides_another(std::size_t track, const Pairing& sighting_of) const;
   [[nodiscard]] bool is_hidden(const Track& track) const;
-  [[nodiscard]] double sigma_px(const Track& track) const;
-  void learn_jitter(const Eigen::Vector3d& residual, double px_rad, Track& track) const;
   void observe(Track& track, const Sighting& sighting, Timestamp stamp);
   [[nodiscard]] bool is_another(const Track& track, const Sighting& sighting,
                                 Timestamp stamp) const;
