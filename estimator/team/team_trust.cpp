@@ -431,8 +431,22 @@ std::vector<TeamFault> TeamTrust::gyro_faults(Timestamp now) const {
   return faults;
 }
 
+/// The ranges of a robot and to it.
+Agreement ranges_of(const TeamBelief& belief, RobotId id) {
+  Agreement all;
+  for (const auto& [pair, range] : belief.ranges) {
+    if (pair.first != id && pair.second != id) continue;
+    for (const auto& [observer, agreement] : range.agreement) {
+      all.fused += agreement.fused;
+      all.gated += agreement.gated;
+    }
+  }
+  return all;
+}
+
 bool is_plausible(const TeamBelief& belief, RobotId id) {
-  if (belief.stamp <= belief.robots.at(id).since) return false;
+  if (belief.stamp <= belief.robots.at(id).since || ranges_of(belief, id).is_contradiction())
+    return false;
   const Witnesses all = bearings_of(belief.robots);
   const auto agreement = all.find(id);
   return agreement == all.end() || agreement->second.fused >= kAgreed * agreement->second.gated;

@@ -88,8 +88,8 @@ class TeamTrust {
   std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
 };
 
-/// Whether the bearings of a robot and to it agree with its place, four in five of them. False in
-/// the interval in which it started: they are yet to come.
+/// Whether the bearings of a robot and to it agree with its place, four in five of them, and its
+/// ranges do not contradict it. False in the interval in which it started: they are yet to come.
 [[nodiscard]] bool is_plausible(const TeamBelief& belief, RobotId id);
 
 }  // namespace crepes

@@ -91,6 +91,8 @@ void SimulatedSpots::add_mirror_images(const std::vector<RingRenderer::View>& vi
     const SeededNoise luck{kSpotKey, static_cast<std::uint64_t>(world_.seed()), self_.value,
                            view.robot.value};
     if (luck.uniform(spell) > kMirrorShare) continue;
+    // A pillar stands on the way by the floor, too.
+    if (disturbance_.hides_images && is_hidden(view.robot, t_s)) continue;
     const auto member = std::find_if(members_.begin(), members_.end(),
                                      [&](const MemberConfig& m) { return m.id == view.robot; });
     CREPES_EXPECT(member != members_.end(), "views are of members");

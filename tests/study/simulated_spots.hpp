@@ -15,6 +15,7 @@ namespace crepes::study {
 struct Disturbance {
   bool interference = false;  ///< glints, mains lamps, mirror images in the floor
   ObstacleField obstacles{Obstacles::kNone, 0};
+  bool hides_images = true;  ///< what hides a robot hides its image, too
   double dark_from_s = 0.0;  ///< no spot from here
   double dark_to_s = 0.0;    ///< to here
   double sight_m = 1e3;      ///< no spot of boards beyond

@@ -90,6 +90,7 @@ Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vecto
   const int seed = world.seed();
   const Disturbance disturbance{.interference = scenario.interference,
                                 .obstacles = ObstacleField(scenario.obstacles, seed),
+                                .hides_images = scenario.hides_images,
                                 .dark_from_s = scenario.dark_from_s,
                                 .dark_to_s = scenario.dark_to_s,
                                 .sight_m = scenario.sight_m};

@@ -23,6 +23,7 @@ struct Scenario {
   NetworkModel network{.latency_ms = 3.0, .jitter_ms = 3.0, .loss = 0.02, .seed = 0};
   bool interference = false;  ///< glints, mains lamps, mirror images in the floor
   Obstacles obstacles = Obstacles::kNone;
+  bool hides_images = true;  ///< what hides a robot hides its mirror image, too
   double dark_from_s = 0.0;  ///< no camera sees anything from here
   double dark_to_s = 0.0;    ///< to here
   RangeModel ranges = RangeModel::kSimulated;
@@ -45,7 +46,17 @@ inline constexpr std::array kScenarios{
     Scenario{.name = "fence", .world = SimScenario::kFour, .obstacles = Obstacles::kFence},
     Scenario{
         .name = "blackout", .world = SimScenario::kFour, .dark_from_s = 15.0, .dark_to_s = 30.0},
-    Scenario{.name = "thin-ranges", .world = SimScenario::kFour, .ranges = RangeModel::kLinkTrack}};
+    Scenario{.name = "thin-ranges", .world = SimScenario::kFour, .ranges = RangeModel::kLinkTrack},
+    Scenario{.name = "workshop",
+             .world = SimScenario::kFour,
+             .network = {.latency_ms = 5.0, .jitter_ms = 60.0, .loss = 0.33, .seed = 0},
+             .interference = true,
+             .obstacles = Obstacles::kThinPillars},
+    Scenario{.name = "glass",
+             .world = SimScenario::kFour,
+             .interference = true,
+             .obstacles = Obstacles::kThinPillars,
+             .hides_images = false}};
 
 /// What constants of the scenario's sensors are drawn from.
 [[nodiscard]] SensorPriors priors_of(const Scenario& scenario);

@@ -242,6 +242,21 @@ TEST_F(TrustOfFour, ProbationEndsWhenMostAgreeForASecond) {
   EXPECT_TRUE(robot.is_trusted);
 }
 
+TEST_F(TrustOfFour, ARobotWhoseRangesContradictItsPlaceIsNotPlausible) {
+  belief_.robots.at(kAccused).since = belief_.stamp;
+  wait(100ms);
+  ASSERT_TRUE(is_plausible(belief_, kAccused));
+
+  belief_.ranges[ordered(kSecond, kAccused)].agreement[kSecond] = kContradicts;
+  EXPECT_FALSE(is_plausible(belief_, kAccused));
+
+  // Those of one pair may go through an obstacle.
+  for (const auto& [id, robot] : belief_.robots)
+    if (id != kSecond && id != kAccused)
+      belief_.ranges[ordered(id, kAccused)].agreement[id] = kAgrees;
+  EXPECT_TRUE(is_plausible(belief_, kAccused));
+}
+
 TEST_F(TrustOfFour, ARobotIsPlausibleFromItsSecondIntervalOnWhileMostOfItsBearingsAgree) {
   TeamRobot& robot = belief_.robots.at(kAccused);
   robot.since = belief_.stamp;
