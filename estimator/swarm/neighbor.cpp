@@ -123,9 +123,10 @@ void Neighbor::fuse_released(Timestamp now, const RobotState& self) {
                                            : Association{.fusion{.verdict = Verdict::kNoState}};
     const bool is_compared = usable && !hypotheses_.empty();
     const Fusion other{.verdict = is_compared ? Verdict::kGated : Verdict::kNoState};
-    for (std::size_t i = 0; i < group.size(); ++i)
+    for (std::size_t i = 0; i < group.size(); ++i) {
       outcomes().add(first.stamp, first.kind, i == association.chosen ? association.fusion : other,
                      reading_of(group[i]));
+    }
   }
   hypotheses_.prune();
   // Without readings the filter advances too: IMU samples are kept for a limited time, and the cost

@@ -116,10 +116,11 @@ Eigen::Matrix3d rate_covariance(const TeamBelief& belief, const TeamRobot& robot
   constexpr std::array<int, 4> kParts{0, 6, 9, 12};  // the bias, and the scale's columns
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (std::size_t a = 0; a < kParts.size(); ++a) {
-    for (std::size_t b = 0; b < kParts.size(); ++b)
+    for (std::size_t b = 0; b < kParts.size(); ++b) {
       covariance +=
           by(Eigen::Index(a)) * by(Eigen::Index(b)) *
           belief.P.block<3, 3>(robot.bias_index + kParts[a], robot.bias_index + kParts[b]);
+    }
   }
   return covariance;
 }

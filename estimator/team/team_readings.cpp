@@ -203,9 +203,10 @@ struct Likeliest {
   bool is_clear = true;  ///< no other is nearly as likely
 
   void add(const Candidate& next) {
-    is_clear = !best.bearing || (is_clear && next.nis - best.nis > kClearly) ||
-               best.nis - next.nis > kClearly;
-    if (!best.bearing || next.nis < best.nis) best = next;
+    const bool is_first = best.bearing == nullptr;
+    is_clear =
+        is_first || (is_clear && next.nis - best.nis > kClearly) || best.nis - next.nis > kClearly;
+    if (is_first || next.nis < best.nis) best = next;
   }
 };
 
