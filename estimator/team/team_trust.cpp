@@ -107,6 +107,19 @@ Witnesses witnesses(const Robots& robots, const IsExcluded& is_excluded) {
   return witnesses;
 }
 
+/// The ranges of a robot and to it.
+Agreement ranges_of(const TeamBelief& belief, RobotId id) {
+  Agreement all;
+  for (const auto& [pair, range] : belief.ranges) {
+    if (pair.first != id && pair.second != id) continue;
+    for (const auto& [observer, agreement] : range.agreement) {
+      all.fused += agreement.fused;
+      all.gated += agreement.gated;
+    }
+  }
+  return all;
+}
+
 /// The bearings of each robot and to it.
 Witnesses bearings_of(const Robots& robots) {
   Witnesses all;
@@ -429,19 +442,6 @@ std::vector<TeamFault> TeamTrust::gyro_faults(Timestamp now) const {
       faults.push_back({id, TeamFault::Kind::kGyro, doubt.rate_radps});
   }
   return faults;
-}
-
-/// The ranges of a robot and to it.
-Agreement ranges_of(const TeamBelief& belief, RobotId id) {
-  Agreement all;
-  for (const auto& [pair, range] : belief.ranges) {
-    if (pair.first != id && pair.second != id) continue;
-    for (const auto& [observer, agreement] : range.agreement) {
-      all.fused += agreement.fused;
-      all.gated += agreement.gated;
-    }
-  }
-  return all;
 }
 
 bool is_plausible(const TeamBelief& belief, RobotId id) {
