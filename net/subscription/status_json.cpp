@@ -326,7 +326,7 @@ std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId 
   if (neighbor == neighbors.end()) return std::nullopt;
   Json json = head_json(status);
   put(json, "timestamp", to_seconds(status.stamp.time_since_epoch()), 13);
-  json["neighbors"] = {neighbor_json(*neighbor)};
+  json["neighbors"] = Json::array({neighbor_json(*neighbor)});
   json["neighbors"][0]["ages_s"] = ages_json(*neighbor, status.stamp);
   if (Json measured = measured_json(*neighbor); !measured.empty())
     json["neighbors"][0]["measured"] = std::move(measured);

@@ -124,9 +124,9 @@ TEST_F(Tools, CheckARobotFromSensorsToCalibration) {
   std::vector<std::string> sections;
   bool is_rate_named = false;
   for (const Json& finding : reported["findings"]) {
-    if (sections.empty() || sections.back() != finding["about"])
-      sections.push_back(finding["about"]);
-    is_rate_named |= finding["about"] == "rates" && finding["verdict"] == "doubt" &&
+    const auto about = finding["about"].get<std::string>();
+    if (sections.empty() || sections.back() != about) sections.push_back(about);
+    is_rate_named |= about == "rates" && finding["verdict"] == "doubt" &&
                      finding["text"].get<std::string>().find("of 400 Hz") != std::string::npos;
   }
   EXPECT_EQ(sections, (std::vector<std::string>{"sensors", "rates", "clocks", "exposure", "board",
