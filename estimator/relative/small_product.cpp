@@ -62,6 +62,7 @@ template <bool kAdd, Index kLanes, Index kVectors, Index kColumns>
 
 template <bool kAdd, Index kLanes, Index kVectors, Index kColumns>
 [[gnu::always_inline]] inline void do_product(Operands x) {
+  if (x.rows == 0 || x.inner == 0) return;  // an empty matrix has no address to count from
   constexpr Index kTall = kVectors * kLanes;
   const Index tall = x.rows / kTall * kTall;
   Index j = 0;

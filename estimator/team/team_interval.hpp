@@ -40,8 +40,6 @@ struct TeamSettings {
   double bearing_gate = 0.0;  ///< on the NIS
   double range_gate = 0.0;
   std::size_t max_robots = 12;
-
-  [[nodiscard]] bool operator==(const TeamSettings&) const = default;
 };
 
 /// Intervals follow each other without a gap. Every measurement is in one of them, once.
