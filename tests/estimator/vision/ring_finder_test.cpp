@@ -22,6 +22,13 @@ double between(std::mt19937& random, double least, double most) {
   return std::uniform_real_distribution<double>(least, most)(random);
 }
 
+/// A board at up to `farthest_m`, up to `most_aslant` [rad].
+Pose board_within(std::mt19937& random, double farthest_m, double most_aslant) {
+  const double aslant = between(random, 0.0, most_aslant);
+  const double range_m = between(random, 0.4, farthest_m);
+  return random_board(random, range_m, aslant);
+}
+
 /// Pictures of one board each, and those with exactly one spot, within a pixel of its center.
 struct Tally {
   int pictures = 0;
@@ -49,8 +56,7 @@ TEST(RingFinder, SeesOneSpotInTheCenterOfEveryRoundRing) {
     Tally of_number;
     for (unsigned i = 0; i < 60; ++i) {
       const RingBoard board{.leds = leds, .radius_m = between(random, 0.01, 0.06)};
-      const Pose T_C_M =
-          random_board(random, between(random, 0.4, 1.6), between(random, 0.0, kSeventyDegrees));
+      const Pose T_C_M = board_within(random, 1.6, kSeventyDegrees);
       look(detector, board, T_C_M, i, of_number);
     }
     EXPECT_GE(of_number.share(), 0.93) << leds << " LEDs";
@@ -69,9 +75,7 @@ TEST(RingFinder, SeesOneSpotInTheCenterOfSquares) {
     for (unsigned i = 0; i < 60; ++i) {
       const RingBoard board{
           .leds = leds, .is_square = true, .radius_m = between(random, 0.01, 0.06)};
-      look(detector, board,
-           random_board(random, between(random, 0.4, 1.6), between(random, 0.0, kSeventyDegrees)),
-           i, tally);
+      look(detector, board, board_within(random, 1.6, kSeventyDegrees), i, tally);
     }
     EXPECT_GE(tally.share(), 0.95) << leds << " LEDs";
   }
@@ -84,8 +88,7 @@ TEST(RingFinder, IsNotMisledByALensInTheMiddle) {
     Tally tally;
     for (unsigned i = 0; i < 60; ++i) {
       const RingBoard board{.leds = leds, .lens = between(random, 0.01, 0.3)};
-      look(detector, board,
-           random_board(random, between(random, 0.4, 2.0), between(random, 0.0, 0.785)), i, tally);
+      look(detector, board, board_within(random, 2.0, 0.785), i, tally);
     }
     EXPECT_GE(tally.share(), 0.98) << leds << " LEDs";
   }
@@ -99,8 +102,7 @@ TEST(RingFinder, CentersRingsOfWhichAThirdIsHidden) {
     for (unsigned i = 0; i < 60; ++i) {
       const int hidden = 1 + static_cast<int>(random() % static_cast<unsigned>(leds / 3));
       const RingBoard board{.leds = leds, .radius_m = 0.05, .hidden = (1U << hidden) - 1U};
-      look(detector, board,
-           random_board(random, between(random, 0.4, 0.8), between(random, 0.0, 0.6)), i, tally);
+      look(detector, board, board_within(random, 0.8, 0.6), i, tally);
     }
     EXPECT_GE(tally.share(), 0.95) << leds << " LEDs";
   }
@@ -146,7 +148,9 @@ TEST(RingFinder, TakesRobotsFarAwayForNoRing) {
     RingScene scene(small_fisheye(), {}, i);
     std::vector<Eigen::Vector2d> centers;
     while (centers.size() < 3 + i % 5) {
-      const Eigen::Vector2d uv(between(random, 120.0, 200.0), between(random, 90.0, 170.0));
+      const double v = between(random, 90.0, 170.0);
+      const double u = between(random, 120.0, 200.0);
+      const Eigen::Vector2d uv(u, v);
       const bool is_apart = std::all_of(centers.begin(), centers.end(),
                                         [&](const auto& c) { return (c - uv).norm() > 12.0; });
       if (!is_apart) continue;
