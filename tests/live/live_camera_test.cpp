@@ -20,7 +20,7 @@ using namespace nlohmann::literals;
 
 using std::chrono::seconds;
 
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(CREPES_ASAN)
 constexpr bool kIsSlow = true;  // a tenth of the pace: a picture of a quarter of the pixels then
 #else
 constexpr bool kIsSlow = false;
@@ -29,7 +29,7 @@ constexpr bool kIsSlow = false;
 class LiveCamera : public LiveDaemon {
  protected:
   void SetUp() override {
-#if defined(__SANITIZE_THREAD__)
+#if defined(CREPES_TSAN)
     GTEST_SKIP() << "Aravis is not instrumented: how it hands buffers over looks like a race";
 #endif
     if (!enter_own_network()) GTEST_SKIP() << "no right to a network of our own";

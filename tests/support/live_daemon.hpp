@@ -25,7 +25,7 @@ using Json = nlohmann::json;
 // What is awaited comes within a few seconds; this is for machines that do much else, sanitized.
 inline constexpr Duration kPatience = std::chrono::seconds{60};
 
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#if defined(CREPES_TSAN) || defined(CREPES_ASAN)
 inline constexpr bool kIsSanitized = true;
 #else
 inline constexpr bool kIsSanitized = false;

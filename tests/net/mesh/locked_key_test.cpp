@@ -20,7 +20,7 @@
 namespace crepes::locked_key_test {
 namespace {
 
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#if defined(CREPES_TSAN) || defined(CREPES_ASAN)
 constexpr bool kLocksMemory = false;  // sanitizers turn mlock into nothing
 #else
 constexpr bool kLocksMemory = true;
