@@ -24,9 +24,10 @@ SeededNoise noise_of(std::uint64_t sensor, const SimWorld& world, RobotId robot)
 SimTriad::SimTriad(SeededNoise source, const Sigmas& sigmas)
     : source_(source), sigmas_(sigmas), bias_(sigmas.bias * source_.gaussian3(1)), drawn_(4) {
   constexpr std::array<std::uint64_t, 3> kColumns{0, 2, 3};
-  for (std::size_t axis = 0; axis < kColumns.size(); ++axis)
+  for (std::size_t axis = 0; axis < kColumns.size(); ++axis) {
     scale_.col(static_cast<Eigen::Index>(axis)) =
         sigmas.scale * source_.gaussian3(kColumns.at(axis));
+  }
 }
 
 Eigen::Vector3d SimTriad::measure(const Eigen::Vector3d& truth, double dt_s) {

@@ -293,9 +293,9 @@ Json team_part_json(const SystemStatus& status, TeamDetail detail, const Wanted&
   team["robots"] = Json::array();
   for (const TeamRobotStatus& robot : status.estimator.team->robots) {
     const RobotId id = robot.calibration.robot;
-    if (wanted(id))
-      team["robots"].push_back(team_robot_json(
-          robot, member_name(status, id).value_or(std::string()), status.self, detail));
+    if (!wanted(id)) continue;
+    const std::string name = member_name(status, id).value_or(std::string());
+    team["robots"].push_back(team_robot_json(robot, name, status.self, detail));
   }
   return json;
 }
