@@ -178,6 +178,7 @@ struct HandHeld {
   double moved_m = 0.0;                     ///< how far the first board is moved at half time
   bool hides_quarter = false;               ///< nothing falls on the lower left quarter
   std::optional<CameraConstants> camera{};  ///< without boards; empty: drawn
+  std::vector<Eigen::Vector3d> places{};    ///< of boards in the world; empty: drawn
 };
 
 /// A robot before boards: what a calibration is given, and the truth.
@@ -251,7 +252,8 @@ inline CameraRecording hand_held(std::uint64_t seed, const HandHeld& hand, const
   if (hand.camera) truth = *hand.camera;
   recording.errors = draw_errors(dice, 0.002, 0.01, 0.05);
   const Path path = hand_path(dice, hand);
-  for (int b = 0; b < hand.boards; ++b) {
+  truth.p_W = hand.places;
+  for (int b = 0; hand.places.empty() && b < hand.boards; ++b) {
     const double azimuth = (b - 0.5 * (hand.boards - 1)) * 1.2 + dice.uniform(-0.2, 0.2);
     const double distance = dice.uniform(2.5, 5.0);
     truth.p_W.emplace_back(distance * std::cos(azimuth), distance * std::sin(azimuth),

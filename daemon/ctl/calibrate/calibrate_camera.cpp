@@ -7,9 +7,7 @@
 #include <vector>
 
 #include "daemon/ctl/calibrate/board_sightings.hpp"
-#include "daemon/ctl/calibrate/camchain.hpp"
 #include "daemon/ctl/calibrate/camera_report.hpp"
-#include "drivers/dataset/robot_folder.hpp"
 #include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/core/constants.hpp"
 
@@ -54,7 +52,8 @@ std::vector<std::string> names_of(const BoardSightings& found, const SwarmConfig
   std::vector<std::string> names;
   for (const RobotId id : found.boards) {
     const auto member = std::ranges::find(swarm.members, id, &MemberConfig::id);
-    names.push_back(member == swarm.members.end() ? std::to_string(id.value) : member->name);
+    names.push_back("board " +
+                    (member == swarm.members.end() ? std::to_string(id.value) : member->name));
   }
   return names;
 }
@@ -84,21 +83,14 @@ Result<CalibrationReport> calibrate_camera(const CalibrateCameraOptions& options
                         .p_B_C = camera.T_cam_imu.inverse().p,
                         .noise = recording->config.imu.noise,
                         .on_progress = progress});
-  report.reasons = result.refusals;
-  std::optional<KannalaBrandtFit> kb;
-  if (options.kannala_brandt && result.covariance.size() > 0)
-    kb = to_kannala_brandt(result.constants.lens, camera.resolution[0], camera.resolution[1]);
-  if (result.refusals.empty()) {
-    const auto written = write_text_file(
-        options.out, camchain_text(calibration_of(result.constants, camera.resolution, kb),
-                                   Mounting::kKnown, "camera"));
-    if (!written) return tl::unexpected(written.error());
-  }
-  if (options.json) {
-    report.text = camera_json(result, found->boards.size(), kb);
-  } else if (result.refusals.empty()) {
-    report.text = camera_text(result, found->boards.size(), kb, options.out);
-  }
+  const auto reported =
+      report_camera(result, {.words = "boards", .key = "boards", .count = found->boards.size()},
+                    {.out = options.out,
+                     .resolution = camera.resolution,
+                     .kannala_brandt = options.kannala_brandt,
+                     .json = options.json},
+                    report);
+  if (!reported) return tl::unexpected(reported.error());
   return report;
 }
 

@@ -1,4 +1,5 @@
-/// crepesctl calibrate camera --grid: a lens from pictures of a flat grid of LEDs.
+/// crepesctl calibrate camera --grid: a lens from pictures of a flat grid of LEDs, and with an IMU
+/// the mounting and the time shift, too.
 #pragma once
 
 #include <filesystem>
@@ -26,8 +27,9 @@ struct CalibrateGridOptions {
 /// "5x7".
 [[nodiscard]] Result<GridShape> parse_grid(const std::string& text, double pitch_m);
 
-/// Writes FILE, a camchain.yaml of Kalibr without T_cam_imu: pictures of a grid say nothing of
-/// where the camera is mounted.
+/// Writes a camchain.yaml of Kalibr. If `pictures` is a robot's folder with inertial samples, its
+/// film also says how the camera is mounted, and its time shift; pictures alone do not, and
+/// T_cam_imu is left out.
 [[nodiscard]] Result<CalibrationReport> calibrate_grid(const CalibrateGridOptions& options);
 
 }  // namespace crepes

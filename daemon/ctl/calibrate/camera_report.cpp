@@ -5,11 +5,14 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <vector>
 
-#include "daemon/ctl/calibrate/calibration_report.hpp"
+#include "daemon/ctl/calibrate/camchain.hpp"
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
+#include "drivers/dataset/robot_folder.hpp"
+#include "estimator/calibration/camera/lens_conversion.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {
@@ -50,39 +53,25 @@ std::string conversion_line(const std::optional<KannalaBrandtFit>& kb) {
       fixed(kb->rms_px, 3), fixed(kb->max_px, 3));
 }
 
-}  // namespace
-
-std::string map_text(const ResidualMap& map) {
-  std::string text = "residuals over the picture [px/100 RMS]; . was never seen\n";
-  for (int row = 0; row < ResidualMap::kRows; ++row) {
-    for (int column = 0; column < ResidualMap::kColumns; ++column) {
-      const ResidualMap::Cell& cell = map.at(row, column);
-      text += cell.count == 0 ? "    ." : fmt::format("{:5.0f}", kHundredths * cell.rms_px());
-    }
-    text += "\n";
-  }
-  return text;
-}
-
-std::string camera_text(const CameraBatchResult& found, std::size_t boards,
+std::string camera_text(const CameraBatchResult& found, const SeenTarget& target,
                         const std::optional<KannalaBrandtFit>& kb,
                         const std::filesystem::path& out) {
   const Eigen::Vector3d turn = found.rotation_sigma_rad * kDegPerRad;
   return text_table(lens_rows(found)) +
          fmt::format(
              "rotation to {} deg; lens and rotation to {} px over the picture (one sigma)\n"
-             "{} boards; residuals {} px, in held-out seconds {} px; outliers {} %\n",
-             fixed(turn.norm(), 4), fixed(found.lens_sigma_px, 3), boards,
+             "{} {}; residuals {} px, in held-out seconds {} px; outliers {} %\n",
+             fixed(turn.norm(), 4), fixed(found.lens_sigma_px, 3), target.count, target.words,
              fixed(found.spot_sigma_px, 3), fixed(found.held_out_px, 3),
              fixed(100.0 * found.outliers, 1)) +
          conversion_line(kb) + map_text(found.map) + warning_lines(found.warnings) +
          fmt::format("written: {}\n", out.string());
 }
 
-std::string camera_json(const CameraBatchResult& found, std::size_t boards,
+std::string camera_json(const CameraBatchResult& found, const SeenTarget& target,
                         const std::optional<KannalaBrandtFit>& kb) {
   Json json = report_head(found.refusals, found.warnings);
-  json["boards"] = boards;
+  json[target.key] = target.count;
   json["rate_rms_radps"] = numbers_of(found.rate_rms_radps);
   if (found.covariance.size() > 0) {
     const CameraConstants& c = found.constants;
@@ -119,6 +108,40 @@ std::string camera_json(const CameraBatchResult& found, std::size_t boards,
     }
   }
   return json_line(json);
+}
+
+}  // namespace
+
+std::string map_text(const ResidualMap& map) {
+  std::string text = "residuals over the picture [px/100 RMS]; . was never seen\n";
+  for (int row = 0; row < ResidualMap::kRows; ++row) {
+    for (int column = 0; column < ResidualMap::kColumns; ++column) {
+      const ResidualMap::Cell& cell = map.at(row, column);
+      text += cell.count == 0 ? "    ." : fmt::format("{:5.0f}", kHundredths * cell.rms_px());
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+Result<void> report_camera(const CameraBatchResult& found, const SeenTarget& target,
+                           const CameraOutput& output, CalibrationReport& report) {
+  report.reasons = found.refusals;
+  std::optional<KannalaBrandtFit> kb;
+  if (output.kannala_brandt && found.covariance.size() > 0)
+    kb = to_kannala_brandt(found.constants.lens, output.resolution[0], output.resolution[1]);
+  if (found.refusals.empty()) {
+    const auto written = write_text_file(
+        output.out, camchain_text(calibration_of(found.constants, output.resolution, kb),
+                                  Mounting::kKnown, "camera"));
+    if (!written) return tl::unexpected(written.error());
+  }
+  if (output.json) {
+    report.text = camera_json(found, target, kb);
+  } else if (found.refusals.empty()) {
+    report.text = camera_text(found, target, kb, output.out);
+  }
+  return {};
 }
 
 }  // namespace crepes

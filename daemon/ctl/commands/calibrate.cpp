@@ -158,7 +158,8 @@ void add_camera(CommandLine& line, CLI::App* calibrate) {
   CLI::Option* grid = sub->add_option(
       "--grid", command.grid,
       "the target is a flat grid of LEDs, rows x columns as in 5x7; ROBOT_DIR may be any folder of "
-      "pictures, and no IMU is needed");
+      "pictures, whose lens is calibrated; a robot's folder with a film and imu0 also gives the "
+      "mounting and the time shift");
   CLI::Option* pitch =
       sub->add_option("--pitch", command.pitch_m, "with --grid: from LED to LED [m]")
           ->check(CLI::Range(0.001, 10.0));

@@ -128,11 +128,20 @@ CameraBatchResult calibrate_camera(std::span<const ImuSample> imu,
   guess.p_B_C = settings.p_B_C;
   CameraProblem problem(imu, sightings, settings.noise, {});
   const CameraState start = first_state(problem, imu, names.size(), guess, aligned->gyro_bias);
+  return calibrate_camera_from(start, problem, imu, names, settings);
+}
+
+CameraBatchResult calibrate_camera_from(const CameraState& start, CameraProblem& problem,
+                                        std::span<const ImuSample> imu,
+                                        const std::vector<std::string>& names,
+                                        const CameraBatchSettings& settings) {
+  CameraBatchResult result;
+  const std::span<const BoardSighting> sightings = problem.sightings();
   const auto report = [&](double done) {
     if (settings.on_progress) settings.on_progress(kShareOfFit * done);
   };
   const CameraSolution solution = solve_camera(problem, start, report);
-  result.rate_rms_radps = rate_rms(imu, aligned->gyro_bias);
+  result.rate_rms_radps = rate_rms(imu, start.knots.front().gyro_bias);
   if (solution.covariance.size() == 0) {
     result.refusals = motion_refusals(result.rate_rms_radps);
     result.refusals.emplace_back("the recording does not determine the camera");

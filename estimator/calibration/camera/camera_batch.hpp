@@ -45,12 +45,20 @@ struct CameraBatchResult {
   std::vector<std::string> warnings;
 };
 
-/// `names`: the boards, for messages. `sightings` are ordered by stamp. Unknown are the lens, the
-/// camera's pose in the body, the time shift, the IMU's biases and matrices, the body's path and
-/// the boards' places; see `CameraProblem`.
+/// `names`: the boards, for messages ("board r2"). `sightings` are ordered by stamp. Unknown are
+/// the lens, the camera's pose in the body, the time shift, the IMU's biases and matrices, the
+/// body's path and the boards' places; see `CameraProblem`.
 [[nodiscard]] CameraBatchResult calibrate_camera(std::span<const ImuSample> imu,
                                                  const std::vector<BoardSighting>& sightings,
                                                  const std::vector<std::string>& names,
                                                  const CameraBatchSettings& settings);
+
+/// The same from a first state of one's own, for targets whose places are known better than
+/// boards'.
+[[nodiscard]] CameraBatchResult calibrate_camera_from(const CameraState& start,
+                                                      CameraProblem& problem,
+                                                      std::span<const ImuSample> imu,
+                                                      const std::vector<std::string>& names,
+                                                      const CameraBatchSettings& settings);
 
 }  // namespace crepes

@@ -26,8 +26,7 @@ constexpr double kMostLens = 0.95;
 
 constexpr int kState = ArrowSystem::kState;
 constexpr int kLocal = kState + at::kBoards;  // a knot and the constants without boards
-constexpr int kAll = kLocal + 3;              // and one board
-using Jet = ceres::Jet<double, kAll>;
+using Jet = ceres::Jet<double, kLocal>;
 
 /// A knot and the constants, each number a parameter.
 template <class T>
@@ -70,15 +69,79 @@ Eigen::Matrix<T, kState, 1> knot_residual(const Local<T>& end, const CameraKnot&
   return r;
 }
 
-/// Where a board is seen after `tau` of a step.
+/// From the world to the camera at an instant:  p_C = R_C_W p_W + t_C .
 template <class T>
-std::optional<Eigen::Matrix<T, 2, 1>> seen_at(const Local<T>& local, const InertialStep<T>& step,
-                                              const Vector3<T>& a_W, const T& tau,
-                                              const Vector3<T>& board_W) {
+struct CameraAt {
+  Matrix3<T> R_C_W;
+  Vector3<T> t_C;
+};
+
+/// After `tau` of a step.
+template <class T>
+CameraAt<T> camera_at(const Local<T>& local, const InertialStep<T>& step, const Vector3<T>& a_W,
+                      const T& tau) {
   const Vector3<T> p_W = local.motion.p_W + local.motion.v_W * tau + a_W * (0.5 * tau * tau);
-  const Vector3<T> before = local.motion.R_W_B.transpose() * (board_W - p_W);
-  const Vector3<T> board_B = rotated<T>(-step.angle(tau), before);
-  return project_double_sphere<T>(local.lens, local.R_C_B * (board_B - local.p_B_C));
+  const Vector3<T> phi = step.angle(tau);
+  Matrix3<T> R_B_W;
+  for (int i = 0; i < 3; ++i) {
+    const Vector3<T> axis = local.motion.R_W_B.row(i).transpose();
+    R_B_W.col(i) = rotated<T>(-phi, axis);
+  }
+  CameraAt<T> camera{local.R_C_B * R_B_W, {}};
+  camera.t_C = -(camera.R_C_W * p_W) - local.R_C_B * local.p_B_C;
+  return camera;
+}
+
+/// A spot's residual [sigmas] and its derivatives. Many boards are seen by a camera at one instant,
+/// so its derivatives are those of `CameraAt`, and the board's and the lens's come on top.
+struct SpotRow {
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, kLocal> J;
+  Eigen::Matrix<double, 2, 3> J_board;
+};
+
+std::optional<SpotRow> residual_of(const Local<Jet>& local, const CameraAt<Jet>& camera,
+                                   const Eigen::Vector3d& board_W, const Eigen::Vector2d& seen,
+                                   double sigma_px) {
+  constexpr int kLens = 6;
+  using SpotJet = ceres::Jet<double, kLens + 3>;
+  Eigen::Matrix<double, 3, kLocal> J_point;
+  Eigen::Matrix3d R_C_W;
+  Vector3<SpotJet> p_C;
+  for (int i = 0; i < 3; ++i) {
+    double value = camera.t_C[i].a;
+    Eigen::Matrix<double, kLocal, 1> v = camera.t_C[i].v;
+    for (int j = 0; j < 3; ++j) {
+      R_C_W(i, j) = camera.R_C_W(i, j).a;
+      value += R_C_W(i, j) * board_W[j];
+      v += camera.R_C_W(i, j).v * board_W[j];
+    }
+    J_point.row(i) = v.transpose();
+    p_C[i] = SpotJet(value, kLens + i);
+  }
+  Eigen::Matrix<SpotJet, kLens, 1> lens;
+  for (int i = 0; i < kLens; ++i) lens[i] = SpotJet(local.lens[i].a, i);
+  const auto uv = project_double_sphere<SpotJet>(lens, p_C);
+  if (!uv) return std::nullopt;
+  SpotRow row;
+  for (int i = 0; i < 2; ++i) {
+    const SpotJet& x = (*uv)[i];
+    const Eigen::RowVector3d by_point = x.v.tail<3>().transpose() / sigma_px;
+    row.r[i] = (x.a - seen[i]) / sigma_px;
+    row.J.row(i) = by_point * J_point;
+    row.J.row(i).segment<kLens>(kState + at::kLens) += x.v.head<kLens>().transpose() / sigma_px;
+    row.J_board.row(i) = by_point * R_C_W;
+  }
+  return row;
+}
+
+std::optional<Eigen::Vector2d> residual_of(const Local<double>& local,
+                                           const CameraAt<double>& camera,
+                                           const Eigen::Vector3d& board_W,
+                                           const Eigen::Vector2d& seen, double sigma_px) {
+  const auto uv = project_double_sphere<double>(local.lens, camera.R_C_W * board_W + camera.t_C);
+  if (!uv) return std::nullopt;
+  return Eigen::Vector2d((*uv - seen) / sigma_px);
 }
 
 /// Sums half the squares.
@@ -102,10 +165,27 @@ class CostVisitor {
   double sum_ = 0.0;
 };
 
+/// The unknowns that move a board, and the derivative of its place by them.
+struct BoardColumns {
+  Eigen::Index begin = 0;
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> J;
+};
+
+BoardColumns columns_of(const CameraConstants& constants, std::size_t board) {
+  if (constants.layout == BoardLayout::kFree)
+    return {at::kBoards + 3 * static_cast<Eigen::Index>(board), Eigen::Matrix3d::Identity()};
+  BoardColumns columns{at::kBoards, Eigen::Matrix<double, 3, 6>::Zero()};
+  columns.J << -hat(constants.p_W[board] - constants.p_W.front()), Eigen::Matrix3d::Identity();
+  return columns;
+}
+
 /// Builds the normal equations  J^T J x = -J^T r .
 class NormalVisitor {
  public:
-  explicit NormalVisitor(ArrowSystem& system) : system_(system) {}
+  NormalVisitor(const CameraConstants& constants, ArrowSystem& system) : system_(system) {
+    for (std::size_t b = 0; b < constants.p_W.size(); ++b)
+      boards_.push_back(columns_of(constants, b));
+  }
 
   void imu(std::size_t knot, const Eigen::Matrix<Jet, kState, 1>& r,
            const Eigen::Matrix<double, kState, kState>& J_next) {
@@ -113,7 +193,7 @@ class NormalVisitor {
     Eigen::Matrix<double, kState, 1> e;
     for (int i = 0; i < kState; ++i) {
       e(i) = r(i).a;
-      J.row(i) = r(i).v.template head<kLocal>().transpose();
+      J.row(i) = r(i).v.transpose();
     }
     add_local(knot, J.transpose() * J, J.transpose() * e);
     const auto J_knot = J.template leftCols<kState>();
@@ -124,22 +204,21 @@ class NormalVisitor {
     system_.to_constants(knot + 1).leftCols<at::kBoards>() += J_next.transpose() * J_constants;
   }
 
-  void sighting(std::size_t knot, std::size_t /*index*/, std::size_t board,
-                const Eigen::Matrix<Jet, 2, 1>& r, double weight) {
-    Eigen::Matrix<double, 2, kAll> J;
-    J << r(0).v.transpose(), r(1).v.transpose();
-    const Eigen::Vector2d e(r(0).a, r(1).a);
-    const Eigen::Matrix<double, kAll, kAll> H = weight * J.transpose() * J;
-    const Eigen::Matrix<double, kAll, 1> b = weight * J.transpose() * e;
-    add_local(knot, H.topLeftCorner<kLocal, kLocal>(), b.head<kLocal>());
-    const auto column = at::kBoards + 3 * static_cast<Eigen::Index>(board);
-    system_.to_constants(knot).middleCols<3>(column) += H.topRightCorner<kState, 3>();
+  void sighting(std::size_t knot, std::size_t /*index*/, std::size_t board, const SpotRow& row,
+                double weight) {
+    const Eigen::Matrix<double, kLocal, 2> weighted = weight * row.J.transpose();
+    add_local(knot, weighted * row.J, weighted * row.r);
+    const BoardColumns& columns = boards_[board];
+    const Eigen::Index count = columns.J.cols();
+    const Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 6> J_board = row.J_board * columns.J;
+    const Eigen::Matrix<double, kLocal, Eigen::Dynamic, 0, kLocal, 6> cross = weighted * J_board;
+    system_.to_constants(knot).middleCols(columns.begin, count) += cross.topRows<kState>();
     Eigen::MatrixXd& C = system_.constants();
-    const Eigen::Matrix<double, at::kBoards, 3> cross = H.block<at::kBoards, 3>(kState, kLocal);
-    C.block<at::kBoards, 3>(0, column) += cross;
-    C.block<3, at::kBoards>(column, 0) += cross.transpose();
-    C.block<3, 3>(column, column) += H.bottomRightCorner<3, 3>();
-    system_.constants_gradient().segment<3>(column) -= b.tail<3>();
+    C.block(0, columns.begin, at::kBoards, count) += cross.bottomRows<at::kBoards>();
+    C.block(columns.begin, 0, count, at::kBoards) += cross.bottomRows<at::kBoards>().transpose();
+    C.block(columns.begin, columns.begin, count, count) += weight * J_board.transpose() * J_board;
+    system_.constants_gradient().segment(columns.begin, count) -=
+        weight * J_board.transpose() * row.r;
   }
 
   void invalid(double /*cost*/) {}
@@ -168,6 +247,7 @@ class NormalVisitor {
   }
 
   ArrowSystem& system_;
+  std::vector<BoardColumns> boards_;
 };
 
 /// Collects the residuals in pixels.
@@ -186,6 +266,18 @@ class ResidualVisitor {
   std::vector<SightingResidual>& residuals_;
   double sigma_px_;
 };
+
+void move_boards(const Eigen::Ref<const Eigen::VectorXd>& d, CameraConstants& constants) {
+  if (constants.layout == BoardLayout::kRigid) {
+    const Eigen::Vector3d center = constants.p_W.front();
+    const Eigen::Quaterniond turn = so3_exp(d.head<3>());
+    for (Eigen::Vector3d& p_W : constants.p_W)
+      p_W = center + turn * (p_W - center) + d.segment<3>(3);
+    return;
+  }
+  for (std::size_t b = 0; b < constants.p_W.size(); ++b)
+    constants.p_W[b] += d.segment<3>(3 * static_cast<Eigen::Index>(b));
+}
 
 }  // namespace
 
@@ -226,16 +318,17 @@ void CameraProblem::walk(const CameraState& state, std::size_t knot, Visitor& vi
                          .accel = local.M_accel * (imu_[i].accel_mps2.cast<T>() - local.accel_bias),
                          .dt = end - begin};
     const Vector3<T> a_W = step.world_acceleration(local.motion.R_W_B, kNominalGravityMps2);
+    std::optional<CameraAt<T>> camera;
     for (; next != sightings_.end() && seconds(next->stamp) + shift <= end; ++next) {
       const auto index = static_cast<std::size_t>(next - sightings_.begin());
       const BoardSighting& seen = *next;
       const double weight = weights_[index];
-      const T tau = local.shift + T(seconds(seen.stamp) - begin);
-      const auto uv =
-          seen_at<T>(local, step, a_W, tau, seeded<T>(state.constants.p_W[seen.board], kLocal));
-      if (uv) {
-        visitor.sighting(knot, index, seen.board,
-                         ((*uv - seen.uv.cast<T>()) * T(1.0 / sigma_px_)).eval(), weight);
+      if (!camera || seen.stamp != (next - 1)->stamp)
+        camera = camera_at<T>(local, step, a_W, local.shift + T(seconds(seen.stamp) - begin));
+      const auto r =
+          residual_of(local, *camera, state.constants.p_W[seen.board], seen.uv, sigma_px_);
+      if (r) {
+        visitor.sighting(knot, index, seen.board, *r, weight);
       } else {
         visitor.invalid(0.5 * weight * std::pow(kInvalidPx / sigma_px_, 2));
       }
@@ -290,8 +383,11 @@ void CameraProblem::visit_priors(const CameraState& state, const CameraState& pr
     for (int j = 0; j < 3; ++j) add(index++, x.M_gyro(i, j) - m.M_gyro(i, j), priors_.imu_matrix);
   for (int i = 0; i < 3; ++i)
     for (int j = i; j < 3; ++j) add(index++, x.M_accel(i, j) - m.M_accel(i, j), priors_.imu_matrix);
-  for (std::size_t b = 0; b < x.p_W.size(); ++b)
-    add3(at::kBoards + 3 * static_cast<int>(b), x.p_W[b] - m.p_W[b], priors_.board_m);
+  if (x.layout == BoardLayout::kRigid)
+    add3(at::kBoards + 3, x.p_W.front() - m.p_W.front(), priors_.board_m);
+  else
+    for (std::size_t b = 0; b < x.p_W.size(); ++b)
+      add3(at::kBoards + 3 * static_cast<int>(b), x.p_W[b] - m.p_W[b], priors_.board_m);
 
   const CameraKnot& first = state.knots.front();
   const CameraKnot& held = prior.knots.front();
@@ -320,8 +416,8 @@ double CameraProblem::cost(const CameraState& state, const CameraState& prior) c
 }
 
 ArrowSystem CameraProblem::linearize(const CameraState& state, const CameraState& prior) const {
-  ArrowSystem system(knots(), at::kBoards + 3 * static_cast<int>(state.constants.p_W.size()));
-  NormalVisitor visitor(system);
+  ArrowSystem system(knots(), at::kBoards + board_unknowns(state.constants));
+  NormalVisitor visitor(state.constants, system);
   for (std::size_t k = 0; k + 1 < knots(); ++k) walk<Jet>(state, k, visitor);
   visit_priors(state, prior, visitor);
   return system;
@@ -349,8 +445,7 @@ CameraState moved(const CameraState& state, const ArrowSystem::Step& step) {
     for (int j = 0; j < 3; ++j) c.M_gyro(i, j) += d(index++);
   for (int i = 0; i < 3; ++i)
     for (int j = i; j < 3; ++j) c.M_accel(i, j) += d(index++);
-  for (std::size_t b = 0; b < c.p_W.size(); ++b)
-    c.p_W[b] += d.segment<3>(at::kBoards + 3 * static_cast<Eigen::Index>(b));
+  move_boards(d.tail(d.size() - at::kBoards), c);
   for (std::size_t k = 0; k < next.knots.size(); ++k) {
     CameraKnot& knot = next.knots[k];
     const ArrowSystem::StateVector& s = step.states[k];

@@ -41,7 +41,7 @@ void check_boards(const CameraSolution& solution, std::span<const BoardSighting>
   for (std::size_t b = 0; b < names.size(); ++b)
     if (all[b] > 0.0 && bad[b] > kMovedOutliers * all[b])
       result.refusals.push_back(
-          fmt::format("board {} moved, or is seen in a mirror: {} % of its sightings contradict "
+          fmt::format("{} moved, or is seen in a mirror: {} % of its sightings contradict "
                       "the others",
                       names[b], number_text(100.0 * bad[b] / all[b], 0)));
 }
@@ -107,7 +107,7 @@ std::vector<std::string> refusals_before_fit(std::span<const ImuSample> imu,
   const double seen_s = to_seconds(sightings.back().stamp - sightings.front().stamp);
   if (seen_s < kLeastRecording_s)
     reasons.push_back(
-        fmt::format("boards are seen for {} s; record a minute", number_text(seen_s, 0)));
+        fmt::format("the target is seen for {} s only; record a minute", number_text(seen_s, 0)));
   double gap_s = 0.0;
   for (std::size_t i = 1; i < imu.size(); ++i)
     gap_s = std::max(gap_s, to_seconds(imu[i].stamp - imu[i - 1].stamp));

@@ -79,14 +79,17 @@ std::optional<HandEye> align_camera(std::span<const ImuSample> imu,
   if (count < kLeastSteps) return std::nullopt;
   H.diagonal().array() += 1e-6 * H.trace();
   const Vector12 x = H.ldlt().solve(g);
-  const Eigen::Matrix3d A = Eigen::Map<const Eigen::Matrix3d>(x.data());
+  return hand_eye_of(Eigen::Map<const Eigen::Matrix3d>(x.data()), x.tail<3>());
+}
+
+HandEye hand_eye_of(const Eigen::Matrix3d& A, const Eigen::Vector3d& c) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(A, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d D = Eigen::Matrix3d::Identity();
   D(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
   const Eigen::Matrix3d R = svd.matrixU() * D * svd.matrixV().transpose();
-  return HandEye{.q_C_B = Eigen::Quaterniond(R),
-                 .gyro_bias = R.transpose() * x.tail<3>(),
-                 .singular_ratio = svd.singularValues()(2) / svd.singularValues()(0)};
+  return {.q_C_B = Eigen::Quaterniond(R),
+          .gyro_bias = R.transpose() * c,
+          .singular_ratio = svd.singularValues()(2) / svd.singularValues()(0)};
 }
 
 CameraState first_state(const CameraProblem& problem, std::span<const ImuSample> imu,

@@ -27,6 +27,9 @@ struct HandEye {
   double singular_ratio = 0.0;  ///< of the map from rates to rates: 1 is a rotation, 0 hopeless
 };
 
+/// The rotation nearest to A of  w_C = A w_B - c , and the bias that c means.
+[[nodiscard]] HandEye hand_eye_of(const Eigen::Matrix3d& A, const Eigen::Vector3d& c);
+
 /// From  du/dt = u x (A w - c)  of boards that are far away, A = R_C_B, c = R_C_B bias: linear
 /// least squares, then the nearest rotation. Empty with too few sightings.
 [[nodiscard]] std::optional<HandEye> align_camera(std::span<const ImuSample> imu,

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <vector>
 
 #include "estimator/core/pose.hpp"
@@ -11,7 +12,7 @@ namespace crepes {
 
 /// The order of the constants in normal equations: Double Sphere [xi, alpha, fx, fy, cx, cy],
 /// R_C_B (right perturbation), p_B_C, time shift, gyroscope matrix by rows, accelerometer matrix
-/// (upper triangle by rows), then three for each board.
+/// (upper triangle by rows), then the boards: as many as `board_unknowns` says.
 namespace camera_constants {
 inline constexpr int kLens = 0;
 inline constexpr int kRotation = 6;
@@ -24,6 +25,9 @@ inline constexpr int kBoards = 28;
 
 using LensVector = Eigen::Matrix<double, 6, 1>;
 
+/// Whether boards stand anywhere, or are the LEDs of one rigid grid.
+enum class BoardLayout : std::uint8_t { kFree, kRigid };
+
 /// Everything that does not change during the recording.
 struct CameraConstants {
   LensVector lens = LensVector::Zero();  ///< xi, alpha, fx, fy, cx, cy
@@ -33,10 +37,19 @@ struct CameraConstants {
   Eigen::Matrix3d M_gyro = Eigen::Matrix3d::Identity();   ///< corrected = M (measured - bias)
   Eigen::Matrix3d M_accel = Eigen::Matrix3d::Identity();  ///< upper triangular
   std::vector<Eigen::Vector3d> p_W;                       ///< the boards
+  BoardLayout layout = BoardLayout::kFree;
 
   /// Kalibr's T_cam_imu.
   [[nodiscard]] Pose T_C_B() const { return {-(q_C_B * p_B_C), q_C_B}; }
 };
+
+/// Free boards have three unknowns each. A rigid layout has six: a rotation about its first board
+/// (left, world axes), and that board's place.
+[[nodiscard]] inline int board_unknowns(const CameraConstants& constants) {
+  constexpr int kRigidBody = 6;
+  return constants.layout == BoardLayout::kRigid ? kRigidBody
+                                                 : 3 * static_cast<int>(constants.p_W.size());
+}
 
 /// The body and its IMU's biases at one instant; world z is up.
 struct CameraKnot {

@@ -1,5 +1,5 @@
 /// How good a camera calibration is over seeds, against the bound of its data:
-/// calibration_study [SEEDS [BOARDS [chair | quarter]]]
+/// calibration_study [SEEDS [BOARDS [chair | quarter]]]  or  calibration_study SEEDS grid
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,9 +10,10 @@
 #include "estimator/calibration/batch/jet_geometry.hpp"
 #include "estimator/calibration/camera/camera_batch.hpp"
 #include "estimator/calibration/camera/camera_start.hpp"
+#include "estimator/calibration/grid/grid_calibration.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/core/quantile.hpp"
-#include "tests/support/calibration_recording.hpp"
+#include "tests/support/grid_film.hpp"
 
 namespace crepes {
 namespace {
@@ -103,18 +104,43 @@ double nees_of(const CameraBatchResult& found, const CameraConstants& truth) {
   return e.dot(P.ldlt().solve(e)) / kSize;
 }
 
-Score trial(std::uint64_t seed, const simulated::HandHeld& hand) {
-  const ImuNoise noise;
-  const auto recording = simulated::hand_held(seed, hand, noise);
+constexpr GridShape kGrid{.rows = 5, .columns = 7, .pitch_m = 0.05};
+
+CameraBatchSettings settings_from(const LensVector& lens) {
+  return {.width = 1280,
+          .height = 1024,
+          .lens = lens,
+          .p_B_C = {0.06, 0.0, 0.01},
+          .noise = {},
+          .on_progress = {}};
+}
+
+CameraBatchResult by_boards(const simulated::CameraRecording& recording) {
   const std::vector<std::string> names(recording.truth.p_W.size(), "board");
-  const CameraBatchResult found =
-      calibrate_camera(recording.imu, recording.sightings, names,
-                       {.width = 1280,
-                        .height = 1024,
-                        .lens = generic_lens(1280, 1024, radians(185.0)),
-                        .p_B_C = {0.06, 0.0, 0.01},
-                        .noise = noise,
-                        .on_progress = {}});
+  return calibrate_camera(recording.imu, recording.sightings, names,
+                          settings_from(generic_lens(1280, 1024, radians(185.0))));
+}
+
+/// As `crepesctl calibrate camera --grid` does it, from lights instead of pictures.
+CameraBatchResult by_grid(const simulated::CameraRecording& recording) {
+  const std::vector<GridFrame> frames = simulated::frames_of(recording);
+  std::vector<GridPicture> stills;
+  for (std::size_t k = 0; k < frames.size(); k += 4) stills.push_back({"", frames[k].lights});
+  const GridCalibration lens = calibrate_grid(stills, {.shape = kGrid,
+                                                       .resolution = {1280, 1024},
+                                                       .kind = LensKind::kDoubleSphere,
+                                                       .fov_rad = radians(180.0),
+                                                       .on_progress = {}});
+  if (lens.covariance.size() > 0 && lens.refusals.empty())
+    return calibrate_grid_camera(recording.imu, frames, kGrid, settings_from(lens.lens.numbers));
+  CameraBatchResult refused;
+  refused.refusals = lens.refusals;
+  return refused;
+}
+
+Score trial(std::uint64_t seed, const simulated::HandHeld& hand) {
+  const auto recording = simulated::hand_held(seed, hand, ImuNoise{});
+  const CameraBatchResult found = hand.places.empty() ? by_boards(recording) : by_grid(recording);
   Score score{.is_refused = !found.refusals.empty()};
   if (hand.is_chair) score.is_named = are_named(found.refusals, {"about x", "about y"});
   if (hand.hides_quarter) score.is_named = are_named(found.warnings, {"lower left"});
@@ -180,7 +206,10 @@ int main(int argc, char** argv) {
   crepes::simulated::HandHeld hand;
   const std::vector<std::string> words(argv + 1, argv + argc);
   const int seeds = words.empty() ? 20 : std::stoi(words[0]);
-  if (words.size() > 1) hand.boards = std::stoi(words[1]);
+  if (words.size() > 1 && words[1] == "grid")
+    hand = crepes::simulated::grid_in_hand(crepes::kGrid, 60.0);
+  else if (words.size() > 1)
+    hand.boards = std::stoi(words[1]);
   hand.is_chair = words.size() > 2 && words[2] == "chair";
   hand.hides_quarter = words.size() > 2 && words[2] == "quarter";
   crepes::run(seeds, hand);

@@ -8,6 +8,9 @@
 
 #include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
+#include "drivers/dataset/dataset_rows.hpp"
+#include "drivers/dataset/robot_folder.hpp"
+#include "tests/support/grid_film.hpp"
 #include "tests/support/simulated_grid.hpp"
 
 namespace crepes::calibrate_grid_test {
@@ -31,6 +34,30 @@ class CalibrateGrid : public testing::Test {
       const std::string name =
           "IMG_" + std::to_string((k * 7) % 100) + (k % 3 == 0 ? ".jpg" : ".png");
       ASSERT_TRUE(cv::imwrite((pictures() / name).string(), image, {cv::IMWRITE_JPEG_QUALITY, 90}));
+    }
+  }
+  /// A robot's folder: a film of a grid 0.6 m before a hand, and the inertial samples.
+  void write_film(const simulated::CameraRecording& recording) const {
+    RobotFolder folder(pictures());
+    for (const ImuSample& sample : recording.imu) {
+      std::string row;
+      append_rows(row, sample);
+      ASSERT_TRUE(folder.append("imu0", row));
+    }
+    const simulated::RenderedGrid dark(1);
+    auto seen = recording.sightings.begin();
+    while (seen != recording.sightings.end()) {
+      const Timestamp stamp = seen->stamp;
+      simulated::RenderedGrid picture = dark;
+      for (; seen != recording.sightings.end() && seen->stamp == stamp; ++seen)
+        picture.add(seen->uv, 120.0 + 20.0 * static_cast<double>(seen->board % 5), 1.3);
+      picture.expose();
+      std::vector<std::uint8_t> png;
+      ASSERT_TRUE(cv::imencode(
+          ".png",
+          cv::Mat(simulated::kGridHeight, simulated::kGridWidth, CV_8UC1, picture.pixels.data()),
+          png, {cv::IMWRITE_PNG_COMPRESSION, 0}));
+      ASSERT_TRUE(folder.add_picture("cam0", stamp, png));
     }
   }
   [[nodiscard]] Result<CalibrationReport> run(bool json, bool kannala_brandt = false) const {
@@ -66,6 +93,57 @@ TEST_F(CalibrateGrid, FindsTheLensInAFolderOfPicturesAlone) {
   const std::string camchain = read_text_file(out(), 1 << 20).value();
   EXPECT_NE(camchain.find("camera_model: ds"), std::string::npos) << camchain;
   EXPECT_EQ(camchain.find("T_cam_imu"), std::string::npos) << camchain;
+}
+
+simulated::CameraRecording film(double duration_s) {
+  const GridShape shape = simulated::five_by_seven();
+  CameraConstants camera;
+  camera.lens = simulated::grid_camera().numbers;
+  Eigen::Matrix3d R_C_B;
+  R_C_B << 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0;
+  camera.q_C_B = Eigen::Quaterniond(R_C_B) * so3_exp(Eigen::Vector3d(0.1, -0.05, 0.08));
+  camera.p_B_C = {0.02, -0.01, 0.01};
+  camera.shift_s = 0.004;
+  simulated::HandHeld hand = simulated::grid_in_hand(shape, duration_s);
+  hand.noise_px = 0.0;
+  hand.camera = camera;
+  return simulated::hand_held(4, hand, ImuNoise{});
+}
+
+TEST_F(CalibrateGrid, FindsTheMountingInAFilmWithInertialSamples) {
+  const simulated::CameraRecording recording = film(22.0);
+  write_film(recording);
+
+  const auto report = run(true);
+
+  ASSERT_TRUE(report) << report.error().message;
+  ASSERT_TRUE(report->reasons.empty()) << report->reasons.front();
+  const auto json = nlohmann::json::parse(report->text);
+  EXPECT_EQ(json["leds"], 35);
+  Eigen::Matrix3d R_C_B;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column)
+      R_C_B(row, column) =
+          json["T_cam_imu"][static_cast<std::size_t>(row)][static_cast<std::size_t>(column)];
+  EXPECT_LT(Eigen::Quaterniond(R_C_B).angularDistance(recording.truth.q_C_B), radians(0.1));
+  EXPECT_NEAR(json["timeshift_cam_imu"], recording.truth.shift_s, 2e-4);
+  EXPECT_LT(json["residual_px"], 0.1);
+  const std::string camchain = read_text_file(out(), 1 << 20).value();
+  EXPECT_NE(camchain.find("T_cam_imu"), std::string::npos) << camchain;
+  EXPECT_NE(camchain.find("timeshift_cam_imu"), std::string::npos) << camchain;
+}
+
+TEST_F(CalibrateGrid, SaysWhatAShortFilmStillGives) {
+  write_film(film(12.0));
+
+  const auto report = run(false);
+
+  ASSERT_TRUE(report) << report.error().message;
+  ASSERT_EQ(report->reasons.size(), 2U);
+  EXPECT_NE(report->reasons[0].find("record a minute"), std::string::npos) << report->reasons[0];
+  EXPECT_NE(report->reasons[1].find("pictures/cam0 instead"), std::string::npos)
+      << report->reasons[1];
+  EXPECT_FALSE(fs::exists(out()));
 }
 
 TEST_F(CalibrateGrid, RefusesPicturesWithoutAGridAndWritesNothing) {
