@@ -20,7 +20,9 @@ struct Flight {
   double range_rate_hz = 20.0;
   double noise_px = 0.15;
   double range_noise_m = 0.05;
-  double outliers = 0.02;  ///< of sightings and ranges
+  double outliers = 0.02;     ///< of sightings and ranges
+  double pair_bias_m = 0.0;   ///< of ranges, one sigma, beside both delays
+  double pair_drift_m = 0.0;  ///< amplitude, within some ten seconds
 };
 
 /// What a calibration is given, and the truth.
@@ -113,7 +115,8 @@ inline SwarmFlight fly(std::uint64_t seed, const Flight& flight, const ImuNoise&
     RobotRecord record{.imu = imu_along(paths[r], flight.duration_s, noise, errors, dice),
                        .sightings = {},
                        .ranges = {},
-                       .noise = noise};
+                       .noise = noise,
+                       .range_noise = {}};
     all.truth[r].camera.M_gyro = errors.S_gyro.inverse();
     all.truth[r].camera.M_accel = errors.S_accel.inverse();
     all.records.push_back(std::move(record));
@@ -121,6 +124,15 @@ inline SwarmFlight fly(std::uint64_t seed, const Flight& flight, const ImuNoise&
   const auto spot_noise = [&] {
     const double sigma = dice.uniform(0.0, 1.0) < flight.outliers ? 30.0 : flight.noise_px;
     return Eigen::Vector2d(dice.normal(sigma), dice.normal(sigma));
+  };
+  std::vector<double> bias(pair_count(count));
+  std::vector<double> phase(pair_count(count));
+  for (double& b : bias) b = flight.pair_bias_m > 0.0 ? dice.normal(flight.pair_bias_m) : 0.0;
+  for (double& p : phase)
+    p = flight.pair_drift_m > 0.0 ? dice.uniform(0.0, 2.0 * std::numbers::pi) : 0.0;
+  const auto pair_part = [&](std::size_t a, std::size_t b, double t) {
+    const std::size_t pair = pair_index(a, b, count);
+    return bias[pair] + flight.pair_drift_m * std::sin(t / 10.0 + phase[pair]);
   };
   for (std::size_t o = 0; o < count; ++o) {
     const RobotConstants& own = all.truth[o];
@@ -143,11 +155,11 @@ inline SwarmFlight fly(std::uint64_t seed, const Flight& flight, const ImuNoise&
         const double late = dice.uniform(0.0, 1.0) < flight.outliers ? 2.0 : 0.0;
         const Eigen::Vector3d way = paths[n].p_W(t) + paths[n].q_W_B(t) * all.truth[n].p_B_U -
                                     paths[o].p_W(t) - paths[o].q_W_B(t) * own.p_B_U;
-        all.records[o].ranges.push_back({.stamp = Timestamp{from_seconds(t)},
-                                         .other = n,
-                                         .range_m = way.norm() + own.range_delay_m +
-                                                    all.truth[n].range_delay_m + late +
-                                                    dice.normal(flight.range_noise_m)});
+        all.records[o].ranges.push_back(
+            {.stamp = Timestamp{from_seconds(t)},
+             .other = n,
+             .range_m = way.norm() + own.range_delay_m + all.truth[n].range_delay_m + late +
+                        pair_part(o, n, t) + dice.normal(flight.range_noise_m)});
       }
     }
   }

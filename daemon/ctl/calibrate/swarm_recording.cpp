@@ -159,6 +159,7 @@ Result<RobotRecord> record_of(const RobotRecording& robot,
   record.imu = robot.imu;
   for (ImuSample& sample : record.imu) sample.stamp = clock.reference_time(sample.stamp);
   record.noise = noise_with_vibration(robot.config.imu.noise, robot.imu);
+  record.range_noise = robot.config.uwb.noise;
   record.ranges = direct_ranges(robot, index_of, clock);
   const auto found = board_sightings(robot, robot.config.cameras.front().calibration, true);
   if (!found) return tl::unexpected(found.error());

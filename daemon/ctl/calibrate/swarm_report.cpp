@@ -209,7 +209,8 @@ std::string swarm_text(const SwarmBatchResult& found, const SwarmDataset& datase
                     fixed(robot.spot_sigma_px, 3), fixed(100.0 * robot.outliers, 1),
                     text_table(rows_of(robot)), imu_line(robot));
   }
-  std::vector<std::vector<std::string>> pairs{{"pair", "ranges too long by mm", "+-"}};
+  std::vector<std::vector<std::string>> pairs{
+      {"pair", "ranges too long by both delays mm", "+-", "by the pair itself mm"}};
   for (std::size_t i = 0; i < found.robots.size(); ++i)
     for (std::size_t j = i + 1; j < found.robots.size(); ++j)
       pairs.push_back(
@@ -217,7 +218,8 @@ std::string swarm_text(const SwarmBatchResult& found, const SwarmDataset& datase
            fixed(kMillis *
                      (found.robots[i].after.range_delay_m + found.robots[j].after.range_delay_m),
                  1),
-           fixed(kMillis * pair_delay_sigma(found, i, j), 1)});
+           fixed(kMillis * pair_delay_sigma(found, i, j), 1),
+           fixed(kMillis * found.pair_bias_m[pair_index(i, j, found.robots.size())], 1)});
   return text + text_table(pairs) +
          fmt::format("{} s were used; a range's sigma {} m, outliers {} %\n",
                      fixed(found.seconds, 1), fixed(found.range_sigma_m, 3),
@@ -242,7 +244,8 @@ std::string swarm_json(const SwarmBatchResult& found, const SwarmDataset& datase
       json["pairs"].push_back(
           {{"ids", {dataset.robots[i].robot.id.value, dataset.robots[j].robot.id.value}},
            {"bias_m", found.robots[i].after.range_delay_m + found.robots[j].after.range_delay_m},
-           {"sigma_m", pair_delay_sigma(found, i, j)}});
+           {"sigma_m", pair_delay_sigma(found, i, j)},
+           {"own_bias_m", found.pair_bias_m[pair_index(i, j, found.robots.size())]}});
   return json_line(json);
 }
 

@@ -88,9 +88,19 @@ double pair_delay_sigma(const SwarmBatchResult& result, std::size_t a, std::size
 
 double remaining_range_bias(const SwarmBatchResult& result, std::size_t robot) {
   constexpr double kLeast_m = 0.01;  // what directions of arrival change
+  const std::size_t count = result.robots.size();
   double worst = kLeast_m;
-  for (std::size_t other = 0; other < result.robots.size(); ++other)
-    if (other != robot) worst = std::max(worst, pair_delay_sigma(result, robot, other));
+  for (std::size_t other = 0; other < count; ++other) {
+    if (other == robot) continue;
+    const std::size_t pair = pair_index(robot, other, count);
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(result.covariance.rows());
+    for (const std::size_t r : {robot, other})
+      sum(static_cast<Eigen::Index>(r) * swarm_constants::kSize + swarm_constants::kDelay) = 1.0;
+    sum(static_cast<Eigen::Index>(count) * swarm_constants::kSize +
+        static_cast<Eigen::Index>(pair)) = 1.0;
+    const double variance = std::max(0.0, sum.dot(result.covariance * sum));
+    worst = std::max(worst, std::sqrt(std::pow(result.pair_bias_m[pair], 2) + variance));
+  }
   return worst;
 }
 
@@ -125,6 +135,7 @@ SwarmBatchResult calibrate_swarm(std::vector<RobotRecord> records,
     describe_robot(solution, r, result.robots[r]);
   }
   result.covariance = solution.covariance;
+  result.pair_bias_m = solution.state.pair_bias_m;
   result.range_sigma_m = solution.sigma_m;
   result.range_outliers = solution.range_outliers;
   judge_swarm(solution, settings.names, result);

@@ -43,8 +43,9 @@ struct CalibratedRobot {
 /// The calibrations of all robots, their quality, and the reasons to refuse them.
 struct SwarmBatchResult {
   std::vector<CalibratedRobot> robots;
-  Eigen::MatrixXd covariance;  ///< of all constants, robot by robot
-  double range_sigma_m = 0.0;  ///< of a single range, from the residuals
+  Eigen::MatrixXd covariance;       ///< of all constants, robot by robot, then of the pairs' biases
+  std::vector<double> pair_bias_m;  ///< by `pair_index`; what antenna delays do not explain
+  double range_sigma_m = 0.0;       ///< of a single range, from the residuals
   double range_outliers = 0.0;
   double seconds = 0.0;  ///< of the recording that were used
   std::vector<std::string> refusals;
@@ -54,8 +55,8 @@ struct SwarmBatchResult {
 /// One sigma of what two modules' delays together lengthen their ranges by.
 [[nodiscard]] double pair_delay_sigma(const SwarmBatchResult& result, std::size_t a, std::size_t b);
 
-/// One sigma of what a robot's ranges are still off by once the delays are in force: that of its
-/// worst pair, and at least what directions of arrival change [m].
+/// What a robot's ranges are still off by once the delays are in force, one sigma: that of its
+/// worst pair, with the pair's own bias, and at least what directions of arrival change [m].
 [[nodiscard]] double remaining_range_bias(const SwarmBatchResult& result, std::size_t robot);
 
 /// `guess`: the configuration in force, by robot. See `SwarmProblem` for what is unknown.

@@ -28,6 +28,7 @@ constexpr double kClockGauge_s = 1e-6;  // of the first robot's clock
 constexpr double kSkewGauge = 1e-8;
 constexpr double kVelocitySigma = 3.0;  // of the first knots [m/s]
 constexpr double kInvalidCost_px = 200.0;
+constexpr double kLeastBias_m = 1e-3;
 
 constexpr int kBody = ArrowSystem::kState;
 constexpr int kInterval = interval_columns::kSize;
@@ -84,7 +85,7 @@ struct Reading {
 
 constexpr int kBodies = 2 * kInterval;
 constexpr int kSightingRow = kBodies + 13 + 3 + 2 + 2;
-constexpr int kRangeRow = kBodies + 6 + 6;
+constexpr int kRangeRow = kBodies + 6 + 6 + 2;
 
 std::vector<Columns> columns_of_bodies(const Reading& reading) {
   return {
@@ -105,11 +106,20 @@ std::vector<Columns> columns_of_sighting(const Reading& reading) {
   return all;
 }
 
-std::vector<Columns> columns_of_range(const Reading& reading) {
+std::vector<Columns> columns_of_range(const Reading& reading, std::size_t robots) {
+  const auto pair = static_cast<int>(pair_index(reading.observer, reading.other, robots));
   std::vector<Columns> all = columns_of_bodies(reading);
   all.push_back({kBodies, 6, Columns::kConstants, constants_at(reading.observer) + at::kAntenna});
   all.push_back({kBodies + 6, 6, Columns::kConstants, constants_at(reading.other) + at::kAntenna});
+  all.push_back({kBodies + 12, 1, Columns::kConstants, constants_at(robots) + pair});
+  all.push_back({kBodies + 13, 1, reading.observer_knot, body_at(robots) + pair});
   return all;
+}
+
+/// What the pair itself lengthens a range by.
+double pair_part(const SwarmState& state, const Reading& reading) {
+  const std::size_t pair = pair_index(reading.observer, reading.other, state.robots.size());
+  return state.pair_bias_m[pair] + state.pair_drift_m[reading.observer_knot][pair];
 }
 
 /// Sums half the squares, and keeps the residuals if there is a place for them.
@@ -145,10 +155,15 @@ class PlainVisitor {
     const auto factor = linearize_antenna_range(state_.robots[reading.observer], plain(from),
                                                 state_.robots[reading.other], plain(to));
     if (!factor) return;
-    const double r = range_m - factor->range_m;
+    const double r = range_m - factor->range_m - pair_part(state_, reading);
     sum_ += 0.5 * weight * r * r / (sigma * sigma);
     if (residuals_ != nullptr) residuals_->ranges[reading.observer][reading.index] = r;
   }
+  void drift(std::size_t knot, std::size_t pair, double decay, double sigma) {
+    const double r = state_.pair_drift_m[knot + 1][pair] - decay * state_.pair_drift_m[knot][pair];
+    sum_ += 0.5 * r * r / (sigma * sigma);
+  }
+  void prior_of_drift(std::size_t /*pair*/, double r, double /*slope*/) { sum_ += 0.5 * r * r; }
   void prior_of_constant(int /*index*/, double r, double /*slope*/) { sum_ += 0.5 * r * r; }
   void prior_of_first(int /*where*/, const Eigen::RowVector3d& /*row*/, double r) {
     sum_ += 0.5 * r * r;
@@ -230,11 +245,27 @@ class LinearVisitor {
     row << J_observer * observer.J, J_other * other.J, factor->J.middleCols<3>(column::kAntenna),
         factor->J(column::kDelay), -by_other_time, -reading.stamp_s * by_other_time,
         factor->J.middleCols<3>(column::kOtherAntenna), factor->J(column::kOtherDelay),
-        by_other_time, reading.common_s * by_other_time, factor->range_m - range_m;
-    buffer(ranges_, reading, kRangeRow).next<1>(columns_of_range(reading)) =
+        by_other_time, reading.common_s * by_other_time, 1.0, 1.0,
+        factor->range_m + pair_part(state_, reading) - range_m;
+    buffer(ranges_, reading, kRangeRow).next<1>(columns_of_range(reading, state_.robots.size())) =
         row * (std::sqrt(weight) / sigma);
   }
 
+  void drift(std::size_t knot, std::size_t pair, double decay, double sigma) {
+    const int i = body_at(state_.robots.size()) + static_cast<int>(pair);
+    const double r = state_.pair_drift_m[knot + 1][pair] - decay * state_.pair_drift_m[knot][pair];
+    const double weight = 1.0 / (sigma * sigma);
+    system_.diagonal(knot)(i, i) += weight * decay * decay;
+    system_.to_next(knot)(i, i) -= weight * decay;
+    system_.diagonal(knot + 1)(i, i) += weight;
+    system_.gradient(knot)(i) += weight * decay * r;
+    system_.gradient(knot + 1)(i) -= weight * r;
+  }
+  void prior_of_drift(std::size_t pair, double r, double slope) {
+    const int i = body_at(state_.robots.size()) + static_cast<int>(pair);
+    system_.diagonal(0)(i, i) += slope * slope;
+    system_.gradient(0)(i) -= slope * r;
+  }
   void prior_of_constant(int index, double r, double slope) {
     system_.constants()(index, index) += slope * slope;
     system_.constants_gradient()(index) -= slope * r;
@@ -330,6 +361,22 @@ SwarmProblem::SwarmProblem(std::vector<RobotRecord> records, Timestamp from, Tim
     weights_.ranges.emplace_back(record.ranges.size(), 1.0);
   }
   first_sample_ = knot_samples(imu_s_, seconds(to), knot_spacing(robots()));
+  set_pair_noise();
+}
+
+/// The worse of both robots' biases.
+void SwarmProblem::set_pair_noise() {
+  pair_noise_.resize(pair_count(robots()));
+  for (std::size_t a = 0; a < robots(); ++a) {
+    for (std::size_t b = a + 1; b < robots(); ++b) {
+      RangeNoise& pair = pair_noise_[pair_index(a, b, robots())];
+      const RangeNoise& own = records_[a].range_noise;
+      const RangeNoise& other = records_[b].range_noise;
+      pair.bias_sigma_m = std::max({kLeastBias_m, own.bias_sigma_m, other.bias_sigma_m});
+      pair.bias_drift_m = std::max({kLeastBias_m, own.bias_drift_m, other.bias_drift_m});
+      pair.bias_time_s = std::min(own.bias_time_s, other.bias_time_s);
+    }
+  }
 }
 
 std::optional<SwarmProblem::Place> SwarmProblem::place_of(std::size_t robot, double time_s) const {
@@ -375,6 +422,12 @@ void SwarmProblem::visit(const SwarmState& state, Visitor& visitor) const {
     }
   };
   for (std::size_t k = 0; k + 1 < knots(); ++k) {
+    for (std::size_t pair = 0; pair < pair_noise_.size(); ++pair) {
+      const RangeNoise& noise = pair_noise_[pair];
+      const double decay =
+          std::exp(-to_seconds(time_of(0, k + 1) - time_of(0, k)) / noise.bias_time_s);
+      visitor.drift(k, pair, decay, noise.bias_drift_m * std::sqrt(1.0 - decay * decay));
+    }
     for (std::size_t r = 0; r < robots(); ++r) {
       const double dt = imu_s_[r][first_sample_[r][k + 1]] - imu_s_[r][first_sample_[r][k]];
       visitor.imu(r, k, walk.interval(r, k), knot_whitening(records_[r].noise, dt));
@@ -414,6 +467,14 @@ void SwarmProblem::visit_priors(const SwarmState& state, const SwarmState& prior
     add(9, first.gyro_bias, records_[r].noise.gyroscope_bias_sigma);
     add(12, first.accel_bias, records_[r].noise.accelerometer_bias_sigma);
     if (r > 0) continue;
+    for (std::size_t pair = 0; pair < pair_noise_.size(); ++pair) {
+      const RangeNoise& noise = pair_noise_[pair];
+      visitor.prior_of_constant(constants_at(robots()) + static_cast<int>(pair),
+                                state.pair_bias_m[pair] / noise.bias_sigma_m,
+                                1.0 / noise.bias_sigma_m);
+      visitor.prior_of_drift(pair, state.pair_drift_m.front()[pair] / noise.bias_drift_m,
+                             1.0 / noise.bias_drift_m);
+    }
     const CameraKnot& held = prior.knots[r].front();
     add(3, first.v_W, kVelocitySigma);
     add(6, first.p_W - held.p_W, kGaugeSigma);
@@ -432,7 +493,8 @@ double SwarmProblem::cost(const SwarmState& state, const SwarmState& prior) cons
 
 TeamArrowSystem SwarmProblem::linearize(const SwarmState& state, const SwarmState& prior) const {
   const auto count = static_cast<int>(robots());
-  TeamArrowSystem system(knots(), at::kSize * count, kBody * count);
+  const auto pairs = static_cast<int>(pair_count(robots()));
+  TeamArrowSystem system(knots(), at::kSize * count + pairs, kBody * count + pairs);
   LinearVisitor visitor(state, system);
   visit<TimeJet>(state, visitor);
   visitor.finish();

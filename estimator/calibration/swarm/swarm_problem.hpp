@@ -27,6 +27,7 @@ struct RobotRecord {
   std::vector<BoardSighting> sightings;  ///< by stamp; `board` is the index of a robot
   std::vector<RobotRange> ranges;        ///< by stamp
   ImuNoise noise;                        ///< with vibration
+  RangeNoise range_noise;                ///< of biases; the scatter is taken from the residuals
 };
 
 /// What readings weigh: one each, or less for outliers; 0 leaves one out. By robot and reading.
@@ -42,7 +43,9 @@ struct SwarmResiduals {
 };
 
 /// Knots of all robots every 0.02 s, farther apart for more than four robots. A reading between two
-/// knots sees each robot where its IMU carried it since the earlier one.
+/// knots sees each robot where its IMU carried it since the earlier one. The bias of a pair's
+/// ranges is that of both modules and a constant of its own; what drifts on top is no white noise,
+/// and readings within twice `bias_time_s` share one draw of it.
 class SwarmProblem {
  public:
   /// Readings outside [from, to] are left out.
@@ -82,6 +85,7 @@ class SwarmProblem {
   };
   [[nodiscard]] std::optional<Place> place_of(std::size_t robot, double time_s) const;
   [[nodiscard]] double seconds(Timestamp t) const { return to_seconds(t - from_); }
+  void set_pair_noise();
   template <class Visitor>
   void visit_priors(const SwarmState& state, const SwarmState& prior, Visitor& visitor) const;
   template <class T, class Visitor>
@@ -95,6 +99,7 @@ class SwarmProblem {
   std::vector<RobotPriors> priors_;
   std::vector<double> sigma_px_;
   double sigma_m_ = 1.0;
+  std::vector<RangeNoise> pair_noise_;  ///< by `pair_index`
 };
 
 }  // namespace crepes

@@ -106,7 +106,11 @@ void turn_back(const SwarmProblem& problem, SwarmState& state) {
 
 SwarmState first_state(const SwarmProblem& problem, const std::vector<RobotConstants>& guess,
                        const SwarmStart& start) {
-  SwarmState state{.robots = guess, .knots = {}};
+  SwarmState state{.robots = guess,
+                   .knots = {},
+                   .pair_bias_m = std::vector<double>(pair_count(guess.size()), 0.0),
+                   .pair_drift_m = {}};
+  state.pair_drift_m.assign(problem.knots(), state.pair_bias_m);
   const std::vector<CameraKnot> reference = reference_knots(problem, start);
   for (std::size_t r = 0; r < problem.robots(); ++r)
     state.knots.push_back(r == start.reference ? reference

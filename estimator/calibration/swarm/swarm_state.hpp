@@ -46,10 +46,24 @@ struct RobotConstants {
   }
 };
 
-/// Knots of all robots stand at the same times, but for half an IMU sample.
+/// Pairs of robots, each once: (0, 1), (0, 2), ..., (1, 2), ...
+[[nodiscard]] constexpr std::size_t pair_count(std::size_t robots) {
+  return robots * (robots - 1) / 2;
+}
+[[nodiscard]] constexpr std::size_t pair_index(std::size_t a, std::size_t b, std::size_t robots) {
+  const std::size_t low = a < b ? a : b;
+  const std::size_t high = a < b ? b : a;
+  return low * (2 * robots - low - 1) / 2 + (high - low - 1);
+}
+
+/// Knots of all robots stand at the same times, but for half an IMU sample. What both delays do not
+/// explain of a pair's ranges is a constant and a drift. In normal equations they follow the
+/// constants and the knots of all robots.
 struct SwarmState {
   std::vector<RobotConstants> robots;
-  std::vector<std::vector<CameraKnot>> knots;  ///< by robot
+  std::vector<std::vector<CameraKnot>> knots;     ///< by robot
+  std::vector<double> pair_bias_m;                ///< by `pair_index`
+  std::vector<std::vector<double>> pair_drift_m;  ///< by knot and `pair_index`
 };
 
 /// One-sigma priors of a robot's constants, in the order of `swarm_constants`.

@@ -147,7 +147,10 @@ PoseError least_error(const SwarmBatchResult& found, const std::vector<RobotCons
   for (int draw = 0; draw < kDraws; ++draw) {
     Eigen::VectorXd white(found.covariance.rows());
     for (double& x : white) x = noise.gaussian(next++);
-    const SwarmState state{truth, std::vector<std::vector<CameraKnot>>(truth.size())};
+    const SwarmState state{truth,
+                           std::vector<std::vector<CameraKnot>>(truth.size()),
+                           std::vector<double>(pair_count(truth.size()), 0.0),
+                           {}};
     const TeamArrowSystem::Step step{
         .states = {}, .constants = P.matrixL() * white, .constants_covariance = {}};
     Swarm drawn = swarm;
