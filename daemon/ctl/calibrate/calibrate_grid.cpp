@@ -78,10 +78,11 @@ std::vector<Value> some_of(const std::vector<Value>& all, std::size_t most) {
 
 std::vector<RecordedPicture> film_of(const std::vector<RecordedPicture>& files) {
   std::vector<RecordedPicture> film;
-  for (const RecordedPicture& file : files)
+  for (const RecordedPicture& file : files) {
     if (film.size() < kMostOfFilm &&
         (film.empty() || file.stamp >= film.back().stamp + kFilmPeriod))
       film.push_back(file);
+  }
   return film;
 }
 
@@ -109,12 +110,13 @@ Result<GridPictures> read_pictures(const CalibrateGridOptions& options, bool is_
     }
     const std::array<int, 2> resolution{picture->width, picture->height};
     if (found.pictures.empty()) found.resolution = resolution;
-    if (resolution != found.resolution)
+    if (resolution != found.resolution) {
       return fail(ErrorCode::kFormat,
                   fmt::format("{} is {}x{}, those before it are {}x{}: all pictures must be of one "
                               "camera, as it takes them",
                               file.file.string(), resolution[0], resolution[1], found.resolution[0],
                               found.resolution[1]));
+    }
     GridPicture& next = found.pictures.emplace_back();
     next.name = name;
     found.stamps.push_back(file.stamp);
@@ -123,9 +125,10 @@ Result<GridPictures> read_pictures(const CalibrateGridOptions& options, bool is_
                             .height = picture->height,
                             .stride = picture->width}))
       next.lights.emplace_back(spot.u_px, spot.v_px);
-    if (options.on_progress)
+    if (options.on_progress) {
       options.on_progress(kShareOfReading * static_cast<double>(found.pictures.size()) /
                           static_cast<double>(files.size()));
+    }
   }
   if (found.pictures.empty())
     return fail(ErrorCode::kFormat, options.pictures.string() + ": no picture can be read");
@@ -160,7 +163,7 @@ Result<void> calibrate_stills(const CalibrateGridOptions& options, const GridPic
               options.kannala_brandt ? LensKind::kKannalaBrandt : LensKind::kDoubleSphere, 1.0);
   report.reasons = found.refusals;
   if (found.refusals.empty()) {
-    const auto written =
+    auto written =
         write_text_file(options.out, camchain_text(found.lens.calibration(read.resolution),
                                                    Mounting::kUnknown, "camera --grid"));
     if (!written) return written;
@@ -190,10 +193,11 @@ Result<void> calibrate_film(const CalibrateGridOptions& options, const GridPictu
                                    .noise = body.noise,
                                    .on_progress = part_of(options, kShareOfLens, 1.0)});
   }
-  if (lens.refusals.empty() && !found.refusals.empty())
+  if (lens.refusals.empty() && !found.refusals.empty()) {
     found.refusals.push_back(
         fmt::format("the lens by itself could be calibrated: give {} instead of the whole folder",
                     (options.pictures / "cam0").string()));
+  }
   found.refusals.insert(found.refusals.begin(), lens.refusals.begin(), lens.refusals.end());
   found.warnings.insert(found.warnings.begin(), lens.warnings.begin(), lens.warnings.end());
   return report_camera(

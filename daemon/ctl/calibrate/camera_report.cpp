@@ -37,9 +37,10 @@ std::vector<std::vector<std::string>> lens_rows(const CameraBatchResult& found) 
   }
   const Eigen::Vector3d p_B_C = found.constants.p_B_C;
   constexpr std::array kAxes{"camera x mm", "camera y mm", "camera z mm"};
-  for (int i = 0; i < 3; ++i)
+  for (int i = 0; i < 3; ++i) {
     rows.push_back({kAxes.at(static_cast<std::size_t>(i)), fixed(kMm * p_B_C[i], 1),
                     fixed(kMm * found.position_sigma_m[i], 1)});
+  }
   rows.push_back({"time shift ms", fixed(kMs * found.constants.shift_s, 3),
                   fixed(kMs * found.shift_sigma_s, 3)});
   return rows;

@@ -74,9 +74,10 @@ class ClockLine {
   ClockLine() = default;
   ClockLine(const std::vector<ClockSample>& samples, RobotId reference, RobotId neighbor) {
     std::vector<std::pair<double, double>> points;
-    for (const ClockSample& sample : samples)
+    for (const ClockSample& sample : samples) {
       if (sample.observer == reference && sample.clock.peer == neighbor)
         points.emplace_back(to_seconds(sample.stamp.time_since_epoch()), sample.clock.offset_s);
+    }
     fit(points);
   }
 
@@ -118,9 +119,10 @@ class ClockLine {
 double measured_density(const std::vector<ImuSample>& imu, double period_s,
                         const Eigen::Vector3d ImuSample::*signal) {
   std::vector<double> squares;
-  for (std::size_t i = 2; i < imu.size(); ++i)
+  for (std::size_t i = 2; i < imu.size(); ++i) {
     squares.push_back(
         (imu[i].*signal - 2.0 * (imu[i - 1].*signal) + imu[i - 2].*signal).squaredNorm());
+  }
   if (squares.empty()) return 0.0;
   double sum = 0.0;
   for (const double square : squares) sum += square / static_cast<double>(squares.size());
@@ -214,10 +216,11 @@ Result<ReplayedSwarm> replayed_swarm(const SwarmDataset& dataset,
 Result<RobotConstants> configured_constants(const Config& config) {
   if (config.cameras.empty()) return fail(ErrorCode::kConfig, "no camera is configured");
   const CameraCalibration& camera = config.cameras.front().calibration;
-  if (camera.camera_model != CameraModelKind::kDoubleSphere || camera.intrinsics.size() != 6)
+  if (camera.camera_model != CameraModelKind::kDoubleSphere || camera.intrinsics.size() != 6) {
     return fail(ErrorCode::kConfig,
                 "cameras[0].camera_model: only ds (Double Sphere) can be "
                 "calibrated with a swarm");
+  }
   RobotConstants constants;
   constants.camera.lens = Eigen::Map<const LensVector>(camera.intrinsics.data());
   constants.camera.q_C_B = camera.T_cam_imu.q;
@@ -250,10 +253,11 @@ Result<SwarmMeasurements> swarm_measurements(const SwarmDataset& dataset,
     const RobotRecording& robot = dataset.robots[r];
     const RobotId id = robot.robot.id;
     const ClockLine clock = id == reference ? ClockLine() : ClockLine(found->clocks, reference, id);
-    if (id != reference && !clock.is_known())
+    if (id != reference && !clock.is_known()) {
       return fail(ErrorCode::kFormat,
                   fmt::format("{}: its clock against {}'s stays unknown", robot.robot.name,
                               dataset.robots[all.start.reference].robot.name));
+    }
     auto guess = configured_constants(robot.config);
     if (!guess) return tl::unexpected(std::move(guess.error()).with_context(robot.robot.name));
     all.guess.push_back(*guess);

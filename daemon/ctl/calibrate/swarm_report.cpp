@@ -55,10 +55,11 @@ std::string ranges_part(const SwarmBatchResult& found, const SwarmDataset& datas
     const double delay_m = found.robots[i].after.range_delay_m;
     const int id = dataset.robots[i].robot.id.value;
     modules += fmt::format("  - {{id: {}, bias_m: {}}}\n", id, to_yaml(delay_m));
-    for (std::size_t j = i + 1; j < found.robots.size(); ++j)
+    for (std::size_t j = i + 1; j < found.robots.size(); ++j) {
       text +=
           fmt::format("  - {{ids: [{}, {}], bias_m: {}}}\n", id, dataset.robots[j].robot.id.value,
                       to_yaml(delay_m + found.robots[j].after.range_delay_m));
+    }
   }
   return text + modules;
 }
@@ -104,14 +105,16 @@ std::vector<std::vector<std::string>> rows_of(const CalibratedRobot& robot) {
   constexpr std::array kLens{"xi", "alpha", "fx px", "fy px", "cx px", "cy px"};
   constexpr std::array kAxes{"x", "y", "z"};
   std::vector<std::vector<std::string>> rows{{"", "before", "after", "+-", ""}};
-  for (int i = 0; i < 6; ++i)
+  for (int i = 0; i < 6; ++i) {
     rows.push_back(row_of(kLens.at(static_cast<std::size_t>(i)), robot, swarm_at::kLens + i,
                           a.camera.lens[i], b.camera.lens[i], 1.0, i < 2 ? 4 : 2));
+  }
   const auto vector = [&](const std::string& name, int index, const Eigen::Vector3d& before,
                           const Eigen::Vector3d& after, double unit, int decimals) {
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
       rows.push_back(row_of(name + " " + kAxes.at(static_cast<std::size_t>(i)), robot, index + i,
                             before[i], after[i], unit, decimals));
+    }
   };
   vector("camera turned, deg", swarm_at::kRotation, Eigen::Vector3d::Zero(),
          moved.segment<3>(swarm_at::kRotation), kDegPerRad, 3);
@@ -211,8 +214,8 @@ std::string swarm_text(const SwarmBatchResult& found, const SwarmDataset& datase
   }
   std::vector<std::vector<std::string>> pairs{
       {"pair", "ranges too long by both delays mm", "+-", "by the pair itself mm"}};
-  for (std::size_t i = 0; i < found.robots.size(); ++i)
-    for (std::size_t j = i + 1; j < found.robots.size(); ++j)
+  for (std::size_t i = 0; i < found.robots.size(); ++i) {
+    for (std::size_t j = i + 1; j < found.robots.size(); ++j) {
       pairs.push_back(
           {fmt::format("{},{}", dataset.robots[i].robot.name, dataset.robots[j].robot.name),
            fixed(kMillis *
@@ -220,6 +223,8 @@ std::string swarm_text(const SwarmBatchResult& found, const SwarmDataset& datase
                  1),
            fixed(kMillis * pair_delay_sigma(found, i, j), 1),
            fixed(kMillis * found.pair_bias_m[pair_index(i, j, found.robots.size())], 1)});
+    }
+  }
   return text + text_table(pairs) +
          fmt::format("{} s were used; a range's sigma {} m, outliers {} %\n",
                      fixed(found.seconds, 1), fixed(found.range_sigma_m, 3),
@@ -239,13 +244,15 @@ std::string swarm_json(const SwarmBatchResult& found, const SwarmDataset& datase
   for (std::size_t r = 0; r < found.robots.size(); ++r)
     json["robots"].push_back(robot_json(found.robots[r], dataset.robots[r].robot));
   json["pairs"] = Json::array();
-  for (std::size_t i = 0; i < found.robots.size(); ++i)
-    for (std::size_t j = i + 1; j < found.robots.size(); ++j)
+  for (std::size_t i = 0; i < found.robots.size(); ++i) {
+    for (std::size_t j = i + 1; j < found.robots.size(); ++j) {
       json["pairs"].push_back(
           {{"ids", {dataset.robots[i].robot.id.value, dataset.robots[j].robot.id.value}},
            {"bias_m", found.robots[i].after.range_delay_m + found.robots[j].after.range_delay_m},
            {"sigma_m", pair_delay_sigma(found, i, j)},
            {"own_bias_m", found.pair_bias_m[pair_index(i, j, found.robots.size())]}});
+    }
+  }
   return json_line(json);
 }
 

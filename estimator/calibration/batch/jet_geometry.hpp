@@ -33,7 +33,7 @@ Vector3<T> seeded(const Eigen::Vector3d& x, int index) {
 /// R Exp(d) at d = 0.
 template <class T>
 Matrix3<T> seeded_rotation(const Eigen::Quaterniond& q, int index) {
-  const Matrix3<T> R = q.toRotationMatrix().cast<T>();
+  Matrix3<T> R = q.toRotationMatrix().cast<T>();
   if constexpr (std::is_same_v<T, double>) return R;
   const Vector3<T> d = seeded<T>(Eigen::Vector3d::Zero(), index);
   Matrix3<T> turn;

@@ -282,16 +282,17 @@ void move_boards(const Eigen::Ref<const Eigen::VectorXd>& d, CameraConstants& co
 }  // namespace
 
 CameraProblem::CameraProblem(std::span<const ImuSample> imu, std::vector<BoardSighting> sightings,
-                             const ImuNoise& noise, const CameraPriors& priors)
+                             const ImuNoise& noise, CameraPriors priors)
     : imu_(imu),
       sightings_(std::move(sightings)),
       weights_(sightings_.size(), 1.0),
       noise_(noise),
-      priors_(priors) {
-  for (std::size_t i = 0; i < imu_.size(); ++i)
+      priors_(std::move(priors)) {
+  for (std::size_t i = 0; i < imu_.size(); ++i) {
     if (first_sample_.empty() ||
         seconds(imu_[i].stamp) >= seconds(imu_[first_sample_.back()].stamp) + kKnotSpacing_s * 0.95)
       first_sample_.push_back(i);
+  }
 }
 
 /// Carries the body from a knot to the next, and shows each sighting and the end to the visitor.
@@ -383,11 +384,12 @@ void CameraProblem::visit_priors(const CameraState& state, const CameraState& pr
     for (int j = 0; j < 3; ++j) add(index++, x.M_gyro(i, j) - m.M_gyro(i, j), priors_.imu_matrix);
   for (int i = 0; i < 3; ++i)
     for (int j = i; j < 3; ++j) add(index++, x.M_accel(i, j) - m.M_accel(i, j), priors_.imu_matrix);
-  if (x.layout == BoardLayout::kRigid)
+  if (x.layout == BoardLayout::kRigid) {
     add3(at::kBoards + 3, x.p_W.front() - m.p_W.front(), priors_.board_m);
-  else
+  } else {
     for (std::size_t b = 0; b < x.p_W.size(); ++b)
       add3(at::kBoards + 3 * static_cast<int>(b), x.p_W[b] - m.p_W[b], priors_.board_m);
+  }
 
   const CameraKnot& first = state.knots.front();
   const CameraKnot& held = prior.knots.front();

@@ -44,7 +44,7 @@ class CameraProblem {
  public:
   /// `imu`, ordered by stamp, outlives the problem. `sightings` are ordered by stamp.
   CameraProblem(std::span<const ImuSample> imu, std::vector<BoardSighting> sightings,
-                const ImuNoise& noise, const CameraPriors& priors);
+                const ImuNoise& noise, CameraPriors priors);
 
   [[nodiscard]] std::size_t knots() const { return first_sample_.size(); }
   [[nodiscard]] std::span<const BoardSighting> sightings() const { return sightings_; }

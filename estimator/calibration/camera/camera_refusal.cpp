@@ -38,12 +38,14 @@ void check_boards(const CameraSolution& solution, std::span<const BoardSighting>
     all[sightings[i].board] += 1.0;
     if (is_outlier(residual, solution.sigma_px)) bad[sightings[i].board] += 1.0;
   }
-  for (std::size_t b = 0; b < names.size(); ++b)
-    if (all[b] > 0.0 && bad[b] > kMovedOutliers * all[b])
+  for (std::size_t b = 0; b < names.size(); ++b) {
+    if (all[b] > 0.0 && bad[b] > kMovedOutliers * all[b]) {
       result.refusals.push_back(
           fmt::format("{} moved, or is seen in a mirror: {} % of its sightings contradict "
                       "the others",
                       names[b], number_text(100.0 * bad[b] / all[b], 0)));
+    }
+  }
 }
 
 void check_quarters(std::span<const BoardSighting> sightings, const CameraBatchSettings& settings,
@@ -56,11 +58,13 @@ void check_quarters(std::span<const BoardSighting> sightings, const CameraBatchS
     const std::size_t low = sighting.uv.y() > 0.5 * settings.height ? 1 : 0;
     counts[2 * low + right] += 1.0;
   }
-  for (std::size_t q = 0; q < counts.size(); ++q)
-    if (counts[q] < kLeastQuarter * static_cast<double>(sightings.size()))
+  for (std::size_t q = 0; q < counts.size(); ++q) {
+    if (counts[q] < kLeastQuarter * static_cast<double>(sightings.size())) {
       result.warnings.push_back(
           fmt::format("nothing seen in the {} quarter of the picture: the lens is not known there",
                       kQuarters[q]));
+    }
+  }
 }
 
 /// A lens whose field of view is larger than its model shows in the outermost ring first.
@@ -84,11 +88,12 @@ void check_rim(const CameraSolution& solution, std::span<const BoardSighting> si
   }
   const double inner = rms_px(square[0], std::max(1.0, count[0]));
   const double outer = rms_px(square[1], count[1]);
-  if (outer > kRimRatio * inner)
+  if (outer > kRimRatio * inner) {
     result.warnings.push_back(fmt::format(
         "residuals grow to the rim ({} px against {} px): the field of view is larger than said, "
         "or the lens is no Double Sphere",
         number_text(outer, 2), number_text(inner, 2)));
+  }
 }
 
 }  // namespace
@@ -105,9 +110,10 @@ std::vector<std::string> refusals_before_fit(std::span<const ImuSample> imu,
     return reasons;
   }
   const double seen_s = to_seconds(sightings.back().stamp - sightings.front().stamp);
-  if (seen_s < kLeastRecording_s)
+  if (seen_s < kLeastRecording_s) {
     reasons.push_back(
         fmt::format("the target is seen for {} s only; record a minute", number_text(seen_s, 0)));
+  }
   double gap_s = 0.0;
   for (std::size_t i = 1; i < imu.size(); ++i)
     gap_s = std::max(gap_s, to_seconds(imu[i].stamp - imu[i - 1].stamp));
@@ -119,13 +125,15 @@ std::vector<std::string> refusals_before_fit(std::span<const ImuSample> imu,
 std::vector<std::string> motion_refusals(const Eigen::Vector3d& rate_rms_radps) {
   constexpr std::array<std::string_view, 3> kAxes{"x (roll)", "y (pitch)", "z (yaw)"};
   std::vector<std::string> reasons;
-  for (int i = 0; i < 3; ++i)
-    if (rate_rms_radps[i] < kLeastRate)
+  for (int i = 0; i < 3; ++i) {
+    if (rate_rms_radps[i] < kLeastRate) {
       reasons.push_back(fmt::format(
           "hardly turned about {}: {} deg/s RMS, at least {} are needed about each axis of the "
           "body",
           kAxes[static_cast<std::size_t>(i)], number_text(rate_rms_radps[i] * kDegPerRad, 1),
           number_text(kLeastRate * kDegPerRad, 0)));
+    }
+  }
   return reasons;
 }
 
@@ -134,30 +142,34 @@ void judge_camera(const CameraSolution& solution, std::span<const BoardSighting>
                   CameraBatchResult& result) {
   result.refusals = motion_refusals(result.rate_rms_radps);
   check_boards(solution, sightings, names, result);
-  if (solution.sigma_px > kMostSpotSigma_px)
+  if (solution.sigma_px > kMostSpotSigma_px) {
     result.refusals.push_back(fmt::format(
         "residuals of {} px: boards moved, the time stamps jitter, or the picture is blurred",
         number_text(solution.sigma_px, 2)));
-  if (result.lens_sigma_px > kMostLensSigma_px)
+  }
+  if (result.lens_sigma_px > kMostLensSigma_px) {
     result.refusals.push_back(fmt::format(
         "the lens remains uncertain by {} px (one sigma, RMS over the picture); turn more, about "
         "all axes, so that a board crosses every part of the picture",
         number_text(result.lens_sigma_px, 2)));
+  }
   if (!solution.has_converged)
     result.warnings.emplace_back("the solver had not converged when it stopped");
-  if (result.lens_sigma_px > kGoodLensSigma_px)
+  if (result.lens_sigma_px > kGoodLensSigma_px) {
     result.warnings.push_back(fmt::format(
         "the lens is known to {} px only: a second board and faster turns make it better",
         number_text(result.lens_sigma_px, 2)));
+  }
   check_quarters(sightings, settings, result);
   check_rim(solution, sightings, settings, result);
 }
 
 void judge_held_out(CameraBatchResult& result) {
-  if (result.held_out_px > kHeldOutRatio * result.spot_sigma_px)
+  if (result.held_out_px > kHeldOutRatio * result.spot_sigma_px) {
     result.warnings.push_back(
         fmt::format("held-out seconds fit worse ({} px) than the others ({} px)",
                     number_text(result.held_out_px, 2), number_text(result.spot_sigma_px, 2)));
+  }
 }
 
 }  // namespace crepes

@@ -70,7 +70,7 @@ std::optional<HandEye> align_camera(std::span<const ImuSample> imu,
     if (!u0 || !u1 || i >= imu.size()) return;
     const Eigen::Matrix3d U = hat((*u0 + *u1).normalized());
     Eigen::Matrix<double, 3, 12> J;
-    for (int k = 0; k < 3; ++k) J.middleCols<3>(3 * k) = U * imu[i].gyro_radps[k];
+    for (int k = 0; k < 3; ++k) J.middleCols<3>(3L * k) = U * imu[i].gyro_radps[k];
     J.rightCols<3>() = -U;
     H += J.transpose() * J;
     g += J.transpose() * ((*u1 - *u0) / dt);
@@ -109,9 +109,10 @@ CameraState first_state(const CameraProblem& problem, std::span<const ImuSample>
       q = so3_exp(up.cross(Eigen::Vector3d::UnitZ()) * (dt / kLevelling_s)) * q;
       q.normalize();
     }
-    for (; sighting != problem.sightings().end() && sighting->stamp <= imu[i].stamp; ++sighting)
+    for (; sighting != problem.sightings().end() && sighting->stamp <= imu[i].stamp; ++sighting) {
       if (const auto u_C = direction_of(guess.lens, sighting->uv))
         toward[sighting->board] += q * (guess.q_C_B.conjugate() * *u_C);
+    }
     if (i != problem.sample_of(knot)) continue;
     state.knots.push_back({.q_W_B = q,
                            .v_W = Eigen::Vector3d::Zero(),
@@ -120,10 +121,11 @@ CameraState first_state(const CameraProblem& problem, std::span<const ImuSample>
                            .accel_bias = Eigen::Vector3d::Zero()});
     ++knot;
   }
-  for (const Eigen::Vector3d& direction : toward)
+  for (const Eigen::Vector3d& direction : toward) {
     state.constants.p_W.push_back(direction.norm() > 0.0
                                       ? Eigen::Vector3d(kBoardDistance_m * direction.normalized())
                                       : Eigen::Vector3d(kBoardDistance_m, 0.0, 0.0));
+  }
   return state;
 }
 

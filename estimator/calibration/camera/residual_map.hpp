@@ -26,7 +26,7 @@ struct ResidualMap {
   std::array<Cell, static_cast<std::size_t>(kColumns) * kRows> cells{};
 
   [[nodiscard]] const Cell& at(int row, int column) const {
-    return cells[static_cast<std::size_t>(row * kColumns + column)];
+    return cells[static_cast<std::size_t>(row) * kColumns + static_cast<std::size_t>(column)];
   }
 };
 

@@ -164,19 +164,22 @@ Turn gyro_turn(std::span<const ImuSample> imu, const HandEye& aligned) {
 std::vector<BoardSighting> sightings_of(const std::vector<FilmView>& views,
                                         const GridShape& shape) {
   std::vector<BoardSighting> sightings;
-  for (const FilmView& film : views)
-    for (const GridLed& led : film.view.leds)
+  for (const FilmView& film : views) {
+    for (const GridLed& led : film.view.leds) {
       sightings.push_back({.stamp = film.stamp,
                            .board = static_cast<std::size_t>(led.row * shape.columns + led.column),
                            .uv = led.uv});
+    }
+  }
   return sightings;
 }
 
 std::vector<std::string> names_of(const GridShape& shape) {
   std::vector<std::string> names;
-  for (int row = 0; row < shape.rows; ++row)
+  for (int row = 0; row < shape.rows; ++row) {
     for (int column = 0; column < shape.columns; ++column)
       names.push_back(fmt::format("the LED in row {}, column {}", row + 1, column + 1));
+  }
   return names;
 }
 
@@ -208,10 +211,12 @@ CameraState film_state(const CameraProblem& problem, std::span<const ImuSample> 
     knot.gyro_bias = gyro_bias;
   }
   state.constants.layout = BoardLayout::kRigid;
-  for (int row = 0; row < shape.rows; ++row)
-    for (int column = 0; column < shape.columns; ++column)
+  for (int row = 0; row < shape.rows; ++row) {
+    for (int column = 0; column < shape.columns; ++column) {
       state.constants.p_W.push_back(
           T_W_G * Eigen::Vector3d(shape.pitch_m * column, shape.pitch_m * row, 0.0));
+    }
+  }
   return state;
 }
 

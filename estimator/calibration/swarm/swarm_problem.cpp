@@ -60,9 +60,10 @@ BodyInstant instant_of(const BodyPlace<TimeJet>& place) {
     const int a = (i + 1) % 3;
     const int b = (i + 2) % 3;
     J.row(i).setZero();
-    for (int row = 0; row < 3; ++row)
+    for (int row = 0; row < 3; ++row) {
       J.row(i) +=
           0.5 * (R(row, b) * place.R_W_B(row, a).v - R(row, a) * place.R_W_B(row, b).v).transpose();
+    }
   }
   instant.J = J.leftCols<kInterval>();
   instant.rate = J.col(kInterval);
@@ -408,10 +409,11 @@ void SwarmProblem::visit(const SwarmState& state, Visitor& visitor) const {
       if (place->knot > k) return;
       const double common_s = state.robots[robot].common_s(stamp_s);
       const auto [other, measured] = [&] {
-        if constexpr (requires { readings[cursor].board; })
+        if constexpr (requires { readings[cursor].board; }) {
           return std::pair(readings[cursor].board, readings[cursor].uv);
-        else
+        } else {
           return std::pair(readings[cursor].other, readings[cursor].range_m);
+        }
       }();
       const auto other_place = place_of(other, state.robots[other].stamp_s(common_s));
       if (!other_place) continue;
@@ -460,9 +462,10 @@ void SwarmProblem::visit_priors(const SwarmState& state, const SwarmState& prior
       visitor.prior_of_constant(constants_at(r) + i, d(i) / sigma(i), 1.0 / sigma(i));
     const CameraKnot& first = state.knots[r].front();
     const auto add = [&](int column, const Eigen::Vector3d& error, double sigma_of_axis) {
-      for (int i = 0; i < 3; ++i)
+      for (int i = 0; i < 3; ++i) {
         visitor.prior_of_first(body_at(r) + column, Eigen::RowVector3d::Unit(i) / sigma_of_axis,
                                error[i] / sigma_of_axis);
+      }
     };
     add(9, first.gyro_bias, records_[r].noise.gyroscope_bias_sigma);
     add(12, first.accel_bias, records_[r].noise.accelerometer_bias_sigma);

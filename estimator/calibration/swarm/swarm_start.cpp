@@ -40,9 +40,10 @@ std::vector<CameraKnot> reference_knots(const SwarmProblem& problem, const Swarm
   for (std::size_t k = 0; k < knots.size(); ++k) {
     Eigen::Quaterniond& q = knots[k].q_W_B;
     const Timestamp now = problem.time_of(r, k);
-    if (k > 0)
+    if (k > 0) {
       q = knots[k - 1].q_W_B *
           gyro_rotation(problem.records()[r].imu, problem.time_of(r, k - 1), now);
+    }
     if (const EstimatedUp* up = nearest(start.up, now))
       q = shortest_rotation(q * up->up_B, Eigen::Vector3d::UnitZ()) * q;
     q.normalize();
@@ -112,9 +113,10 @@ SwarmState first_state(const SwarmProblem& problem, const std::vector<RobotConst
                    .pair_drift_m = {}};
   state.pair_drift_m.assign(problem.knots(), state.pair_bias_m);
   const std::vector<CameraKnot> reference = reference_knots(problem, start);
-  for (std::size_t r = 0; r < problem.robots(); ++r)
+  for (std::size_t r = 0; r < problem.robots(); ++r) {
     state.knots.push_back(r == start.reference ? reference
                                                : other_knots(problem, start, reference, r));
+  }
   turn_back(problem, state);
   return state;
 }

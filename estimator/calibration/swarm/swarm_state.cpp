@@ -90,9 +90,10 @@ SwarmState moved(const SwarmState& state, const TeamArrowSystem::Step& step) {
   for (std::size_t i = 0; i < next.pair_bias_m.size(); ++i)
     next.pair_bias_m[i] += step.constants(pairs_at + static_cast<Eigen::Index>(i));
   const auto drift_at = static_cast<Eigen::Index>(next.robots.size()) * ArrowSystem::kState;
-  for (std::size_t k = 0; k < next.pair_drift_m.size(); ++k)
+  for (std::size_t k = 0; k < next.pair_drift_m.size(); ++k) {
     for (std::size_t i = 0; i < next.pair_drift_m[k].size(); ++i)
       next.pair_drift_m[k][i] += step.states[k](drift_at + static_cast<Eigen::Index>(i));
+  }
   return next;
 }
 
