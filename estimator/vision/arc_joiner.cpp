@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/vision/square_outline.hpp"
+
 namespace crepes {
 namespace {
 
@@ -20,12 +22,15 @@ constexpr double kLongArcArea = 4.0;    // the same where there is nothing but a
 constexpr double kArcElongation = 1.4;  // of an arc, where there is nothing but arcs
 constexpr double kArcMiddle = 0.9;  // of the radius: an arc's; that of a streak is on the ellipse
 constexpr double kMinArcRoundness = 0.28;
-constexpr double kOffEllipse = 1.0;    // px beside half an LED
-constexpr double kLeastCovered = 0.6;  // of the ellipse's length
-constexpr double kArcsCovered = 0.75;  // the same where there is nothing but arcs
-constexpr double kLeastHole = 2.0;     // px
-constexpr double kHole = 0.4;          // of the radius: the lens
-constexpr int kParts = 48;             // of the ellipse
+constexpr double kOffEllipse = 1.0;        // px beside half an LED
+constexpr double kLeastCovered = 0.6;      // of the ellipse's length
+constexpr double kArcsCovered = 0.75;      // the same where there is nothing but arcs
+constexpr double kLeastHole = 2.0;         // px
+constexpr double kHole = 0.4;              // of the radius: the lens
+constexpr std::size_t kLeastOfSquare = 4;  // blobs: two edges, and LEDs on both others
+constexpr double kEdgeArea = 2.5;          // of an LED's: three that touch
+constexpr double kEdgeElongation = 2.0;    // of them
+constexpr int kParts = 48;                 // of the ellipse
 
 /// Nearly the distance of `uv` from the ellipse [px].
 double distance_from(const RingView& view, const Eigen::Matrix2d& to_place,
@@ -73,13 +78,30 @@ ArcJoiner::ArcJoiner() {
   rings_.reserve(kUsualArcs);
 }
 
+std::span<const JoinedArcs> ArcJoiner::join_squares(std::span<const Blob> blobs,
+                                                    std::span<const std::uint32_t> open,
+                                                    const BlobFinder& finder) {
+  rings_.clear();
+  is_taken_.assign(blobs.size(), 0);
+  for (const std::uint32_t edge : open) {
+    if (is_taken_[edge] != 0 || blobs[edge].area < kEdgeArea * kLeastLed ||
+        blobs[edge].elongation() < kEdgeElongation || !gather(edge, blobs, open) ||
+        !is_square(blobs, finder))
+      continue;
+    for (const std::uint32_t i : ring_.members()) is_taken_[i] = 1;
+    rings_.push_back(ring_);
+  }
+  return rings_;
+}
+
 std::span<const JoinedArcs> ArcJoiner::join(std::span<const Blob> blobs,
                                             std::span<const std::uint32_t> open,
                                             const BlobFinder& finder) {
   rings_.clear();
   is_taken_.assign(blobs.size(), 0);
   for (const std::uint32_t arc : open) {
-    if (is_taken_[arc] != 0 || !gather(arc, blobs, open) || !is_ring(blobs, finder)) continue;
+    if (is_taken_[arc] != 0 || !gather(arc, blobs, open)) continue;
+    if (!is_ring(blobs, finder) && !is_square(blobs, finder)) continue;
     for (const std::uint32_t i : ring_.members()) is_taken_[i] = 1;
     rings_.push_back(ring_);
   }
@@ -164,6 +186,31 @@ bool ArcJoiner::is_ring(std::span<const Blob> blobs, const BlobFinder& finder) {
     return distance_from(*view, to_place, uv) <= 0.5 * width + kOffEllipse;
   });
   return are_near && length.lit >= (has_led_ ? kLeastCovered : kArcsCovered) * length.whole;
+}
+
+/// The blobs are all those that were gathered: a square's lens is not among them.
+bool ArcJoiner::is_square(std::span<const Blob> blobs, const BlobFinder& finder) {
+  if (!has_led_ || ring_.count < kLeastOfSquare) return false;
+  pixels_.clear();
+  std::int32_t led = blobs[ring_.blobs[0]].area;
+  for (const std::uint32_t i : ring_.members()) {
+    finder.visit(i, blobs[i].box, [&](int u, int v) { pixels_.emplace_back(u, v); });
+    led = std::min(led, blobs[i].area);
+  }
+  const auto ellipse = fit_ellipse(pixels_);
+  if (!ellipse || ellipse->roundness() < 0.5 * kMinArcRoundness) return false;
+  const auto outline = fit_square(pixels_, *ellipse);
+  if (!outline) return false;
+  ring_.view = outline->view();
+  const double width = std::sqrt(4.0 * led / std::numbers::pi);
+  const double radius = ring_.view.radius();
+  if (ring_.view.roundness() < kMinArcRoundness || 2.0 * radius > kMaxRingSide ||
+      2.0 * std::min(outline->pairs[0].half, outline->pairs[1].half) < width + kLeastHole)
+    return false;
+  const bool are_near = std::all_of(pixels_.begin(), pixels_.end(), [&](const Eigen::Vector2d& uv) {
+    return outline->distance_from(uv) <= 0.5 * width + kOffEllipse;
+  });
+  return are_near && share_covered(*outline, pixels_) >= kLeastCovered;
 }
 
 /// Least squares of  x^2 + y^2 + a (x^2 - y^2) + b 2 x y + d x + e y + f,  which has the same

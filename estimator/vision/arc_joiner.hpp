@@ -14,7 +14,7 @@
 
 namespace crepes {
 
-/// Blobs on one ellipse.
+/// Blobs on one ellipse, or on the outline of a square.
 struct JoinedArcs {
   RingView view{};
   std::array<std::uint32_t, kMaxRingLeds> blobs{};
@@ -30,12 +30,19 @@ struct JoinedArcs {
 ///
 /// A ring needs a single LED, which shows how wide an arc is, and at least one arc; or arcs only,
 /// whose width is their area divided by the length that they cover. Most of the ellipse must be
-/// lit, and its inside dark.
+/// lit, and its inside dark. What lies on no ellipse may lie on a parallelogram: a square board
+/// whose LEDs touch along two edges. It needs a single LED.
 class ArcJoiner {
  public:
   ArcJoiner();
 
-  /// Valid until the next call. `open` are places in `blobs`, which `finder` found, by first row.
+  /// Squares with an edge along which LEDs touch: no other board looks like that, while the single
+  /// LEDs among them may look like parts of one. Valid until the next call. `open` are places in
+  /// `blobs`, which `finder` found, by first row.
+  [[nodiscard]] std::span<const JoinedArcs> join_squares(std::span<const Blob> blobs,
+                                                         std::span<const std::uint32_t> open,
+                                                         const BlobFinder& finder);
+  /// The same for all others.
   [[nodiscard]] std::span<const JoinedArcs> join(std::span<const Blob> blobs,
                                                  std::span<const std::uint32_t> open,
                                                  const BlobFinder& finder);
@@ -44,6 +51,7 @@ class ArcJoiner {
   [[nodiscard]] bool gather(std::uint32_t arc, std::span<const Blob> blobs,
                             std::span<const std::uint32_t> open);
   [[nodiscard]] bool is_ring(std::span<const Blob> blobs, const BlobFinder& finder);
+  [[nodiscard]] bool is_square(std::span<const Blob> blobs, const BlobFinder& finder);
 
   JoinedArcs ring_;
   bool has_led_ = false;  ///< a member that may be a single LED

@@ -167,12 +167,15 @@ bool SpotDetector::search(const GrayImage& image, const Background& level, doubl
   suspect_specks();
   find_faint(image, level, rejected);
   sort_out(image, threshold, contrast, rejected);
-  find_lights(image, threshold);
-  for (const Ring& ring : ring_finder_.find(lights_, image, threshold))
-    if (!is_whole_blob(ring)) take_ring(image, threshold, ring);
   const auto close = [&] {
     std::erase_if(open_, [&](std::uint32_t i) { return is_open_[i] == 0; });
   };
+  for (const JoinedArcs& square : arc_joiner_.join_squares(blobs_, open_, finder_))
+    take_arcs(image, threshold, square);
+  close();
+  find_lights(image, threshold);
+  for (const Ring& ring : ring_finder_.find(lights_, image, threshold))
+    if (!is_whole_blob(ring)) take_ring(image, threshold, ring);
   close();
   for (const JoinedArcs& arcs : arc_joiner_.join(blobs_, open_, finder_))
     take_arcs(image, threshold, arcs);
@@ -192,9 +195,10 @@ bool SpotDetector::search(const GrayImage& image, const Background& level, doubl
 
 /// Pixels of a few may be hot.
 void SpotDetector::suspect_specks() {
-  for (std::size_t i = 0; i < blobs_.size() && hot_pixels_.has_room(); ++i)
+  for (std::size_t i = 0; i < blobs_.size() && hot_pixels_.has_room(); ++i) {
     if (blobs_[i].area <= kMaxHot)
       finder_.visit(i, blobs_[i].box, [&](int u, int v) { hot_pixels_.suspect(u, v); });
+  }
 }
 
 void SpotDetector::measure_open(const GrayImage& image, int threshold) {
@@ -221,10 +225,12 @@ std::optional<Spot> SpotDetector::measure_mended(const GrayImage& image, const P
   patch_.clear();
   for (int v = around.v_min; v <= around.v_max; ++v)
     patch_.insert(patch_.end(), image.row(v) + around.u_min, image.row(v) + around.u_max + 1);
-  for (const MendedPixel& pixel : hot_pixels_.in_rows_of(around))
-    if (around.u_min <= pixel.u && pixel.u <= around.u_max)
+  for (const MendedPixel& pixel : hot_pixels_.in_rows_of(around)) {
+    if (around.u_min <= pixel.u && pixel.u <= around.u_max) {
       patch_[static_cast<std::size_t>((pixel.v - around.v_min) * around.width() + pixel.u -
                                       around.u_min)] = pixel.level;
+    }
+  }
   const GrayImage patch{patch_.data(), around.width(), around.height(), around.width()};
   const PixelBox inside{box.u_min - around.u_min, box.v_min - around.v_min,
                         box.u_max - around.u_min, box.v_max - around.v_min};

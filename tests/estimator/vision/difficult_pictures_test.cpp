@@ -47,6 +47,24 @@ INSTANTIATE_TEST_SUITE_P(
                     Row{"crossing boards", 80.0, 2.4}, Row{"propeller", 90.0, 2.0},
                     Row{"rolling shutter, 150 deg/s", 94.0}));
 
+// Aslant, the LEDs along two edges touch, and those along the others do not.
+TEST(Rings, OfSquareBoardsAreOneSpot) {
+  RingScore sum;
+  for (const int leds : {12, 16}) {
+    const RingScore score = score_rings({.leds = {leds},
+                                         .radii_m = {0.01, 0.02, 0.03, 0.045, 0.06},
+                                         .is_square = true,
+                                         .pictures = 150,
+                                         .seed = 42});
+    sum.pictures += score.pictures;
+    sum.one_spot += score.one_spot;
+    sum.centered += score.centered;
+  }
+
+  EXPECT_GE(sum.one_spot, 0.98 * sum.pictures);
+  EXPECT_GE(sum.centered, 0.97 * sum.pictures);
+}
+
 // At this distance twelve LEDs touch, and brighter and darker ones leave two halves.
 TEST(Rings, ThatFallIntoArcsAreOneSpot) {
   const RingScore score = score_rings({.leds = {12},
