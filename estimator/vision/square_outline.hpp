@@ -13,6 +13,7 @@ namespace crepes {
 /// A parallelogram, which is what a square is from afar: two pairs of parallel edges, on which
 /// | normal . uv - middle | = half  for one pair, and not more for the other.
 struct SquareOutline {
+  /// Two edges that are parallel.
   struct Edges {
     Eigen::Vector2d normal = Eigen::Vector2d::UnitX();  ///< of length 1
     double middle = 0.0;                                ///< [px]
