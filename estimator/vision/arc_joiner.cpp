@@ -78,34 +78,35 @@ ArcJoiner::ArcJoiner() {
   rings_.reserve(kUsualArcs);
 }
 
-std::span<const JoinedArcs> ArcJoiner::join_squares(std::span<const Blob> blobs,
-                                                    std::span<const std::uint32_t> open,
-                                                    const BlobFinder& finder) {
+template <class IsBoard>
+std::span<const JoinedArcs> ArcJoiner::join_where(std::span<const std::uint32_t> open,
+                                                  std::size_t blobs, const IsBoard& is_board) {
   rings_.clear();
-  is_taken_.assign(blobs.size(), 0);
-  for (const std::uint32_t edge : open) {
-    if (is_taken_[edge] != 0 || blobs[edge].area < kEdgeArea * kLeastLed ||
-        blobs[edge].elongation() < kEdgeElongation || !gather(edge, blobs, open) ||
-        !is_square(blobs, finder))
-      continue;
+  is_taken_.assign(blobs, 0);
+  for (const std::uint32_t first : open) {
+    if (is_taken_[first] != 0 || !is_board(first)) continue;
     for (const std::uint32_t i : ring_.members()) is_taken_[i] = 1;
     rings_.push_back(ring_);
   }
   return rings_;
 }
 
+std::span<const JoinedArcs> ArcJoiner::join_squares(std::span<const Blob> blobs,
+                                                    std::span<const std::uint32_t> open,
+                                                    const BlobFinder& finder) {
+  return join_where(open, blobs.size(), [&](std::uint32_t edge) {
+    return blobs[edge].area >= kEdgeArea * kLeastLed &&
+           blobs[edge].elongation() >= kEdgeElongation && gather(edge, blobs, open) &&
+           is_square(blobs, finder);
+  });
+}
+
 std::span<const JoinedArcs> ArcJoiner::join(std::span<const Blob> blobs,
                                             std::span<const std::uint32_t> open,
                                             const BlobFinder& finder) {
-  rings_.clear();
-  is_taken_.assign(blobs.size(), 0);
-  for (const std::uint32_t arc : open) {
-    if (is_taken_[arc] != 0 || !gather(arc, blobs, open)) continue;
-    if (!is_ring(blobs, finder) && !is_square(blobs, finder)) continue;
-    for (const std::uint32_t i : ring_.members()) is_taken_[i] = 1;
-    rings_.push_back(ring_);
-  }
-  return rings_;
+  return join_where(open, blobs.size(), [&](std::uint32_t arc) {
+    return gather(arc, blobs, open) && (is_ring(blobs, finder) || is_square(blobs, finder));
+  });
 }
 
 /// Whether the blob, which may be an arc, has neighbors that may be its ring's.

@@ -48,6 +48,9 @@ class ArcJoiner {
                                                  const BlobFinder& finder);
 
  private:
+  template <class IsBoard>
+  [[nodiscard]] std::span<const JoinedArcs> join_where(std::span<const std::uint32_t> open,
+                                                       std::size_t blobs, const IsBoard& is_board);
   [[nodiscard]] bool gather(std::uint32_t arc, std::span<const Blob> blobs,
                             std::span<const std::uint32_t> open);
   [[nodiscard]] bool is_ring(std::span<const Blob> blobs, const BlobFinder& finder);
