@@ -63,7 +63,8 @@ Result<std::optional<GridBody>> read_body(const fs::path& source, DatasetFaults&
   const auto config = load_config(file);
   if (!config) return tl::unexpected(config.error());
   body.noise = config->imu.noise;
-  body.p_B_C = config->cameras.front().calibration.T_cam_imu.inverse().p;
+  if (!config->cameras.empty())
+    body.p_B_C = config->cameras.front().calibration.T_cam_imu.inverse().p;
   return body;
 }
 

@@ -44,8 +44,8 @@ struct SwarmResiduals {
 
 /// Knots of all robots every 0.02 s, farther apart for more than four robots. A reading between two
 /// knots sees each robot where its IMU carried it since the earlier one. The bias of a pair's
-/// ranges is that of both modules and a constant of its own; what drifts on top is no white noise,
-/// and readings within twice `bias_time_s` share one draw of it.
+/// ranges is that of both modules, a constant of its own, and a drift: a first-order Gauss-Markov
+/// process from knot to knot.
 class SwarmProblem {
  public:
   /// Readings outside [from, to] are left out.
