@@ -2,7 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -13,13 +13,18 @@
 #include "estimator/core/imu_history.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/outputs.hpp"
-#include "estimator/vision/assignment.hpp"
 #include "estimator/vision/camera_model.hpp"
+#include "estimator/vision/decoding/blink_evidence.hpp"
+#include "estimator/vision/decoding/phase_memory.hpp"
 #include "estimator/vision/expected_board.hpp"
 #include "estimator/vision/hidden_lights.hpp"
 #include "estimator/vision/id_decoder.hpp"
 #include "estimator/vision/id_library.hpp"
-#include "estimator/vision/light_direction.hpp"
+#include "estimator/vision/tracking/camera_view.hpp"
+#include "estimator/vision/tracking/expected_light.hpp"
+#include "estimator/vision/tracking/light_sighting.hpp"
+#include "estimator/vision/tracking/light_track.hpp"
+#include "estimator/vision/tracking/track_pairing.hpp"
 #include "estimator/vision/vision_config.hpp"
 
 namespace crepes {
@@ -62,74 +67,40 @@ class BlinkTracker {
   [[nodiscard]] TrackerStatus status() const;
 
  private:
-  /// A spot as a direction.
-  struct Sighting {
-    Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
-    double radius_rad = 0.0;  ///< of the blob
-    double px_rad = 0.0;      ///< what a pixel subtends here
-    double peak = 0.0;        ///< gray levels
-    Timestamp exposed{};      ///< middle of its row's exposure, body time
-  };
-  struct Track {
-    LightDirection light;
-    Eigen::Vector3d seen_B = Eigen::Vector3d::UnitX();   ///< where it was last, turned since
-    Eigen::Vector3d steady_B = Eigen::Vector3d::Zero();  ///< its rate over some 50 ms, less noisy
-    Timestamp exposed{};                                 ///< of its row in the frame at hand
-    Sighting seen;                                       ///< the latest
-    Timestamp last_seen{};
-    Duration unseen{};          ///< in frames since; those that were lost do not count
-    bool is_ambiguous = false;  ///< since then it may have been in a spot with another
-    int hits = 0;
-    BlinkEvidence evidence;
-    std::vector<Bearing> predicted;  ///< until its blinking is read
-  };
-  /// The sighting of each track, for those that have one.
-  using Pairing = std::vector<std::optional<std::size_t>>;
-
-  void unproject(const SpotFrame& frame, Timestamp stamp);
-  [[nodiscard]] Timestamp exposure_of(double v_px, Timestamp stamp) const;
-  [[nodiscard]] Timestamp exposure_of(const Track& track, Timestamp stamp) const;
-  void predict(Timestamp stamp);
-  [[nodiscard]] bool is_in_sight(std::size_t code) const;
   void expect(std::span<const ExpectedBoard> boards, Timestamp stamp);
-  [[nodiscard]] const ExpectedLight* expected_of(const Track& track) const;
-  [[nodiscard]] bool is_alone(const Sighting& sighting, const Eigen::Vector3d& u_B,
+  [[nodiscard]] bool is_in_sight(std::size_t code) const;
+  void predict(Timestamp stamp);
+  [[nodiscard]] const ExpectedLight* expected_of(const LightTrack& track) const;
+  void mark_known(const TrackPairing::Pairs& sighting_of);
+  void observe_seen(const TrackPairing::Pairs& sighting_of, Timestamp stamp,
+                    std::vector<Bearing>& bearings);
+  void observe(LightTrack& track, const LightSighting& sighting, Timestamp stamp);
+  [[nodiscard]] bool is_alone(const LightSighting& sighting, const Eigen::Vector3d& u_B,
                               double reach_rad) const;
-  void name(Track& track, Timestamp stamp, std::vector<Bearing>& bearings);
-  [[nodiscard]] double gate_of(const Track& track) const;
-  [[nodiscard]] const Pairing& assign();
-  [[nodiscard]] bool is_established(const Track& track) const;
-  [[nodiscard]] bool hides_another(std::size_t track, const Pairing& sighting_of) const;
-  [[nodiscard]] bool is_hidden(const Track& track) const;
-  void observe(Track& track, const Sighting& sighting, Timestamp stamp);
-  [[nodiscard]] bool is_another(const Track& track, const Sighting& sighting,
-                                Timestamp stamp) const;
-  void observe_absence(Track& track) const;
+  void name(LightTrack& track, Timestamp stamp, std::vector<Bearing>& bearings);
+  void settle_predicted(LightTrack& track, std::optional<RobotId> read);
+  void observe_unseen(const TrackPairing::Pairs& sighting_of, Duration looked);
+  [[nodiscard]] bool is_hidden(const LightTrack& track) const;
   void retire(Timestamp stamp);
-  void keep_or_forget(Track& track);
-  void begin(const Sighting& sighting, Timestamp stamp, std::vector<Bearing>& bearings);
-  void resume(Track& track, const Sighting& sighting, Timestamp stamp);
+  void keep_or_forget(LightTrack& track);
+  void begin(const LightSighting& sighting, Timestamp stamp, std::vector<Bearing>& bearings);
+  void resume(LightTrack& track, const LightSighting& sighting, Timestamp stamp);
 
   VisionConfig config_;
-  CameraModel model_;
-  Pose T_B_C_;
-  Pose T_C_B_;
-  Duration timeshift_{};
+  CameraView view_;
   Duration timeout_{};
-  Duration period_{};         ///< of frames
-  double row_delay_s_ = 0.0;  ///< of a rolling shutter
+  Duration period_{};  ///< of frames
   IdDecoder decoder_;
   ImuHistory imu_;
   PhaseMemory phases_;
-  std::vector<Track> tracks_;
+  std::vector<LightTrack> tracks_;
   HiddenLights hidden_;
   std::optional<Timestamp> now_;
   TrackerStatus counts_;
 
   // Of the frame at hand; kept for their memory.
-  Assignment assignment_;
-  std::vector<PairBenefit> pairs_;
-  std::vector<Sighting> sightings_;
+  TrackPairing pairing_;
+  std::vector<LightSighting> sightings_;
   std::vector<bool> is_taken_;  ///< sightings that have a track
   std::vector<bool> is_known_;  ///< sightings of tracks with an ID
   std::vector<ExpectedLight> expected_;

@@ -27,6 +27,12 @@ struct PixelBox {
 
   [[nodiscard]] int width() const { return u_max - u_min + 1; }
   [[nodiscard]] int height() const { return v_max - v_min + 1; }
+  [[nodiscard]] int longer_side() const { return std::max(width(), height()); }
+  [[nodiscard]] int shorter_side() const { return std::min(width(), height()); }
+  /// Larger by `by` pixels on each side; it may leave the image.
+  [[nodiscard]] PixelBox grown(int by) const {
+    return {u_min - by, v_min - by, u_max + by, v_max + by};
+  }
   [[nodiscard]] bool overlaps(const PixelBox& other) const;
   void include(const PixelBox& other);
 };

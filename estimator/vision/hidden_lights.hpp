@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "estimator/core/time.hpp"
-#include "estimator/vision/id_decoder.hpp"
+#include "estimator/vision/decoding/blink_evidence.hpp"
+#include "estimator/vision/tracking/expected_light.hpp"
 
 namespace crepes {
 
@@ -19,14 +20,6 @@ struct HiddenLight {
   Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();  ///< du/dt that own rotation leaves [1/s]
   Timestamp last_seen{};
   BlinkEvidence evidence;
-};
-
-/// Where a board is, by the pose of its robot, with the phase in which it was blinking.
-struct ExpectedLight {
-  CodeMatch match;
-  Timestamp phase_learned{};
-  Eigen::Vector3d u_B = Eigen::Vector3d::UnitX();
-  double sigma_rad = 0.0;
 };
 
 /// Predicts the directions of hidden lights for a few seconds, by the gyro and their own motion. A

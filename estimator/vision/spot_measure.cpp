@@ -88,6 +88,12 @@ int count_from(const GrayImage& image, const PixelBox& box, double level) {
 
 }  // namespace
 
+PixelBox pixel_of(const Spot& spot) {
+  const auto u = static_cast<int>(std::lround(spot.u_px));
+  const auto v = static_cast<int>(std::lround(spot.v_px));
+  return {u, v, u, v};
+}
+
 Surroundings surroundings_of(const GrayImage& image, const PixelBox& box, int threshold) {
   Surroundings around;
   for (int distance = 1; distance <= kMargin; ++distance) {

@@ -14,6 +14,9 @@ struct Surroundings {
   bool is_known = false;    ///< false when there is nothing but other blobs
 };
 
+/// The pixel in which the center is.
+[[nodiscard]] PixelBox pixel_of(const Spot& spot);
+
 [[nodiscard]] Surroundings surroundings_of(const GrayImage& image, const PixelBox& box,
                                            int threshold);
 

@@ -1,4 +1,4 @@
-#include "estimator/vision/blink_window.hpp"
+#include "estimator/vision/decoding/blink_window.hpp"
 
 #include <cmath>
 #include <numbers>

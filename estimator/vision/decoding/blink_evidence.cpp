@@ -1,0 +1,22 @@
+#include "estimator/vision/decoding/blink_evidence.hpp"
+
+namespace crepes {
+
+void BlinkEvidence::forget() {
+  window.clear();
+  pending_dark.clear();
+  score.clear();
+  last_lit.reset();
+  assigned.reset();
+  confidence = 0.0;
+  doubt = 0.0;
+  obstructed_doubt = 0.0;
+  dark_runs = 0.0;
+  is_obstructed = false;
+  earlier_markov = 0.0;
+  expected.reset();
+  foretold = 0.0;
+  predictable_until.reset();
+}
+
+}  // namespace crepes

@@ -1,0 +1,63 @@
+#include "estimator/vision/tracking/camera_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace crepes {
+
+CameraView::CameraView(const CameraCalibration& camera, CameraModel model)
+    : model_(std::move(model)),
+      T_B_C_(camera.T_cam_imu.inverse()),
+      T_C_B_(camera.T_cam_imu),
+      timeshift_(from_seconds(camera.timeshift_cam_imu)),
+      row_delay_s_(1e-6 * camera.rolling_shutter_us_per_row) {}
+
+/// The middle of the exposure of a row. The stamp is that of the middle row.
+Timestamp CameraView::row_exposure(double v_px, Timestamp stamp) const {
+  return stamp + from_seconds(row_delay_s_ * (v_px - 0.5 * (model_.height() - 1)));
+}
+
+std::optional<Eigen::Vector2d> CameraView::pixel_of(const Eigen::Vector3d& u_B) const {
+  const auto uv = model_.project(T_C_B_.q * u_B);
+  return uv && model_.contains(*uv) ? uv : std::nullopt;
+}
+
+Timestamp CameraView::exposure_of(const Eigen::Vector3d& u_B, Timestamp stamp) const {
+  if (row_delay_s_ == 0.0) return stamp;
+  const auto uv = pixel_of(u_B);
+  return uv ? row_exposure(uv->y(), stamp) : stamp;
+}
+
+/// u = R_B(stamp)_B(exposed) u_B(exposed).
+std::size_t CameraView::unproject(const SpotFrame& frame, Timestamp stamp, const ImuHistory& imu,
+                                  std::size_t most, std::vector<LightSighting>& sightings) const {
+  std::size_t refused = 0;
+  sightings.clear();
+  for (const Spot& spot : frame.spots) {
+    CameraModel::UnprojectionJacobian J;
+    const auto u_C = model_.unproject({spot.u_px, spot.v_px}, &J);
+    if (!u_C || !(spot.area_px2 >= 0.0) || !std::isfinite(spot.area_px2) ||
+        sightings.size() >= most) {
+      ++refused;
+      continue;
+    }
+    const double px_rad = std::sqrt(0.5 * J.squaredNorm());
+    sightings.push_back({.u_B = T_B_C_.q * *u_C,
+                         .radius_rad = std::sqrt(spot.area_px2 / std::numbers::pi) * px_rad,
+                         .px_rad = px_rad,
+                         .peak = spot.peak,
+                         .exposed = row_exposure(spot.v_px, stamp)});
+    LightSighting& sighting = sightings.back();
+    if (row_delay_s_ != 0.0 && !imu.empty())
+      sighting.u_B = imu.rotation(stamp, sighting.exposed) * sighting.u_B;
+  }
+  // Not the order of the file but of the world: ties are broken alike for every order of spots.
+  std::sort(sightings.begin(), sightings.end(), [](const LightSighting& a, const LightSighting& b) {
+    return std::lexicographical_compare(a.u_B.begin(), a.u_B.end(), b.u_B.begin(), b.u_B.end());
+  });
+  return refused;
+}
+
+}  // namespace crepes
