@@ -10,6 +10,8 @@
 
 #include "estimator/core/quantile.hpp"
 #include "estimator/core/so3.hpp"
+#include "estimator/team/reading_scene.hpp"
+#include "estimator/team/team_measurement.hpp"
 
 namespace crepes {
 namespace {
@@ -141,13 +143,8 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   const double t2_s = second.time_s(interval.from);
   if (t2_s - t1_s < kLeastTime) return std::nullopt;
 
-  const TeamPair pair{belief.robots.at(sight.observer),
-                      belief.robots.at(sight.neighbor),
-                      *interval.member(sight.observer),
-                      *interval.member(sight.neighbor),
-                      paths.at(sight.observer),
-                      paths.at(sight.neighbor),
-                      instant.states()};
+  const ReadingScene scene{interval, paths, instant, belief};
+  const TeamPair pair = scene.pair(sight.observer, sight.neighbor);
   const TeamCamera& camera = pair.observer.cameras[sight.camera];
   const auto before = SightModel::at(pair, camera, t1_s, sight.sigma_rad());
   const auto after = SightModel::at(pair, camera, t2_s, sight.sigma_rad());

@@ -9,7 +9,7 @@
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
-#include "estimator/team/motion_image.hpp"
+#include "estimator/team/frame_change.hpp"
 
 namespace crepes {
 namespace {
@@ -31,78 +31,6 @@ double turn_rate(const TeamMember& member) {
   double sum = 0.0;
   for (const ImuMean& mean : member.imu) sum += mean.gyro_radps.norm();
   return sum / static_cast<double>(std::max<std::size_t>(1, member.imu.size()));
-}
-
-/// How a robot's errors at the next keyframe follow from those at the last one.
-struct Moved {
-  int index = 0;
-  MotionImage image{};
-  Eigen::Matrix<double, kMotion, kMotion> by_self{};  ///< by this robot's motion at the end
-  Eigen::Matrix<double, kMotion, kMotion> noise{};
-};
-
-/// With S this robot at the end of the interval, the new frame's motions are
-///   p' = R_S^T (p - p_S + tau v_S),  v' = R_S^T (v - v_S),  R' = R_S^T R,
-/// because the robot is there tau before the new frame begins, and their errors
-///   dp' = R_S^T (dp - dp_S + tau dv_S + v_S dtau) + [p']x dtheta_S,
-///   dv' = R_S^T (dv - dv_S) + [v']x dtheta_S,  dtheta' = dtheta - R'^T dtheta_S.
-/// `robot` receives the new motion.
-Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, int self_bias, TeamRobot& robot) {
-  const Eigen::Matrix3d R_S_F = self.motion.R().transpose();
-  FreeMotion& next = robot.motion;
-  next.p_F = R_S_F * (end.motion.p_F - self.motion.p_F + robot.clock_s * self.motion.v_F);
-  next.v_F = R_S_F * (end.motion.v_F - self.motion.v_F);
-  next.q_F_B = (self.motion.q_F_B.conjugate() * end.motion.q_F_B).normalized();
-  Moved moved{.index = robot.motion_index};
-  moved.by_self.setZero();
-  moved.by_self.block<3, 3>(0, 0) = -R_S_F;
-  moved.by_self.block<3, 3>(0, 3) = robot.clock_s * R_S_F;
-  moved.by_self.block<3, 3>(3, 3) = -R_S_F;
-  moved.by_self.block<3, 3>(0, 6) = hat(next.p_F);
-  moved.by_self.block<3, 3>(3, 6) = hat(next.v_F);
-  moved.by_self.block<3, 3>(6, 6) = -next.R().transpose();
-  Eigen::Matrix<double, kMotion, kMotion> turn =
-      Eigen::Matrix<double, kMotion, kMotion>::Identity();
-  turn.block<3, 3>(0, 0) = R_S_F;
-  turn.block<3, 3>(3, 3) = R_S_F;
-  Eigen::Matrix<double, kMotion, 1> by_clock = Eigen::Matrix<double, kMotion, 1>::Zero();
-  by_clock.head<3>() = R_S_F * self.motion.v_F;
-  moved.image.parts = {{robot.motion_index, turn.lazyProduct(end.by_start.leftCols<kMotion>())},
-                       {robot.bias_index, turn.lazyProduct(end.by_start.rightCols<kBias>())},
-                       {self_bias, moved.by_self.lazyProduct(self.by_start.rightCols<kBias>())},
-                       {robot.clock_index(), by_clock}};
-  const Eigen::Matrix<double, kMotion, kMotion> turned = turn.lazyProduct(end.noise);
-  moved.noise = turned.lazyProduct(turn.transpose());
-  return moved;
-}
-
-/// The covariance at the next keyframe. `self_noise` is what this robot's IMU has added.
-void carry(const std::vector<Moved>& all, const Eigen::Matrix<double, kMotion, kMotion>& self_noise,
-           Eigen::MatrixXd& P) {
-  std::vector<MotionImage> images;
-  images.reserve(all.size());
-  for (const Moved& m : all) images.push_back(m.image);
-  const Eigen::MatrixXd with_all = covariance_with(images, P);
-  const Eigen::MatrixXd own = covariance_with(images, with_all.transpose());
-  const auto first = [](std::size_t i) { return kMotion * static_cast<Eigen::Index>(i); };
-  for (std::size_t a = 0; a < all.size(); ++a) {
-    P.middleCols<kMotion>(all[a].index) = with_all.middleCols<kMotion>(first(a));
-    P.middleRows<kMotion>(all[a].index) = with_all.middleCols<kMotion>(first(a)).transpose();
-  }
-  for (std::size_t a = 0; a < all.size(); ++a) {
-    const Eigen::Matrix<double, kMotion, kMotion> of_self = all[a].by_self.lazyProduct(self_noise);
-    for (std::size_t b = 0; b <= a; ++b) {
-      Eigen::Matrix<double, kMotion, kMotion> block =
-          own.block<kMotion, kMotion>(first(a), first(b));
-      block += of_self.lazyProduct(all[b].by_self.transpose());
-      if (a == b) {
-        block += all[a].noise;
-        block = (0.5 * (block + block.transpose())).eval();
-      }
-      P.block<kMotion, kMotion>(all[b].index, all[a].index) = block.transpose();
-      P.block<kMotion, kMotion>(all[a].index, all[b].index) = block;
-    }
-  }
 }
 
 }  // namespace
@@ -256,57 +184,6 @@ GaussianPose TeamBelief::pose(RobotId id) const {
   return result;
 }
 
-TeamPose TeamBelief::team_pose(RobotId id, const TeamMember& member) const {
-  const TeamRobot& robot = robots.at(id);
-  const double tau = robot.clock_s;
-  const ImuMean& last = member.imu.back();
-  const Eigen::Vector3d rate = last.gyro_radps - robot.bias.gyro_radps;
-  const Eigen::Vector3d w = rate - robot.bias.gyro_scale * rate;
-  const Eigen::Vector3d a = robot.motion.q_F_B * (last.accel_mps2 - robot.bias.accel_mps2);
-  const Eigen::Vector3d v = robot.motion.v_F + tau * a;
-
-  // Of [motion, biases of this robot and of the other], by the states and the clock.
-  constexpr int kBiases = TeamPose::kBiases;
-  using Matrix9d = Eigen::Matrix<double, kMotion, kMotion>;
-  Matrix9d by_motion = Matrix9d::Identity();
-  by_motion.block<3, 3>(0, 3).diagonal().setConstant(tau);
-  by_motion.block<3, 3>(6, 6) = so3_exp(-tau * w).toRotationMatrix();
-  Eigen::Matrix<double, kMotion, 1> by_clock;
-  by_clock << v, a, w;
-  const int motion = robot.motion_index;
-  const int clock = robot.clock_index();
-  const std::array<int, 2> biases{robots.at(self).bias_index, robot.bias_index};
-  const auto of_biases = [&](Eigen::Index row) {
-    Eigen::Matrix<double, 1, kBiases> covariance;
-    covariance << P.block<1, 6>(row, biases[0]), P.block<1, 6>(row, biases[1]);
-    return covariance;
-  };
-  const Eigen::Matrix<double, kMotion, 1> with_clock =
-      by_motion * P.block<kMotion, 1>(motion, clock);
-  const Matrix9d carried = by_motion.lazyProduct(P.block<kMotion, kMotion>(motion, motion));
-  Matrix9d of_motion = carried.lazyProduct(by_motion.transpose());
-  of_motion += with_clock * by_clock.transpose() + by_clock * with_clock.transpose() +
-               P(clock, clock) * by_clock * by_clock.transpose();
-  Eigen::Matrix<double, kMotion, kBiases> with_biases;
-  for (int i = 0; i < kMotion; ++i) with_biases.row(i) = of_biases(motion + i);
-  with_biases = (by_motion * with_biases + by_clock * of_biases(clock)).eval();
-
-  TeamPose pose{.neighbor = id,
-                .T_B_N = {robot.motion.p_F + tau * robot.motion.v_F + 0.5 * tau * tau * a,
-                          (robot.motion.q_F_B * so3_exp(tau * w)).normalized()},
-                .v_B_N = v,
-                .last_sighting = std::max(robot.last_sighting, robot.last_fix),
-                .clock_ahead = from_seconds(tau)};
-  pose.covariance.topLeftCorner<kMotion, kMotion>() = 0.5 * (of_motion + of_motion.transpose());
-  pose.covariance.topRightCorner<kMotion, kBiases>() = with_biases;
-  pose.covariance.bottomLeftCorner<kBiases, kMotion>() = with_biases.transpose();
-  for (int i = 0; i < kBiases; ++i) {
-    pose.covariance.bottomRightCorner<kBiases, kBiases>().row(i) =
-        of_biases(biases.at(static_cast<std::size_t>(i / 6)) + i % 6);
-  }
-  return pose;
-}
-
 RobotCalibration TeamBelief::calibration(RobotId id) const {
   const TeamRobot& robot = robots.at(id);
   const auto sigma = [this](int index) { return std::sqrt(P(index, index)); };
@@ -371,17 +248,8 @@ void TeamBelief::reset_attitude(int index, const Eigen::VectorXd& dx) {
   P.middleCols<3>(index) = rows.transpose();
   P.block<3, 3>(index, index) = 0.5 * (own + own.transpose());
 }
-
 void TeamBelief::advance(const TeamInterval& interval) {
-  const TeamTrajectories paths = trajectories(interval);
-  const FreeMotionAt& end_of_self = paths.at(self).end();
-  const int self_bias = robots.at(self).bias_index;
-  std::vector<Moved> all;
-  for (auto& [id, robot] : robots) {
-    if (robot.motion_index >= 0)
-      all.push_back(moved(paths.at(id).end(), end_of_self, self_bias, robot));
-  }
-  carry(all, end_of_self.noise, P);
+  change_frame(trajectories(interval), *this);
   add_drift(interval, to_seconds(interval.to - interval.from));
   stamp = interval.to;
 }

@@ -52,9 +52,6 @@ struct TeamBelief {
   [[nodiscard]] TeamTrajectories trajectories(const TeamInterval& interval) const;
   /// T_S_N with S this robot.
   [[nodiscard]] GaussianPose pose(RobotId id) const;
-  /// The same at the keyframe by this robot's clock. `member` carries it there from its own
-  /// clock's.
-  [[nodiscard]] TeamPose team_pose(RobotId id, const TeamMember& member) const;
   /// What is known of a robot's sensors.
   [[nodiscard]] RobotCalibration calibration(RobotId id) const;
   /// Of the position of `to` relative to `from`.

@@ -8,6 +8,8 @@
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
+#include "estimator/team/keyframe_pose.hpp"
+#include "estimator/team/reading_rows.hpp"
 #include "estimator/team/team_faults.hpp"
 #include "estimator/team/team_update.hpp"
 
@@ -358,7 +360,7 @@ void TeamFilter::report(const TeamInterval& interval, bool are_placed,
     // one.
     const bool is_new = !robot.is_trusted || !are_placed;
     if (robot.motion_index < 0 || (is_new && has_own_edge(interval, id))) continue;
-    TeamPose& pose = solution.poses.emplace_back(belief_.team_pose(id, *interval.member(id)));
+    TeamPose& pose = solution.poses.emplace_back(keyframe_pose(belief_, id, *interval.member(id)));
     // The estimate that it started from may be false.
     pose.needs_witness = !robot.is_trusted && !is_plausible(belief_, id);
   }

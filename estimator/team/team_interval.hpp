@@ -61,6 +61,8 @@ struct TeamInterval {
     const auto found = std::ranges::find(members, robot, &TeamMember::robot);
     return found == members.end() ? nullptr : &*found;
   }
+  /// Whether what was stamped then belongs to this interval, and to no other one.
+  [[nodiscard]] bool contains(Timestamp stamp) const { return stamp > from && stamp <= to; }
   [[nodiscard]] std::size_t step_count() const {
     return static_cast<std::size_t>((to - from + kStep - Duration{1}) / kStep);
   }

@@ -1,38 +1,26 @@
 #include "estimator/team/team_readings.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <optional>
-#include <set>
 #include <tuple>
 #include <utility>
 
-#include "estimator/relative/range_update.hpp"
+#include "estimator/team/reading_scene.hpp"
+#include "estimator/team/team_darkness.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr Duration kDark = std::chrono::seconds{1};  // a robot that nobody saw for so long
 // What hides a robot from all cameras may delay its ranges, too, for seconds: an error of 0.15 m
 // that lasts 2 s weighs as much as independent ones of this size in each interval.
 constexpr double kDarkSigma = 1.0;  // m
-// Ranges locate a robot in the dark if those who measure them are in different directions from it:
-// the least eigenvalue of the sum of u u^T.
-constexpr std::size_t kLeastBeacons = 3;
-constexpr double kLeastSpread = 0.05;
-constexpr double kMostDoubt = 0.7;  // m; sigma of its place; beyond, a range is no plane
 
 // NIS by which the likeliest of a robot and its mirror images is told from the next: odds of 90.
-constexpr double kClearly = 9.0;
-
-bool is_inside(const TeamInterval& interval, Timestamp stamp) {
-  return stamp > interval.from && stamp <= interval.to;
-}
+constexpr double kClearNis = 9.0;
 
 bool takes_part(const TeamBelief& belief, RobotId observer, RobotId neighbor,
                 TeamReadings::Stage stage) {
@@ -51,7 +39,7 @@ std::vector<Sight> sights_of(const TeamInterval& interval, const TeamBelief& bel
   for (const TeamBearing& reading : interval.bearings) {
     const Bearing& z = reading.bearing;
     const auto observer = belief.robots.find(reading.observer);
-    if (!is_inside(interval, z.stamp) || observer == belief.robots.end() ||
+    if (!interval.contains(z.stamp) || observer == belief.robots.end() ||
         !belief.robots.contains(z.neighbor))
       continue;
     const auto& cameras = observer->second.cameras;
@@ -68,66 +56,13 @@ std::vector<Sight> sights_of(const TeamInterval& interval, const TeamBelief& bel
   return all;
 }
 
-/// Which robots nobody sees, and which of them ranges locate.
-class Darkness {
- public:
-  Darkness(const TeamInterval& interval, const TeamBelief& belief)
-      : interval_(interval), belief_(belief) {
-    std::map<RobotId, std::set<RobotId>> beacons;
-    for (const TeamRange& reading : interval.ranges) {
-      if (!is_inside(interval, reading.stamp)) continue;
-      const auto dark = dark_of(reading);
-      if (!dark) continue;
-      const RobotId beacon = *dark == reading.observer ? reading.neighbor : reading.observer;
-      if (belief.robots.at(beacon).is_trusted) beacons[*dark].insert(beacon);
-    }
-    for (const auto& [dark, seen] : beacons)
-      if (is_located(dark, seen)) located_.insert(dark);
-  }
-
-  /// Where everybody is seen, or the one that is not is located by ranges.
-  [[nodiscard]] bool allows(const TeamRange& reading) const {
-    if (!is_dark(reading.observer) && !is_dark(reading.neighbor)) return true;
-    const auto dark = dark_of(reading);
-    return dark && located_.contains(*dark);
-  }
-  /// If one of the two is in the dark, and the other is not.
-  [[nodiscard]] std::optional<RobotId> dark_of(const TeamRange& reading) const {
-    if (!belief_.robots.contains(reading.observer) || !belief_.robots.contains(reading.neighbor) ||
-        is_dark(reading.observer) == is_dark(reading.neighbor))
-      return std::nullopt;
-    return is_dark(reading.observer) ? reading.observer : reading.neighbor;
-  }
-
- private:
-  [[nodiscard]] bool is_dark(RobotId id) const {
-    return interval_.to - belief_.robots.at(id).last_sighting > kDark;
-  }
-  [[nodiscard]] bool is_located(RobotId dark, const std::set<RobotId>& beacons) const {
-    if (beacons.size() < kLeastBeacons) return false;
-    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-    for (const RobotId beacon : beacons) {
-      const Eigen::Vector3d d =
-          belief_.robots.at(dark).motion.p_F - belief_.robots.at(beacon).motion.p_F;
-      spread += d * d.transpose() / d.squaredNorm();
-      if (!(belief_.position_covariance(dark, beacon).trace() < kMostDoubt * kMostDoubt))
-        return false;
-    }
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()(0) >= kLeastSpread;
-  }
-
-  const TeamInterval& interval_;
-  const TeamBelief& belief_;
-  std::set<RobotId> located_;
-};
-
 std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief& belief,
                                  TeamReadings::Stage stage) {
-  const Darkness darkness(interval, belief);
+  const TeamDarkness darkness(interval, belief);
   std::map<std::pair<RobotId, RobotId>, Ranging> rangings;
   for (const TeamRange& reading : interval.ranges) {
     const auto [observer, neighbor] = std::pair(reading.observer, reading.neighbor);
-    if (!is_inside(interval, reading.stamp) || !takes_part(belief, observer, neighbor, stage) ||
+    if (!interval.contains(reading.stamp) || !takes_part(belief, observer, neighbor, stage) ||
         !darkness.allows(reading))
       continue;
     rangings
@@ -139,25 +74,6 @@ std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief&
   for (auto& [key, ranging] : rangings) all.push_back(std::move(ranging));
   return all;
 }
-
-/// What the robots of a reading are, at the time of an interval.
-struct Scene {
-  const TeamInterval& interval;
-  const TeamTrajectories& paths;
-  const TeamInstant& instant;
-  const TeamBelief& belief;
-
-  [[nodiscard]] TeamPair pair(RobotId observer, RobotId neighbor) const {
-    return {belief.robots.at(observer),
-            belief.robots.at(neighbor),
-            *interval.member(observer),
-            *interval.member(neighbor),
-            paths.at(observer),
-            paths.at(neighbor),
-            instant.states()};
-  }
-  [[nodiscard]] double time_s(Timestamp stamp) const { return to_seconds(stamp - interval.from); }
-};
 
 /// Mean residual of readings, of those that were fused if any was.
 class MeanResidual {
@@ -204,14 +120,14 @@ struct Likeliest {
 
   void add(const Candidate& next) {
     const bool is_first = best.bearing == nullptr;
-    is_clear =
-        is_first || (is_clear && next.nis - best.nis > kClearly) || best.nis - next.nis > kClearly;
+    is_clear = is_first || (is_clear && next.nis - best.nis > kClearNis) ||
+               best.nis - next.nis > kClearNis;
     if (is_first || next.nis < best.nis) best = next;
   }
 };
 
 /// Of a robot and its mirror images in one frame, the likeliest remains; none if that is not clear.
-TeamResidual gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
+TeamResidual gate(const ReadingScene& scene, TeamCamera& camera, Sight& sight) {
   TeamResidual found{.observer = sight.observer,
                      .neighbor = sight.neighbor,
                      .kind = TeamResidual::Kind::kBearing,
@@ -242,7 +158,7 @@ TeamResidual gate(const Scene& scene, TeamCamera& camera, Sight& sight) {
   return mean.of(found, S, 2);
 }
 
-TeamResidual gate(const Scene& scene, TeamRangeBias& bias, Ranging& ranging) {
+TeamResidual gate(const ReadingScene& scene, TeamRangeBias& bias, Ranging& ranging) {
   const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
   const Eigen::Matrix3d covariance =
       scene.belief.position_covariance(ranging.observer, ranging.neighbor);
@@ -266,62 +182,6 @@ TeamResidual gate(const Scene& scene, TeamRangeBias& bias, Ranging& ranging) {
                   .neighbor = ranging.neighbor,
                   .kind = TeamResidual::Kind::kRange},
                  of_mean * Eigen::Matrix2d::Identity(), 1);
-}
-
-std::optional<TeamRow> mean_of(const Scene& scene, const Sight& sight) {
-  const TeamPair pair = scene.pair(sight.observer, sight.neighbor);
-  const TeamCamera& camera = pair.observer.cameras[sight.camera];
-  const auto model = SightModel::at(pair, camera, sight.time_s(scene.interval), sight.sigma_rad());
-  if (!model) return std::nullopt;
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  double count = 0.0;
-  for (const Bearing* z : sight.bearings) {
-    const auto residual = model->residual(pair, camera, z->u_B, scene.time_s(z->stamp));
-    if (!residual) continue;
-    sum += *residual;
-    count += 1.0;
-  }
-  if (count == 0.0) return std::nullopt;
-  TeamRow row = model->row();
-  row.residual = sum / count;
-  return row;
-}
-
-/// The mean range of a pair may be false although the gate accepts it. Mean and variance become
-/// those of the mixture of both cases (probabilistic data association, Bar-Shalom and Tse 1975).
-/// `S` is the innovation's variance. Returns false if the range is more likely false than true.
-bool associate(double S, TeamRow& row) {
-  const double residual = row.residual.x();
-  const double nis = residual * residual / S;
-  const double density = std::exp(-0.5 * nis) / std::sqrt(2.0 * std::numbers::pi * S);
-  const double is_true = density / (density + kFalseRangeDensity);
-  const double weight = is_true * (1.0 - (1.0 - is_true) * nis);
-  if (is_true < 0.5 || weight <= 0.0) return false;
-  row.variance += S / weight - S;
-  row.residual.x() *= is_true / weight;
-  return true;
-}
-
-std::optional<TeamRow> mean_of(const Scene& scene, const Ranging& ranging) {
-  const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
-  const TeamRangeBias& bias = scene.belief.ranges.at(ordered(ranging.observer, ranging.neighbor));
-  const Eigen::Matrix3d covariance =
-      scene.belief.position_covariance(ranging.observer, ranging.neighbor);
-  std::optional<TeamRow> mean;
-  double sum_m = 0.0;
-  double count = 0.0;
-  for (const TeamRange* z : ranging.ranges) {
-    const RangeReading weighed{z->reading.range_m, ranging.sigma_m()};
-    const auto row = range_row(pair, bias, weighed, scene.time_s(z->stamp), covariance);
-    if (!row) continue;
-    mean = *row;
-    sum_m += row->residual.x();
-    count += 1.0;
-  }
-  if (!mean) return std::nullopt;
-  mean->residual.x() = sum_m / count;
-  if (!associate(mean->covariance(scene.instant.covariance())(0, 0), *mean)) return std::nullopt;
-  return mean;
 }
 
 }  // namespace
@@ -372,7 +232,7 @@ std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& be
 
 void gate(const TeamInterval& interval, const TeamTrajectories& paths, const TeamInstant& instant,
           TeamBelief& belief, TeamReadings& readings, std::vector<TeamResidual>& residuals) {
-  const Scene scene{interval, paths, instant, belief};
+  const ReadingScene scene{interval, paths, instant, belief};
   for (Sight& sight : readings.sights) {
     residuals.push_back(gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight));
     for (const Bearing* z : sight.bearings) {
@@ -390,20 +250,6 @@ void gate(const TeamInterval& interval, const TeamTrajectories& paths, const Tea
   }
   std::erase_if(readings.sights, [](const Sight& s) { return s.bearings.empty(); });
   std::erase_if(readings.rangings, [](const Ranging& r) { return r.ranges.empty(); });
-}
-
-std::vector<TeamRow> linearized(const TeamInterval& interval, const TeamTrajectories& paths,
-                                const TeamInstant& instant, const TeamBelief& belief,
-                                const TeamReadings& readings) {
-  const Scene scene{interval, paths, instant, belief};
-  std::vector<TeamRow> rows;
-  rows.reserve(readings.sights.size() + readings.rangings.size());
-  const auto add = [&](const std::optional<TeamRow>& row) {
-    if (row) rows.push_back(*row);
-  };
-  for (const Sight& sight : readings.sights) add(mean_of(scene, sight));
-  for (const Ranging& ranging : readings.rangings) add(mean_of(scene, ranging));
-  return rows;
 }
 
 }  // namespace crepes

@@ -6,7 +6,7 @@
 
 #include "estimator/team/team_belief.hpp"
 #include "estimator/team/team_instant.hpp"
-#include "estimator/team/team_measurement.hpp"
+#include "estimator/team/team_interval.hpp"
 
 namespace crepes {
 
@@ -57,11 +57,5 @@ struct TeamReadings {
 /// was last seen. Appends what was found to `residuals`.
 void gate(const TeamInterval& interval, const TeamTrajectories& paths, const TeamInstant& instant,
           TeamBelief& belief, TeamReadings& readings, std::vector<TeamResidual>& residuals);
-
-/// One row a sight and one a pair's ranges: the mean of what was not gated.
-[[nodiscard]] std::vector<TeamRow> linearized(const TeamInterval& interval,
-                                              const TeamTrajectories& paths,
-                                              const TeamInstant& instant, const TeamBelief& belief,
-                                              const TeamReadings& readings);
 
 }  // namespace crepes
