@@ -78,7 +78,4 @@ class CameraProblem {
   double sigma_px_ = 1.0;
 };
 
-/// `state` moved by `step`.
-[[nodiscard]] CameraState moved(const CameraState& state, const ArrowSystem::Step& step);
-
 }  // namespace crepes

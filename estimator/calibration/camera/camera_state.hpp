@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "estimator/calibration/batch/arrow_system.hpp"
 #include "estimator/core/pose.hpp"
 
 namespace crepes {
@@ -65,5 +66,8 @@ struct CameraState {
   CameraConstants constants;
   std::vector<CameraKnot> knots;
 };
+
+/// `state` moved by `step`.
+[[nodiscard]] CameraState moved(const CameraState& state, const ArrowSystem::Step& step);
 
 }  // namespace crepes

@@ -72,13 +72,10 @@ RobotPriors difference(const RobotConstants& from, const RobotConstants& to) {
 SwarmState moved(const SwarmState& state, const TeamArrowSystem::Step& step) {
   SwarmState next = state;
   for (std::size_t r = 0; r < next.robots.size(); ++r) {
-    move_constants(
-        next.robots[r],
-        step.constants.segment(static_cast<Eigen::Index>(r) * robot_at::kSize, robot_at::kSize));
+    move_constants(next.robots[r], step.constants.segment(constants_index(r), robot_at::kSize));
     for (std::size_t k = 0; k < next.knots[r].size(); ++k) {
       CameraKnot& knot = next.knots[r][k];
-      const ArrowSystem::StateVector s = step.states[k].segment<ArrowSystem::kState>(
-          static_cast<Eigen::Index>(r) * ArrowSystem::kState);
+      const ArrowSystem::StateVector s = step.states[k].segment<ArrowSystem::kState>(body_index(r));
       knot.q_W_B = (knot.q_W_B * so3_exp(s.head<3>())).normalized();
       knot.v_W += s.segment<3>(3);
       knot.p_W += s.segment<3>(6);
@@ -86,10 +83,10 @@ SwarmState moved(const SwarmState& state, const TeamArrowSystem::Step& step) {
       knot.accel_bias += s.segment<3>(12);
     }
   }
-  const auto pairs_at = static_cast<Eigen::Index>(next.robots.size()) * robot_at::kSize;
+  const Eigen::Index pairs_at = constants_index(next.robots.size());
   for (std::size_t i = 0; i < next.pair_bias_m.size(); ++i)
     next.pair_bias_m[i] += step.constants(pairs_at + static_cast<Eigen::Index>(i));
-  const auto drift_at = static_cast<Eigen::Index>(next.robots.size()) * ArrowSystem::kState;
+  const Eigen::Index drift_at = body_index(next.robots.size());
   for (std::size_t k = 0; k < next.pair_drift_m.size(); ++k) {
     for (std::size_t i = 0; i < next.pair_drift_m[k].size(); ++i)
       next.pair_drift_m[k][i] += step.states[k](drift_at + static_cast<Eigen::Index>(i));

@@ -46,6 +46,17 @@ struct RobotConstants {
   }
 };
 
+/// Where a robot's constants begin among all constants; for the number of robots, where those of
+/// the pairs do.
+[[nodiscard]] constexpr int constants_index(std::size_t robot) {
+  return static_cast<int>(robot) * swarm_constants::kSize;
+}
+/// Where a robot's body begins in a knot of all robots; for the number of robots, where the pairs'
+/// drifts do.
+[[nodiscard]] constexpr int body_index(std::size_t robot) {
+  return static_cast<int>(robot) * ArrowSystem::kState;
+}
+
 /// Pairs of robots, each once: (0, 1), (0, 2), ..., (1, 2), ...
 [[nodiscard]] constexpr std::size_t pair_count(std::size_t robots) {
   return robots * (robots - 1) / 2;
