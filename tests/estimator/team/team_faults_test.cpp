@@ -1,15 +1,17 @@
-/// The filter of a team in which a robot lies.
+/// The filter of a team in which a robot lies: its camera is turned, its clock is off, or its
+/// estimates are false. See also team_gyro_faults_test.cpp and team_range_faults_test.cpp.
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
 #include <set>
-#include <vector>
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 #include "estimator/team/team_filter.hpp"
+#include "tests/estimator/team/fault_of.hpp"
 #include "tests/support/simulated_team.hpp"
 #include "tests/support/team_solution.hpp"
 
@@ -17,6 +19,7 @@ namespace crepes::team_faults_test {
 namespace {
 
 using test::error_of;
+using test::fault_of;
 using test::find;
 using test::kIntervalSeconds;
 using test::kProbation;
@@ -60,11 +63,6 @@ TEST(TeamFaults, ATurnedCameraHarmsNobody) {
     EXPECT_LT(std::sqrt(turned), 1.2 * std::sqrt(alone)) << turn_deg;
     EXPECT_LT(std::sqrt(turned), 1.5 * std::sqrt(healthy)) << turn_deg;
   }
-}
-
-const TeamFault* fault_of(const TeamSolution& solution, RobotId robot) {
-  const auto found = std::ranges::find(solution.faults, robot, &TeamFault::robot);
-  return found == solution.faults.end() ? nullptr : &*found;
 }
 
 // Robots that start from what a turned camera sees take its carrier to be turned. Then only motion
@@ -146,231 +144,6 @@ TEST(TeamFaults, NamesATurnedCamera) {
     }
   }
   EXPECT_GE(measured, 2);
-}
-
-// As when its pair's filter believed it from the beginning: its place fits its own ranges, and all
-// others' contradict. Nobody else is drawn along.
-TEST(TeamFaults, ARobotThatStartsByItsOwnLongRangesMovesNobody) {
-  constexpr RobotId kLiar{4};
-  int beyond = 0;
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    SimulatedTeam team(seed);
-    team.damage = [&](TeamInterval& interval) {
-      const std::vector<TeamRange> by_one = interval.ranges;
-      for (TeamRange range : by_one) {
-        std::swap(range.observer, range.neighbor);
-        interval.ranges.push_back(range);
-      }
-      for (TeamRange& range : interval.ranges)
-        if (range.observer == kLiar) range.reading.range_m += 1.0;
-      for (RelativePoseEdge& edge : interval.edges)
-        if (edge.from == kLiar || edge.to == kLiar)
-          edge.T_from_to.pose.p += edge.T_from_to.pose.p.normalized();
-    };
-    TeamFilter filter;
-    for (double t = 0.0; t < 8.0; t += kIntervalSeconds) {
-      const bool are_alone = t < kProbation;
-      team.sees = [=](RobotId i, RobotId j) {
-        return !are_alone || std::set{i, j} == std::set{kSelf, kLiar};
-      };
-      const TeamSolution solution = filter.step(team.next());
-      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
-        const TeamPose* pose = find(solution, robot);
-        if (pose != nullptr && position_nees_of(*pose, team.truth(robot)) > 35.0) ++beyond;
-      }
-    }
-  }
-  EXPECT_EQ(beyond, 0);
-}
-
-// All ranges to and from a robot that this one trusts before it knows anybody else. So the robots
-// that come later contradict the scale, until most pairs do: then the filter begins anew.
-TEST(TeamFaults, AnAntennaDelayThatCameFirstIsOutvoted) {
-  constexpr RobotId kLiar{4};
-  constexpr double kSettled = 6.0;  // s
-  int poses = 0;
-  int beyond = 0;
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    SimulatedTeam team(seed);
-    team.damage = [&](TeamInterval& interval) {
-      for (TeamRange& range : interval.ranges)
-        if (range.observer == kLiar || range.neighbor == kLiar) range.reading.range_m += 1.0;
-      for (RelativePoseEdge& edge : interval.edges)
-        if (edge.from == kLiar || edge.to == kLiar)
-          edge.T_from_to.pose.p += edge.T_from_to.pose.p.normalized();
-    };
-    TeamFilter filter;
-    for (double t = 0.0; t < 12.0; t += kIntervalSeconds) {
-      const bool are_alone = t < kProbation;
-      team.sees = [=](RobotId i, RobotId j) {
-        return !are_alone || std::set{i, j} == std::set{kSelf, kLiar};
-      };
-      const TeamSolution solution = filter.step(team.next());
-      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
-        const TeamPose* pose = find(solution, robot);
-        if (pose == nullptr || t < kSettled) continue;
-        ++poses;
-        if (position_nees_of(*pose, team.truth(robot)) > 35.0) ++beyond;
-      }
-    }
-  }
-  EXPECT_GT(poses, 1000);
-  EXPECT_EQ(beyond, 0);
-}
-
-/// Its gyroscope reads nearly twice its rate.
-void scale_gyro(TeamInterval& interval, RobotId robot) {
-  for (TeamMember& member : interval.members)
-    if (member.robot == robot)
-      for (ImuMean& mean : member.imu) mean.gyro_radps *= 1.9;
-}
-
-TEST(TeamFaults, NamesAFalseGyroscopeAndIsWithoutThatRobotAsLongAsItLasts) {
-  constexpr RobotId kLiar{4};
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    SimulatedTeam team(seed);
-    TeamFilter filter;
-    static_cast<void>(solution_after(team, filter, 3.0));
-    team.damage = [&](TeamInterval& interval) { scale_gyro(interval, kLiar); };
-    TeamSolution solution;
-    bool is_named = false;
-    int absent = 0;
-    for (double t = 0.0; t < 3.0; t += kIntervalSeconds) {
-      solution = filter.step(team.next());
-      const TeamFault* fault = fault_of(solution, kLiar);
-      is_named = is_named || (fault != nullptr && fault->kind == TeamFault::Kind::kGyro);
-      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
-        const TeamPose* pose = find(solution, robot);
-        if (pose == nullptr) {
-          ++absent;  // placed again by the pair's filter, whose pose is published
-          continue;
-        }
-        EXPECT_LT(nees_of(*pose, team.truth(robot)), 30.0) << seed << " at " << t;
-      }
-    }
-    EXPECT_TRUE(is_named) << seed;
-    EXPECT_LE(absent, 4) << seed;  // both of them, each time that the liar was trusted
-    team.damage = [](TeamInterval&) {};
-    solution = solution_after(team, filter, 3.0);
-    for (const TeamFault& fault : solution.faults)
-      ADD_FAILURE() << seed << ": robot " << fault.robot.value << ", kind "
-                    << static_cast<int>(fault.kind) << ", " << fault.size;
-    const TeamPose* pose = find(solution, kLiar);
-    ASSERT_NE(pose, nullptr) << seed;
-    EXPECT_LT(nees_of(*pose, team.truth(kLiar)), 30.0) << seed;
-  }
-}
-
-// Everything that it knows is relative to itself, so it begins anew.
-TEST(TeamFaults, RecoversFromItsOwnFalseGyroscope) {
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    SimulatedTeam team(seed);
-    TeamFilter filter;
-    static_cast<void>(solution_after(team, filter, 3.0));
-    team.damage = [](TeamInterval& interval) { scale_gyro(interval, kSelf); };
-    TeamSolution solution = solution_after(team, filter, 2.0);
-    const TeamFault* fault = fault_of(solution, kSelf);
-    ASSERT_NE(fault, nullptr) << seed;
-    EXPECT_EQ(fault->kind, TeamFault::Kind::kGyro);
-    team.damage = [](TeamInterval&) {};
-    solution = solution_after(team, filter, 3.0);
-    for (const TeamFault& found : solution.faults)
-      ADD_FAILURE() << seed << ": robot " << found.robot.value << ", kind "
-                    << static_cast<int>(found.kind) << ", " << found.size;
-    ASSERT_EQ(solution.poses.size(), 3U) << seed;
-    for (const TeamPose& pose : solution.poses) {
-      EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0) << seed;
-      EXPECT_LT(error_of(pose, team.truth(pose.neighbor)).head<3>().norm(), 0.15) << seed;
-    }
-  }
-}
-
-double camera_sigma_of(const TeamSolution& solution, RobotId robot) {
-  const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
-  if (found == solution.calibrations.end() || found->cameras.empty()) return 1.0;
-  return found->cameras.front().angle_sigma_rad();
-}
-
-// Whoever had the false gyroscope.
-TEST(TeamFaults, AFalseGyroscopeCostsNobodyWhatWasLearnedOfHisCamera) {
-  for (const RobotId liar : {kSelf, RobotId{4}}) {
-    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-      SimulatedTeam team(seed);
-      TeamFilter filter;
-      const TeamSolution before = solution_after(team, filter, 15.0);
-      team.damage = [&](TeamInterval& interval) { scale_gyro(interval, liar); };
-      static_cast<void>(solution_after(team, filter, 1.0));
-      team.damage = [](TeamInterval&) {};
-      const TeamSolution after = solution_after(team, filter, 1.0);
-      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
-        EXPECT_LT(camera_sigma_of(after, robot), 1.1 * camera_sigma_of(before, robot))
-            << "liar " << liar.value << ", seed " << seed;
-        const TeamPose* pose = find(after, robot);
-        ASSERT_NE(pose, nullptr) << "liar " << liar.value << ", seed " << seed;
-        EXPECT_LT(nees_of(*pose, team.truth(robot)), 30.0)
-            << "liar " << liar.value << ", seed " << seed;
-      }
-    }
-  }
-}
-
-// Again and again its robot is trusted, found false, and leaves. The others go on learning.
-TEST(TeamFaults, AGyroscopeThatIsFalseNowAndThenForAMinuteCostsTheOthersLittle) {
-  constexpr RobotId kLiar{4};
-  constexpr double kMinute = 60.0;
-  for (const double period_s : {1.4, 2.0, 3.0, 5.0}) {
-    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
-      const auto label = testing::Message() << "every " << period_s << " s, seed " << seed;
-      SimulatedTeam team(seed);
-      TeamFilter filter;
-      team.damage = [&](TeamInterval& interval) {
-        const double since_s = to_seconds(interval.from.time_since_epoch());
-        if (std::fmod(since_s, period_s) < 0.4) scale_gyro(interval, kLiar);
-      };
-      TeamSolution solution = solution_after(team, filter, 5.0);
-      int absent = 0;
-      for (double t = 0.0; t < kMinute; t += kIntervalSeconds) {
-        solution = filter.step(team.next());
-        for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
-          const TeamPose* pose = find(solution, robot);
-          if (pose == nullptr) {
-            ++absent;
-          } else {
-            EXPECT_LT(position_nees_of(*pose, team.truth(robot)), 35.0) << label << " at " << t;
-          }
-        }
-      }
-      EXPECT_LE(absent, 8) << label;  // of 1,200: both of them, at most four times
-
-      SimulatedTeam others(seed);
-      others.sees = [=](RobotId i, RobotId j) { return i != kLiar && j != kLiar; };
-      TeamFilter unharmed;
-      const TeamSolution alone = solution_after(others, unharmed, 5.0 + kMinute);
-      for (const RobotId robot : {RobotId{2}, RobotId{3}})
-        EXPECT_LT(camera_sigma_of(solution, robot), 1.1 * camera_sigma_of(alone, robot)) << label;
-    }
-  }
-}
-
-TEST(TeamFaults, NamesRangesThatAreTooLong) {
-  constexpr RobotId kLiar{4};
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    SimulatedTeam team(seed);
-    team.damage = [&](TeamInterval& interval) {
-      for (TeamRange& r : interval.ranges)
-        if (r.neighbor == kLiar) std::swap(r.observer, r.neighbor);
-      for (TeamRange& r : interval.ranges)
-        if (r.observer == kLiar) r.reading.range_m += 1.0;
-    };
-    TeamFilter filter;
-    const TeamSolution solution = solution_after(team, filter, 5.0);
-    const TeamFault* fault = fault_of(solution, kLiar);
-    ASSERT_NE(fault, nullptr) << seed;
-    EXPECT_EQ(fault->kind, TeamFault::Kind::kRanges);
-    EXPECT_NEAR(fault->size, 1.0, 0.15) << seed;
-    for (const TeamPose& pose : solution.poses)
-      EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0) << seed;
-  }
 }
 
 // All sensors of a robot are stamped 20 ms late. These robots are slow, so it takes some seconds.

@@ -1,0 +1,119 @@
+/// The filter of a team in which a robot's ranges are too long.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "estimator/team/team_filter.hpp"
+#include "tests/estimator/team/fault_of.hpp"
+#include "tests/support/simulated_team.hpp"
+#include "tests/support/team_solution.hpp"
+
+namespace crepes::team_range_faults_test {
+namespace {
+
+using test::fault_of;
+using test::find;
+using test::kIntervalSeconds;
+using test::kProbation;
+using test::kSelf;
+using test::nees_of;
+using test::position_nees_of;
+using test::SimulatedTeam;
+using test::solution_after;
+
+// As when its pair's filter believed it from the beginning: its place fits its own ranges, and all
+// others' contradict. Nobody else is drawn along.
+TEST(TeamFaults, ARobotThatStartsByItsOwnLongRangesMovesNobody) {
+  constexpr RobotId kLiar{4};
+  int beyond = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      const std::vector<TeamRange> by_one = interval.ranges;
+      for (TeamRange range : by_one) {
+        std::swap(range.observer, range.neighbor);
+        interval.ranges.push_back(range);
+      }
+      for (TeamRange& range : interval.ranges)
+        if (range.observer == kLiar) range.reading.range_m += 1.0;
+      for (RelativePoseEdge& edge : interval.edges)
+        if (edge.from == kLiar || edge.to == kLiar)
+          edge.T_from_to.pose.p += edge.T_from_to.pose.p.normalized();
+    };
+    TeamFilter filter;
+    for (double t = 0.0; t < 8.0; t += kIntervalSeconds) {
+      const bool are_alone = t < kProbation;
+      team.sees = [=](RobotId i, RobotId j) {
+        return !are_alone || std::set{i, j} == std::set{kSelf, kLiar};
+      };
+      const TeamSolution solution = filter.step(team.next());
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        if (pose != nullptr && position_nees_of(*pose, team.truth(robot)) > 35.0) ++beyond;
+      }
+    }
+  }
+  EXPECT_EQ(beyond, 0);
+}
+
+// All ranges to and from a robot that this one trusts before it knows anybody else. So the robots
+// that come later contradict the scale, until most pairs do: then the filter begins anew.
+TEST(TeamFaults, AnAntennaDelayThatCameFirstIsOutvoted) {
+  constexpr RobotId kLiar{4};
+  constexpr double kSettled = 6.0;  // s
+  int poses = 0;
+  int beyond = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamRange& range : interval.ranges)
+        if (range.observer == kLiar || range.neighbor == kLiar) range.reading.range_m += 1.0;
+      for (RelativePoseEdge& edge : interval.edges)
+        if (edge.from == kLiar || edge.to == kLiar)
+          edge.T_from_to.pose.p += edge.T_from_to.pose.p.normalized();
+    };
+    TeamFilter filter;
+    for (double t = 0.0; t < 12.0; t += kIntervalSeconds) {
+      const bool are_alone = t < kProbation;
+      team.sees = [=](RobotId i, RobotId j) {
+        return !are_alone || std::set{i, j} == std::set{kSelf, kLiar};
+      };
+      const TeamSolution solution = filter.step(team.next());
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        if (pose == nullptr || t < kSettled) continue;
+        ++poses;
+        if (position_nees_of(*pose, team.truth(robot)) > 35.0) ++beyond;
+      }
+    }
+  }
+  EXPECT_GT(poses, 1000);
+  EXPECT_EQ(beyond, 0);
+}
+
+TEST(TeamFaults, NamesRangesThatAreTooLong) {
+  constexpr RobotId kLiar{4};
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SimulatedTeam team(seed);
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamRange& r : interval.ranges)
+        if (r.neighbor == kLiar) std::swap(r.observer, r.neighbor);
+      for (TeamRange& r : interval.ranges)
+        if (r.observer == kLiar) r.reading.range_m += 1.0;
+    };
+    TeamFilter filter;
+    const TeamSolution solution = solution_after(team, filter, 5.0);
+    const TeamFault* fault = fault_of(solution, kLiar);
+    ASSERT_NE(fault, nullptr) << seed;
+    EXPECT_EQ(fault->kind, TeamFault::Kind::kRanges);
+    EXPECT_NEAR(fault->size, 1.0, 0.15) << seed;
+    for (const TeamPose& pose : solution.poses)
+      EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 30.0) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace crepes::team_range_faults_test
