@@ -11,13 +11,13 @@ constexpr int kInner = 4;  // px, of the surroundings
 constexpr int kOuter = 8;
 constexpr int kStep = 2;                     // px; filters overlap by little
 constexpr int kReach = 2;                    // px, of the light
-constexpr int kMargin = 2 * kReach;          // px
+constexpr int kFaintMargin = 2 * kReach;     // px
 constexpr double kLeastFlanks = 3.0;         // sigmas of what is beside its brightest pixel
 constexpr double kQuantization = 1.0 / 4.0;  // least variance of a pixel [gray levels^2]
 constexpr int kWeights = 16;                 // sum of those of the filter
 constexpr int kWeights2 = 36;                // of their squares
 constexpr double kLensSigma = 0.9;           // px, of a point's image
-constexpr int kRounds = 3;
+constexpr int kFaintRounds = 3;
 constexpr double kMaxShift = 1.5;  // px
 
 /// The sum of weighted levels about a pixel.
@@ -77,7 +77,7 @@ Pixel highest_near(Pixel middle, int reach, const Level& level) {
 /// of both is narrower by the root of two, so a step is twice the centroid.
 Eigen::Vector2d centroid(const GrayImage& image, int u, int v, double background) {
   Eigen::Vector2d at = Eigen::Vector2d::Zero();
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kFaintRounds; ++round) {
     double weight = 0.0;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
     for (int y = -kReach; y <= kReach; ++y) {
@@ -100,7 +100,7 @@ Eigen::Vector2d centroid(const GrayImage& image, int u, int v, double background
 
 std::optional<FaintLight> find_faint_light(const GrayImage& image, int u, int v,
                                            const FaintSearch& search) {
-  const int margin = search.reach + kMargin;
+  const int margin = search.reach + kFaintMargin;
   if (u < margin || v < margin || u >= image.width - margin || v >= image.height - margin)
     return std::nullopt;
   const Pixel middle =

@@ -6,7 +6,7 @@
 namespace crepes {
 namespace {
 
-constexpr int kMargin = 2;              // px
+constexpr int kSpotMargin = 2;          // px
 constexpr int kMaxFlankSide = 64;       // px; larger spots have nothing to gain from their flanks
 constexpr std::int32_t kFewPixels = 4;  // pixels
 constexpr double kPixel = 1.0 / 12.0;   // variance of a single pixel's own extent
@@ -96,7 +96,7 @@ PixelBox pixel_of(const Spot& spot) {
 
 Surroundings surroundings_of(const GrayImage& image, const PixelBox& box, int threshold) {
   Surroundings around;
-  for (int distance = 1; distance <= kMargin; ++distance) {
+  for (int distance = 1; distance <= kSpotMargin; ++distance) {
     Mean all;
     Mean middle;
     bool is_free = true;
@@ -129,10 +129,10 @@ Spot measure_spot(const GrayImage& image, const Blob& blob, int threshold,
             .area_px2 = static_cast<double>(area_of(image, blob, threshold, around)),
             .peak = static_cast<double>(blob.peak),
             .elongation = blob.elongation()};
-  if (around.margin < kMargin || blob.box.width() > kMaxFlankSide ||
+  if (around.margin < kSpotMargin || blob.box.width() > kMaxFlankSide ||
       blob.box.height() > kMaxFlankSide)
     return spot;
-  const PixelBox window = grown(blob.box, kMargin, image);
+  const PixelBox window = grown(blob.box, kSpotMargin, image);
   const Moments light(image, window, around.background);
   if (light.weight < blob.peak - around.background) return spot;  // more dark than light in there
   const double u_px = window.u_min + light.u / light.weight;

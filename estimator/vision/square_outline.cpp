@@ -9,9 +9,9 @@
 namespace crepes {
 namespace {
 
-constexpr int kStarts = 4;       // directions of edges that are tried, within a quarter turn
-constexpr int kRounds = 6;       // of assigning points to edges
-constexpr int kParts = 12;       // of an edge
+constexpr int kStarts = 4;         // directions of edges that are tried, within a quarter turn
+constexpr int kOutlineRounds = 6;  // of assigning points to edges
+constexpr int kEdgeParts = 12;     // of an edge
 constexpr double kInside = 0.7;  // half of a square's edge against the radius of its nearest circle
 
 using Edges = SquareOutline::Edges;
@@ -114,7 +114,8 @@ std::optional<SquareOutline> fit_square(std::span<const Eigen::Vector2d> points,
   for (int start = 0; start < kStarts; ++start) {
     std::optional<SquareOutline> outline =
         square_in(first, 0.5 * std::numbers::pi * start / kStarts);
-    for (int round = 0; round < kRounds && outline; ++round) outline = improved(*outline, points);
+    for (int round = 0; round < kOutlineRounds && outline; ++round)
+      outline = improved(*outline, points);
     if (!outline) continue;
     const double square = mean_square(*outline, points);
     if (best && square >= least) continue;
@@ -125,21 +126,21 @@ std::optional<SquareOutline> fit_square(std::span<const Eigen::Vector2d> points,
 }
 
 double share_covered(const SquareOutline& outline, std::span<const Eigen::Vector2d> points) {
-  std::array<bool, 4UL * kParts> is_lit{};
+  std::array<bool, 4UL * kEdgeParts> is_lit{};
   for (const Eigen::Vector2d& uv : points) {
     const std::size_t k = nearest_pair(outline, uv);
     const Edges& along = outline.pairs.at(1 - k);
     const double place = 0.5 + 0.5 * along.from_middle(uv) / along.half;  // 0 to 1
     const auto part = static_cast<std::size_t>(
-        std::clamp(std::floor(place * kParts), 0.0, static_cast<double>(kParts - 1)));
+        std::clamp(std::floor(place * kEdgeParts), 0.0, static_cast<double>(kEdgeParts - 1)));
     const std::size_t edge = 2 * k + (outline.pairs.at(k).from_middle(uv) >= 0.0 ? 1 : 0);
-    is_lit.at(edge * kParts + part) = true;
+    is_lit.at(edge * kEdgeParts + part) = true;
   }
   const Eigen::Matrix2d axes = outline.view().axes;
   double lit = 0.0;
   for (std::size_t part = 0; part < is_lit.size(); ++part)
-    if (is_lit.at(part)) lit += axes.col(part < 2UL * kParts ? 1 : 0).norm();
-  return lit / (2.0 * kParts * (axes.col(0).norm() + axes.col(1).norm()));
+    if (is_lit.at(part)) lit += axes.col(part < 2UL * kEdgeParts ? 1 : 0).norm();
+  return lit / (2.0 * kEdgeParts * (axes.col(0).norm() + axes.col(1).norm()));
 }
 
 }  // namespace crepes

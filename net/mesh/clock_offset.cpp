@@ -24,7 +24,7 @@ constexpr double kMaxCorrection = 20e-3;  // s: more is stepped, because slewing
 constexpr Duration kRecent = std::chrono::milliseconds{500};
 constexpr std::size_t kMaxRecent = 256;  // packets of that time; a peer sends 50
 
-using Bounds = std::vector<OffsetBound>;
+using OffsetBounds = std::vector<OffsetBound>;
 
 ClockOffset::Verdict contradicted(int& in_a_row) {
   using Verdict = ClockOffset::Verdict;
@@ -104,8 +104,8 @@ ClockOffset::Verdict ClockOffset::add_echo(Timestamp sent, PeerTimestamp arrival
 ///   max over k of  (min_j (u_j - k t_j) - max_i (l_i - k t_i)) / scale - k^2 / (2 sigma_k^2)
 /// with times from the middle of the window.
 void ClockOffset::refit() {
-  const Bounds lower = lower_.bounds(now_);
-  const Bounds upper = upper_.bounds(now_);
+  const OffsetBounds lower = lower_.bounds(now_);
+  const OffsetBounds upper = upper_.bounds(now_);
   if (lower.empty() || upper.empty()) return;
 
   const auto earlier = [](const OffsetBound& a, const OffsetBound& b) { return a.t < b.t; };

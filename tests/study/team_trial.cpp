@@ -14,7 +14,7 @@
 namespace crepes::study {
 namespace {
 
-void append(std::vector<double>& all, const std::vector<double>& more) {
+void append_all(std::vector<double>& all, const std::vector<double>& more) {
   all.insert(all.end(), more.begin(), more.end());
 }
 
@@ -194,9 +194,9 @@ TeamQuality quality_of(const PairScores& scores) {
   std::vector<double> rotation_errors;
   std::vector<double> nees;
   for (const auto& [pair, score] : scores) {
-    append(position_errors, score.position_errors_m);
-    append(rotation_errors, score.rotation_errors_rad);
-    append(nees, score.nees);
+    append_all(position_errors, score.position_errors_m);
+    append_all(rotation_errors, score.rotation_errors_rad);
+    append_all(nees, score.nees);
     merge(quality.gross_errors, score.gross_errors);
     quality.worst_availability = std::min(quality.worst_availability, score.availability);
     quality.divergences += score.divergences;
