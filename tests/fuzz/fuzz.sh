@@ -2,7 +2,7 @@
 # Runs libFuzzer and keeps what it finds:
 #   fuzz.sh [SECONDS [TARGET...]]         a minute each of all targets, unless given
 #   RUNS=10000000 fuzz.sh 0 [TARGET...]   so many executions of each: a night (0: no limit of time)
-# Needs clang-19 and libclang-rt-19-dev, which building and testing do not.
+# Needs libclang-rt-19-dev, which building and testing do not.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 seconds=${1:-60}
