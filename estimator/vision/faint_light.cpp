@@ -118,9 +118,10 @@ std::optional<FaintLight> find_faint_light(const GrayImage& image, int u, int v,
   found.is_hot = flanks < kLeastFlanks * std::sqrt(20.0 / kWeights2) * noise.sigma;
   const Eigen::Vector2d at = centroid(image, middle.u, middle.v, background);
   int area = 0;
-  for (int y = top.v - 1; y <= top.v + 1; ++y)
+  for (int y = top.v - 1; y <= top.v + 1; ++y) {
     for (int x = top.u - 1; x <= top.u + 1; ++x)
       area += image.row(y)[x] - background >= 0.5 * peak ? 1 : 0;
+  }
   found.spot = {.u_px = middle.u + at.x(),
                 .v_px = middle.v + at.y(),
                 .area_px2 = static_cast<double>(std::max(2, area)),
