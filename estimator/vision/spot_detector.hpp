@@ -13,11 +13,11 @@
 #include "estimator/vision/brightness_sample.hpp"
 #include "estimator/vision/detection.hpp"
 #include "estimator/vision/faint_light_memory.hpp"
-#include "estimator/vision/rings/fragment_joiner.hpp"
 #include "estimator/vision/hot_pixel_map.hpp"
-#include "estimator/vision/rings/led_separator.hpp"
 #include "estimator/vision/mended_spot.hpp"
 #include "estimator/vision/ring_finder.hpp"
+#include "estimator/vision/rings/fragment_joiner.hpp"
+#include "estimator/vision/rings/led_separator.hpp"
 #include "estimator/vision/search_area.hpp"
 #include "estimator/vision/vision_config.hpp"
 
