@@ -8,6 +8,7 @@
 #include "estimator/vision/decoding/id_doubt.hpp"
 #include "estimator/vision/decoding/id_posterior.hpp"
 #include "estimator/vision/decoding/phase_scores.hpp"
+#include "estimator/vision/decoding/rival_board.hpp"
 #include "estimator/vision/decoding/sighting_prior.hpp"
 
 namespace crepes {
@@ -18,6 +19,7 @@ constexpr Duration kMinWindow = std::chrono::milliseconds{1200};
 constexpr double kDarkFrames = 6.0;    // margin of a dark run: its edges, missed frames
 constexpr double kMissedFrames = 2.0;  // at the edges of a dark run
 constexpr std::int64_t kPeriodsToLearn = 2;
+constexpr std::int64_t kPeriodsCompared = 2;
 
 // After a brief absence, beyond the dark times of codes, little is in doubt. After the other one
 // the assigned code is forgotten.
@@ -58,7 +60,7 @@ void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp,
   if (evidence.score.empty()) return;
   if (!evidence.assigned) {
     decide(evidence, stamp, known);
-  } else if (has_changed(evidence)) {
+  } else if (has_changed(evidence) || has_lost_to_rival(evidence, stamp)) {
     evidence.forget();
     evidence.last_lit = stamp;
   } else {
@@ -103,7 +105,7 @@ void IdDecoder::add(BlinkEvidence& evidence, BlinkObservation observation) const
       sources_.score(evidence, evidence.window[i], 1);
   }
   if (const auto p_lit = lit_probability(evidence, observation.stamp))
-    test_frame(evidence, *p_lit, observation.lit);
+    test_frame(evidence, observation, *p_lit);
 }
 
 void IdDecoder::forget_old(BlinkEvidence& evidence, Timestamp now) const {
@@ -125,7 +127,18 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
   evidence.assigned = {best, best_phase(SourceModels::scores_of(evidence, code))};
   if (evidence.expected != best) evidence.assigned_since = now;
   evidence.confidence = posterior.probability();
-  clear_doubt(evidence);
+  clear_doubt(evidence, now);
+}
+
+/// What seems to be the assigned board, hidden at times, may be another one.
+bool IdDecoder::has_lost_to_rival(BlinkEvidence& evidence, Timestamp now) const {
+  const Duration period = sources_.codes()[evidence.assigned->code].period;
+  if (!has_changed_or_is_obstructed(evidence) ||
+      now < std::max(evidence.undoubted_at, evidence.compared_at) + period / 4)
+    return false;
+  evidence.compared_at = now;
+  const Timestamp since = std::max(evidence.undoubted_at, now - kPeriodsCompared * period);
+  return is_lost_to(rival_log_odds(evidence, sources_, since));
 }
 
 bool IdDecoder::is_worth_keeping(const BlinkEvidence& evidence) {
@@ -139,7 +152,7 @@ void IdDecoder::resume(BlinkEvidence& evidence, Timestamp now, double stranger) 
   evidence.pending_dark.clear();
   evidence.last_lit.reset();
   evidence.assigned.reset();
-  clear_doubt(evidence);
+  clear_doubt(evidence, now);
   evidence.dark_runs = 0.0;
   evidence.is_obstructed = false;
   evidence.foretold = 0.0;

@@ -31,6 +31,8 @@ struct BlinkEvidence {
   double doubt = 0.0;  ///< log odds that another board has blinked here since; at least zero
   /// The same if something hides the light in half of the frames, as a propeller does.
   double obstructed_doubt = 0.0;
+  Timestamp undoubted_at{};    ///< when `doubt` was zero last
+  Timestamp compared_at{};     ///< when the other boards were compared last
   double dark_runs = 0.0;      ///< how often it went dark of late, with fading memory
   bool is_obstructed = false;  ///< more often than any board: a propeller is in front of it
   /// After IdDecoder::resume(), `score` contains the earlier sightings, normalized so that the mean

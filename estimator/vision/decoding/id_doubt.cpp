@@ -22,15 +22,16 @@ double doubt_of(const BlinkEvidence& evidence) {
 
 }  // namespace
 
-void test_frame(BlinkEvidence& evidence, double p_lit, bool is_lit) {
+void test_frame(BlinkEvidence& evidence, BlinkObservation seen, double p_lit) {
   const auto after = [&](double doubt, double shown) {
-    const double p = is_lit ? shown * p_lit : 1.0 - shown * p_lit;
-    const double q = is_lit ? shown * (1.0 - p_lit) : 1.0 - shown * (1.0 - p_lit);
+    const double p = seen.lit ? shown * p_lit : 1.0 - shown * p_lit;
+    const double q = seen.lit ? shown * (1.0 - p_lit) : 1.0 - shown * (1.0 - p_lit);
     return std::clamp(doubt + std::log(((1.0 - kOtherDiffers) * p + kOtherDiffers * q) / p), 0.0,
                       kLost + 1.0);
   };
   evidence.doubt = after(evidence.doubt, 1.0);
   evidence.obstructed_doubt = after(evidence.obstructed_doubt, kShown);
+  if (evidence.doubt == 0.0) evidence.undoubted_at = seen.stamp;
 }
 
 void doubt_after_absence(BlinkEvidence& evidence, Duration absence, Duration brief) {
@@ -41,9 +42,10 @@ void doubt_after_absence(BlinkEvidence& evidence, Duration absence, Duration bri
   evidence.obstructed_doubt = std::max(evidence.obstructed_doubt, doubt - kObstructedCost);
 }
 
-void clear_doubt(BlinkEvidence& evidence) {
+void clear_doubt(BlinkEvidence& evidence, Timestamp now) {
   evidence.doubt = 0.0;
   evidence.obstructed_doubt = 0.0;
+  evidence.undoubted_at = now;
 }
 
 bool is_undoubted(const BlinkEvidence& evidence) {
@@ -55,5 +57,9 @@ bool may_have_returned(const BlinkEvidence& evidence) {
 }
 
 bool has_changed(const BlinkEvidence& evidence) { return doubt_of(evidence) > kLost; }
+
+bool has_changed_or_is_obstructed(const BlinkEvidence& evidence) { return evidence.doubt > kLost; }
+
+bool is_lost_to(double rival_log_odds) { return rival_log_odds > kLost; }
 
 }  // namespace crepes

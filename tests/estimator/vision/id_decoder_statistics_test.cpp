@@ -92,10 +92,10 @@ TEST_F(IdDecoderStatistics, TakesNoneOfHundredsOfLampsForARobot) {
   }
 }
 
-// Of 6000 changes, one in a thousand took longer than 1.17 patterns, and one 1.2 s (tests/bench).
+// Of 19,723 changes one in a thousand took longer than 1.3 patterns, and none two (tests/bench).
 TEST_F(IdDecoderStatistics, TakesTheIdBackWithinOnePatternWhenTheTrackChangesHands) {
   std::vector<double> periods;
-  for (int i = 0; i < 400; ++i) {
+  for (int i = 0; i < 1'000; ++i) {
     const Viewing viewing{.rate_hz = uniform(120.0, 250.0)};
     const IdDecoder decoder(library(), VisionConfig{}, viewing.rate_hz);
     Watcher watcher(decoder, viewing, random_());
@@ -116,7 +116,8 @@ TEST_F(IdDecoderStatistics, TakesTheIdBackWithinOnePatternWhenTheTrackChangesHan
   }
   EXPECT_LT(at(periods, 0.5), 0.3);
   EXPECT_LE(at(periods, 0.99), 0.7);
-  EXPECT_LE(std::ranges::count_if(periods, [](double p) { return p > 1.0; }), 2);
+  EXPECT_LE(std::ranges::count_if(periods, [](double p) { return p > 1.0; }), 5);
+  EXPECT_LE(at(periods, 1.0), 2.0);
 }
 
 TEST_F(IdDecoderStatistics, HardlyTakesAStrangerForTheBoardThatWasHidden) {
