@@ -276,6 +276,7 @@ struct EstimatorStatus {
   ImuFaultCounts refused_imu{};       ///< of our IMU, by reason
   std::vector<TeamFault> faults;      ///< what the team finds wrong with us
   PredictedIds predicted_ids;
+  std::uint64_t foreign_boards = 0;  ///< lights that blink nearly as a member, but are none
   std::optional<TeamStatus> team;
 };
 

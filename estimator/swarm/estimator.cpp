@@ -391,9 +391,10 @@ EstimatorStatus Estimator::status() const {
     status.neighbors.push_back(std::move(one));
   }
   for (const BlinkTracker& tracker : state_->trackers) {
-    const PredictedIds ids = tracker.status().predicted_ids;
-    status.predicted_ids.confirmed += ids.confirmed;
-    status.predicted_ids.unconfirmed += ids.unconfirmed;
+    const TrackerStatus seen = tracker.status();
+    status.predicted_ids.confirmed += seen.predicted_ids.confirmed;
+    status.predicted_ids.unconfirmed += seen.predicted_ids.unconfirmed;
+    status.foreign_boards += seen.foreign_boards;
   }
   status.tilt = state_->self.tilt;
   status.unknown_senders = state_->unknown_senders;

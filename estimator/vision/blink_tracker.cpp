@@ -135,6 +135,7 @@ void BlinkTracker::observe_seen(const TrackPairing::Pairs& sighting_of, Timestam
 
 void BlinkTracker::observe(LightTrack& track, const LightSighting& sighting, Timestamp stamp) {
   const bool was_assigned = track.evidence.assigned.has_value();
+  const bool was_foreign = track.evidence.is_foreign;
   if (was_assigned && track.is_continued_by_another(sighting, stamp, decoder_.longest_dark()))
     track.evidence.forget();
   track.correct(sighting, stamp, config_.bearing_sigma_px);
@@ -147,6 +148,7 @@ void BlinkTracker::observe(LightTrack& track, const LightSighting& sighting, Tim
   if (!was_assigned && track.evidence.assigned)
     ++counts_.decodes[decoder_.code_id(*track.evidence.assigned)];
   if (was_assigned && !track.evidence.assigned) ++counts_.lost_ids;
+  if (!was_foreign && track.evidence.is_foreign) ++counts_.foreign_boards;
 }
 
 /// Whether no other light of unknown ID is within `reach_rad` of `u_B`.

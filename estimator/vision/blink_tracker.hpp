@@ -39,6 +39,7 @@ struct TrackerStatus {
   std::uint64_t merged_spots = 0;            ///< two boards in one spot: no bearing
   std::map<RobotId, std::uint64_t> decodes;  ///< tracks that were given this ID
   std::uint64_t lost_ids = 0;                ///< tracks that stopped blinking as their ID should
+  std::uint64_t foreign_boards = 0;          ///< tracks that blink nearly as one of ours
   PredictedIds predicted_ids;
 };
 

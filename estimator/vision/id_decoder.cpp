@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 
 #include "estimator/vision/decoding/code_model.hpp"
 #include "estimator/vision/decoding/dark_runs.hpp"
+#include "estimator/vision/decoding/foreign_code.hpp"
 #include "estimator/vision/decoding/id_doubt.hpp"
 #include "estimator/vision/decoding/id_posterior.hpp"
 #include "estimator/vision/decoding/phase_scores.hpp"
@@ -20,6 +22,12 @@ constexpr double kDarkFrames = 6.0;    // margin of a dark run: its edges, misse
 constexpr double kMissedFrames = 2.0;  // at the edges of a dark run
 constexpr std::int64_t kPeriodsToLearn = 2;
 constexpr std::int64_t kPeriodsCompared = 2;
+constexpr std::int64_t kComparisonsPerPeriod = 4;
+
+// Nats by which another pattern explains the window better: one frame that differs is no reason to
+// wait with a decision, three are one to withdraw it.
+constexpr double kHardlyOurs = 5.0;
+constexpr double kForeign = 11.0;
 
 // After a brief absence, beyond the dark times of codes, little is in doubt. After the other one
 // the assigned code is forgotten.
@@ -60,13 +68,14 @@ void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp,
   if (evidence.score.empty()) return;
   if (!evidence.assigned) {
     decide(evidence, stamp, known);
-  } else if (has_changed(evidence) || has_lost_to_rival(evidence, stamp)) {
+  } else if (has_changed(evidence)) {
     evidence.forget();
     evidence.last_lit = stamp;
   } else {
     const CodeModel& code = sources_.codes()[evidence.assigned->code];
     // Its clock drifts.
     evidence.assigned->phase = best_phase(SourceModels::scores_of(evidence, code));
+    review(evidence, stamp);
   }
   if (is_identified(evidence)) evidence.predictable_until.reset();
 }
@@ -124,21 +133,46 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
       posterior.clutter > max_false_robot_)
     return;
   const CodeModel& code = sources_.codes()[best];
-  evidence.assigned = {best, best_phase(SourceModels::scores_of(evidence, code))};
+  if (now < evidence.compared_at + code.period / kComparisonsPerPeriod) return;
+  evidence.compared_at = now;
+  const std::size_t phase = best_phase(SourceModels::scores_of(evidence, code));
+  const double log_ratio = foreign_log_ratio(evidence.window, code, phase);
+  evidence.is_foreign = log_ratio > kForeign;
+  if (log_ratio > kHardlyOurs) return;
+  evidence.assigned = {best, phase};
   if (evidence.expected != best) evidence.assigned_since = now;
   evidence.confidence = posterior.probability();
   clear_doubt(evidence, now);
 }
 
-/// What seems to be the assigned board, hidden at times, may be another one.
-bool IdDecoder::has_lost_to_rival(BlinkEvidence& evidence, Timestamp now) const {
-  const Duration period = sources_.codes()[evidence.assigned->code].period;
-  if (!has_changed_or_is_obstructed(evidence) ||
-      now < std::max(evidence.undoubted_at, evidence.compared_at) + period / 4)
-    return false;
+/// Takes the ID back from what only seems to be the assigned board: another one of the swarm that
+/// looks like it, hidden at times, or one of another swarm.
+void IdDecoder::review(BlinkEvidence& evidence, Timestamp now) const {
+  const auto [assigned, phase] = *evidence.assigned;
+  const CodeModel& code = sources_.codes()[assigned];
+  if (now < evidence.compared_at + code.period / kComparisonsPerPeriod) return;
   evidence.compared_at = now;
-  const Timestamp since = std::max(evidence.undoubted_at, now - kPeriodsCompared * period);
-  return is_lost_to(rival_log_odds(evidence, sources_, since));
+  const Timestamp since = std::max(evidence.undoubted_at, now - kPeriodsCompared * code.period);
+  if (has_changed_or_is_obstructed(evidence) &&
+      is_lost_to(rival_log_odds(evidence, sources_, since))) {
+    evidence.forget();
+    evidence.last_lit = now;
+  } else if (!evidence.is_obstructed &&
+             foreign_log_ratio(evidence.window, code, phase) > kForeign) {
+    read_again(evidence);
+  }
+}
+
+/// Withdraws the decision: it is a foreign board. What was observed remains.
+void IdDecoder::read_again(BlinkEvidence& evidence) const {
+  BlinkEvidence again;
+  again.last_lit = evidence.last_lit;
+  again.window = std::move(evidence.window);
+  again.compared_at = evidence.compared_at;
+  again.is_foreign = true;
+  sources_.fill_scores(again, 0);
+  for (std::size_t i = 0; i < again.window.size(); ++i) sources_.score(again, again.window[i], 1);
+  evidence = std::move(again);
 }
 
 bool IdDecoder::is_worth_keeping(const BlinkEvidence& evidence) {

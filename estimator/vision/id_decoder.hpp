@@ -71,7 +71,8 @@ class IdDecoder {
   void forget_old(BlinkEvidence& evidence, Timestamp now) const;
   void decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory& known) const;
   void end_absence(BlinkEvidence& evidence, Timestamp stamp) const;
-  [[nodiscard]] bool has_lost_to_rival(BlinkEvidence& evidence, Timestamp now) const;
+  void review(BlinkEvidence& evidence, Timestamp now) const;
+  void read_again(BlinkEvidence& evidence) const;
 
   SourceModels sources_;
   double max_wrong_id_;

@@ -45,6 +45,7 @@ Result<BlinkCode> BlinkCode::from_pattern(std::string_view pattern, Duration slo
 
   BlinkCode code;
   code.period_ = slot * static_cast<std::int64_t>(pattern.size());
+  code.slots_ = pattern.size();
   Duration begin{};
   for (const char bit : pattern) {
     const Duration end = begin + slot;

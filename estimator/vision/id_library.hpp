@@ -1,6 +1,7 @@
 /// The blink codes of all boards of the swarm.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -23,6 +24,8 @@ class BlinkCode {
   [[nodiscard]] static Result<BlinkCode> from(const MemberConfig& member, const SwarmConfig& swarm);
 
   [[nodiscard]] Duration period() const { return period_; }
+  /// Of a pattern; zero for a duty.
+  [[nodiscard]] std::size_t slots() const { return slots_; }
   [[nodiscard]] bool is_lit(Duration board_time) const;
   /// The share of [from, to) in which the board is lit, 0 to 1: the light that an exposure of this
   /// time collects.
@@ -37,6 +40,7 @@ class BlinkCode {
   [[nodiscard]] Duration lit_until(Duration board_time) const;
 
   Duration period_{};
+  std::size_t slots_ = 0;
   std::vector<Interval> lit_;  ///< within one period, in order
 };
 

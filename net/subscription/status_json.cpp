@@ -185,7 +185,8 @@ void put_network(Json& json, const SystemStatus& status) {
       totals_json({{"unknown_senders", status.estimator.unknown_senders},
                    {"refused_samples", status.estimator.refused_samples},
                    {"ids_confirmed", status.estimator.predicted_ids.confirmed},
-                   {"ids_unconfirmed", status.estimator.predicted_ids.unconfirmed}});
+                   {"ids_unconfirmed", status.estimator.predicted_ids.unconfirmed},
+                   {"foreign_boards", status.estimator.foreign_boards}});
   put_refused_imu(json["estimator"], status.estimator.refused_imu);
   json["mesh"] = mesh_json(status.mesh);
   json["network"] = totals_json(status.network);

@@ -88,6 +88,7 @@ Json robot_json(const RobotReport& robot, const ReplayOutput::Names& names) {
   json["unknown_senders"] = robot.status.unknown_senders;
   json["predicted_ids"] = {{"confirmed", robot.status.predicted_ids.confirmed},
                            {"unconfirmed", robot.status.predicted_ids.unconfirmed}};
+  json["foreign_boards"] = robot.status.foreign_boards;
   json["cpu_s"] = object_of(robot.cpu_s);
   if (robot.status.team) json["team"] = team_json(robot, names);
   return json;

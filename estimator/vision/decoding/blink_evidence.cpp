@@ -11,6 +11,8 @@ void BlinkEvidence::forget() {
   confidence = 0.0;
   doubt = 0.0;
   obstructed_doubt = 0.0;
+  compared_at = {};
+  is_foreign = false;
   dark_runs = 0.0;
   is_obstructed = false;
   earlier_markov = 0.0;

@@ -32,7 +32,8 @@ struct BlinkEvidence {
   /// The same if something hides the light in half of the frames, as a propeller does.
   double obstructed_doubt = 0.0;
   Timestamp undoubted_at{};    ///< when `doubt` was zero last
-  Timestamp compared_at{};     ///< when the other boards were compared last
+  Timestamp compared_at{};     ///< when other codes were compared last, ours and foreign ones
+  bool is_foreign = false;     ///< its code is no board's of ours, but like one
   double dark_runs = 0.0;      ///< how often it went dark of late, with fading memory
   bool is_obstructed = false;  ///< more often than any board: a propeller is in front of it
   /// After IdDecoder::resume(), `score` contains the earlier sightings, normalized so that the mean

@@ -23,11 +23,14 @@ CodeModel CodeModel::from(const BlinkCode& blink, double flip_rate) {
   code.period = blink.period();
   code.phases = std::clamp<std::size_t>(static_cast<std::size_t>(code.period / kPhaseStep),
                                         kMinPhases, kMaxPhases);
+  code.slots = blink.slots();
+  code.flip_rate = flip_rate;
   const std::size_t steps = code.phases * kFine;
   const auto step_count = static_cast<std::int64_t>(steps);
   // A step represents all phases and times that are rounded to it.
   const Duration spread =
       code.period * 3 / (4 * static_cast<std::int64_t>(code.phases)) + kEdgeBlur;
+  code.edge_blur = to_seconds(spread) / to_seconds(code.period);
   for (std::int64_t i = 0; i < step_count; ++i) {
     const Duration t = code.period * (2 * i + 1) / (2 * step_count);
     const double lit = blink.lit_fraction(t - spread, t + spread);

@@ -120,6 +120,36 @@ TEST_F(IdDecoderStatistics, TakesTheIdBackWithinOnePatternWhenTheTrackChangesHan
   EXPECT_LE(at(periods, 1.0), 2.0);
 }
 
+TEST_F(IdDecoderStatistics, HardlyEverNamesABoardOfAnotherSwarm) {
+  const IdDecoder decoder(library(), VisionConfig{}, 200.0);
+  const std::vector<std::string> ours =
+      search_codebook({.slots = 20, .distance = 4, .max_dark = 2}, 64, {.steps = 200'000}).patterns;
+  const std::vector<std::string> theirs =
+      search_codebook({.slots = 20, .distance = 4}, 64, {.seed = 77, .on_progress = {}}).patterns;
+  int boards = 0;
+  int named_frames = 0;
+  int foreign = 0;
+  for (const std::string& pattern : theirs) {
+    std::vector<std::string> both = ours;
+    both.push_back(pattern);
+    if (!IdLibrary::from(test::swarm_of(both))) continue;  // the very code of one of ours
+    ++boards;
+    const BlinkCode code = *BlinkCode::from_pattern(pattern, 10ms);
+    const Light light = light_of(code);
+    Watcher watcher(decoder, {.flip_rate = 0.01, .exposure_ms = 0.5}, random_());
+    BlinkEvidence evidence;
+    bool is_foreign = false;
+    for (double t = 0.0; t < 5.0; t += 0.005) {
+      named_frames += watcher.look(light, from_seconds(t), evidence).has_value() ? 1 : 0;
+      is_foreign = is_foreign || evidence.is_foreign;
+    }
+    foreign += is_foreign ? 1 : 0;
+  }
+  EXPECT_GT(boards, 50);
+  EXPECT_LT(named_frames, boards);  // of 1000 each
+  EXPECT_GT(foreign, boards / 4);   // those that are nearly as one of ours
+}
+
 TEST_F(IdDecoderStatistics, HardlyTakesAStrangerForTheBoardThatWasHidden) {
   const IdDecoder decoder(library(), VisionConfig{}, 200.0);
   int wrong_frames = 0;
