@@ -16,6 +16,7 @@ constexpr double kWrongPriors = 4.0;
 constexpr double kWrongSigmas = 3.0;
 constexpr double kLeastMisalignment = radians(0.1);  // rad
 constexpr double kWrongClock = 8e-3;                 // s
+constexpr Duration kSettling = std::chrono::seconds{2};
 
 void add_camera_faults(const RobotCalibration& robot, std::vector<TeamFault>& faults) {
   using State = CameraMisalignment::State;
@@ -27,6 +28,12 @@ void add_camera_faults(const RobotCalibration& robot, std::vector<TeamFault>& fa
   }
 }
 
+/// Soon after a robot was placed, it may be the place that is wrong.
+bool is_settled(const TeamBelief& belief, RobotId id) {
+  const TeamRobot& robot = belief.robots.at(id);
+  return robot.is_trusted || belief.stamp - robot.since > kSettling;
+}
+
 /// A robot most of whose ranges, to at least two others, are refused.
 void add_range_fault(const TeamBelief& belief, RobotId id, std::vector<TeamFault>& faults) {
   int measured = 0;
@@ -34,7 +41,9 @@ void add_range_fault(const TeamBelief& belief, RobotId id, std::vector<TeamFault
   double sum_m = 0.0;
   for (const auto& [pair, range] : belief.ranges) {
     const auto agreement = range.agreement.find(id);
-    if (agreement == range.agreement.end()) continue;
+    if (agreement == range.agreement.end() || !is_settled(belief, pair.first) ||
+        !is_settled(belief, pair.second))
+      continue;
     measured += agreement->second.fused + agreement->second.gated > 1.0 ? 1 : 0;
     if (!agreement->second.is_contradiction()) continue;
     ++contradicted;
