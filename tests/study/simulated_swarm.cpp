@@ -8,6 +8,7 @@
 
 #include "drivers/imu/witmotion.hpp"
 #include "drivers/sim/sim_imu.hpp"
+#include "tests/study/rendered_spots.hpp"
 #include "tests/study/simulated_spots.hpp"
 
 namespace crepes::study {
@@ -38,16 +39,17 @@ std::vector<ImuSample> record_imu(const SimWorld& world, const DemoRobot& robot,
   return samples;
 }
 
-std::vector<SpotFrame> record_spots(const SimWorld& world, const DemoRobot& robot,
-                                    const Disturbance& disturbance, double duration_s) {
+/// `spots_at(t_s)` are those of the picture at this time.
+template <class SpotsAt>
+std::vector<SpotFrame> record_spots(const DemoRobot& robot, double duration_s,
+                                    const SpotsAt& spots_at) {
   const CameraCalibration& camera = robot.config.cameras.front().calibration;
-  SimulatedSpots source(world, robot.config, disturbance);
   std::vector<SpotFrame> frames;
   const double period_s = 1.0 / camera.rate_hz;
   const double phase_s = 0.0007 * robot.config.robot.id.value;
   for (int i = 0; i * period_s + phase_s <= duration_s; ++i) {
     const double t = i * period_s + phase_s;
-    frames.push_back({.stamp = robot.clock.local(t), .camera = 0, .spots = source.at(t)});
+    frames.push_back({.stamp = robot.clock.local(t), .camera = 0, .spots = spots_at(t)});
   }
   return frames;
 }
@@ -94,6 +96,14 @@ Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vecto
                                 .dark_from_s = scenario.dark_from_s,
                                 .dark_to_s = scenario.dark_to_s,
                                 .sight_m = scenario.sight_m};
+  const auto spots_of = [&](const DemoRobot& robot) {
+    if (scenario.pictured) {
+      RenderedSpots pictures(world, robot.config, *scenario.pictured);
+      return record_spots(robot, duration_s, [&](double t_s) { return pictures.at(t_s); });
+    }
+    SimulatedSpots projections(world, robot.config, disturbance);
+    return record_spots(robot, duration_s, [&](double t_s) { return projections.at(t_s); });
+  };
   SwarmDataset dataset;
   dataset.manifest = {.scenario = std::string(scenario.name),
                       .duration_s = duration_s,
@@ -111,8 +121,7 @@ Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vecto
     recording.imu = record_imu(world, robot, duration_s);
     recording.ranges = simulated_ranges(world, robot.config, robot.clock, scenario.ranges,
                                         disturbance.obstacles, duration_s);
-    recording.cameras.push_back(
-        {.spots = record_spots(world, robot, disturbance, duration_s), .images = {}});
+    recording.cameras.push_back({.spots = spots_of(robot), .images = {}});
     miscalibrate(robot.config, seed);
     recording.config = std::move(robot.config);
     dataset.robots.push_back(std::move(recording));

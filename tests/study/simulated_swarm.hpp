@@ -3,11 +3,13 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "config/schema/config.hpp"
 #include "daemon/ctl/demo/demo_swarm.hpp"
+#include "drivers/sim/board_renderer.hpp"
 #include "drivers/sim/world.hpp"
 #include "tests/study/obstacles.hpp"
 #include "tests/study/pair_bound.hpp"
@@ -28,6 +30,8 @@ struct Scenario {
   double dark_to_s = 0.0;    ///< to here
   RangeModel ranges = RangeModel::kSimulated;
   double sight_m = 1e3;  ///< no camera sees further
+  /// Spots are what the detector finds in rendered pictures of such boards, without disturbances.
+  std::optional<LedBoard> pictured{};
 };
 
 inline constexpr std::array kScenarios{

@@ -231,6 +231,24 @@ TEST(TeamStudy, ScoresATeamAgainstItsBound) {
   EXPECT_NEAR(static_cast<double>(trial->reached.gross_errors.all.poses), 12.0 * 150.0, 100.0);
 }
 
+TEST(TeamStudy, PosesFromPicturesAreThoseOfAnyRing) {
+  Scenario pictured = scenario("manual");
+  TeamTrialOptions options;
+  options.after_s = 3.0;
+  std::vector<double> errors_m;
+  for (const int leds : {6, 8}) {
+    pictured.pictured = LedBoard{.leds = leds};
+    const auto trial = run_team_trial(simulate_swarm(pictured, 1, 8.0), options);
+    ASSERT_TRUE(trial) << trial.error().message;
+    SCOPED_TRACE(table_of(std::vector{*trial}));
+    EXPECT_GT(trial->reached.worst_availability, 0.95);
+    EXPECT_EQ(trial->reached.gross_errors.all.share(), 0.0);
+    errors_m.push_back(trial->reached.position_rmse_m);
+  }
+  EXPECT_LT(errors_m[0], 0.06);
+  EXPECT_NEAR(errors_m[1] / errors_m[0], 1.0, 0.1);
+}
+
 // Floors mirror for seconds, so that robots are seen twice or only their images are.
 TEST(TeamStudy, MirrorImagesCostATeamNoPoses) {
   const Swarm swarm = simulate_swarm(scenario("interference"), 5, 14.0);

@@ -32,6 +32,7 @@ struct Options {
   bool bound_only = false;
   std::string liar;
   std::string write_dir;
+  int leds = 0;
 };
 
 bool complain(const std::string& message) {
@@ -97,7 +98,8 @@ class Study {
   std::vector<LiarTrial> liar_trials_;
 };
 
-bool add_seeds(const Options& options, const Scenario& scenario, Study& study) {
+bool add_seeds(const Options& options, Scenario scenario, Study& study) {
+  if (options.leds > 0) scenario.pictured = LedBoard{.leds = options.leds};
   for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
     const std::string name = std::string(scenario.name) + " " + std::to_string(seed);
     const Swarm swarm = simulate_swarm(scenario, seed, options.duration_s);
@@ -156,6 +158,9 @@ int main(int argc, char** argv) {
       ->transform(CLI::CheckedTransformer(methods));
   app.add_flag("--scaled", options.scaled, "also the bound with the IMUs' scale and axis errors");
   app.add_flag("--bound-only", options.bound_only, "print the bounds by observer; no replay");
+  app.add_option("--leds", options.leds,
+                 "render every picture, with boards of so many LEDs, instead of projecting spots")
+      ->check(CLI::Range(1, 64));
   app.add_option("--liar", options.liar,
                  "make the last robot faulty; errors of the others with it over without it")
       ->check(CLI::IsMember(liars));
