@@ -181,6 +181,7 @@ struct Status {
   std::vector<Clock> clocks;
   Totals queues;
   Totals network;
+  Totals estimator;  ///< inputs that it could not use, lights that are no members
   std::optional<Mesh> mesh;
   std::optional<Team> team;   ///< only if asked for
   std::optional<Pair> pair;   ///< only if asked for

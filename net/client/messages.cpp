@@ -213,6 +213,7 @@ Status status_from(const json& object) {
               [&](const json& entry) { status.clocks.push_back(clock_from(entry)); });
   status.queues = totals_from(object, "queues");
   status.network = totals_from(object, "network");
+  status.estimator = totals_from(object, "estimator");
   if (const auto mesh = object.find("mesh"); mesh != object.end()) status.mesh = mesh_from(*mesh);
   if (const auto team = object.find("team"); team != object.end()) status.team = team_from(*team);
   if (const auto pair = object.find("pair"); pair != object.end()) status.pair = pair_from(*pair);

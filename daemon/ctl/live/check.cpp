@@ -10,9 +10,9 @@
 
 #include "config/reading/config_file.hpp"
 #include "daemon/ctl/json_line.hpp"
+#include "daemon/ctl/live/check/robot_check.hpp"
 #include "daemon/ctl/live/full_status.hpp"
 #include "daemon/ctl/live/own_board.hpp"
-#include "daemon/ctl/live/robot_check.hpp"
 #include "daemon/ctl/live/walk_around.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 

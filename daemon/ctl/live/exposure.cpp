@@ -11,9 +11,9 @@
 
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/live/camera_lights.hpp"
+#include "daemon/ctl/live/check/robot_check.hpp"
 #include "daemon/ctl/live/full_status.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
-#include "daemon/ctl/live/robot_check.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/base/child_process.hpp"
 #include "drivers/base/monotonic_clock.hpp"

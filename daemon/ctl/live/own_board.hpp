@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "daemon/ctl/live/robot_check.hpp"
+#include "daemon/ctl/live/check/robot_check.hpp"
 #include "firmware/protocol/led_messages.h"
 
 namespace crepes {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ctl/live/robot_check.hpp"
+#include "daemon/ctl/live/check/robot_check.hpp"
 
 namespace crepes {
 

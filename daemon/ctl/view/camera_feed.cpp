@@ -18,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Duration kPeriod = 200ms;  // five pictures a second
+constexpr Duration kPicturePeriod = 200ms;  // five pictures a second
 constexpr Duration kRetry = 1s;
 constexpr Duration kPatience = 2s;
 constexpr Duration kCoveragePeriod = 1s;
@@ -83,7 +83,7 @@ void CameraFeed::request_picture(Timestamp now, const std::vector<std::uint8_t>&
   }
   const std::uint8_t next = *std::ranges::min_element(
       wanted, {}, [this](std::uint8_t camera) { return last_asked_[camera]; });
-  if (now - last_asked_[next] < kPeriod) return;
+  if (now - last_asked_[next] < kPicturePeriod) return;
   last_asked_[next] = now;
   if (const auto sent = daemon_->request(fmt::format("{}{}", kLookRequest, next)); !sent)
     return hang_up(sent.error().message, now);

@@ -1,4 +1,4 @@
-#include "daemon/ctl/live/robot_check.hpp"
+#include "daemon/ctl/live/check/robot_check.hpp"
 
 #include <gtest/gtest.h>
 
@@ -130,6 +130,16 @@ TEST(RobotCheck, JudgesTheExposureByBackgroundAndLights) {
   EXPECT_NE(with("faintest", 35).find("exposure doubt"), std::string::npos);
   EXPECT_NE(with("spots", 80).find("80 lights"), std::string::npos);
   EXPECT_NE(with("brightest", 0).find("no light in view"), std::string::npos);
+}
+
+TEST(RobotCheck, NoticesBoardsOfAnotherSwarm) {
+  RobotObservation seen = healthy();
+  seen.before.estimator["foreign_boards"] = 3;
+  seen.after.estimator["foreign_boards"] = 3;
+  EXPECT_EQ(complaints(seen), "");
+
+  seen.after.estimator["foreign_boards"] = 5;
+  EXPECT_EQ(complaints(seen), "board doubt: 2 lights blink nearly as a member, but are none");
 }
 
 TEST(RobotCheck, LetsTheOthersSeeOurBoard) {
