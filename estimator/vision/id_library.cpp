@@ -49,10 +49,11 @@ Result<BlinkCode> BlinkCode::from_pattern(std::string_view pattern, Duration slo
   Duration begin{};
   for (const char bit : pattern) {
     const Duration end = begin + slot;
-    if (bit == '1' && !code.lit_.empty() && code.lit_.back().end == begin)
+    if (bit == '1' && !code.lit_.empty() && code.lit_.back().end == begin) {
       code.lit_.back().end = end;
-    else if (bit == '1')
+    } else if (bit == '1') {
       code.lit_.push_back({begin, end});
+    }
     begin = end;
   }
   return code;

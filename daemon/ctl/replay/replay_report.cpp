@@ -70,9 +70,10 @@ Json pair_json(const RobotReport& robot, const NeighborStatus& neighbor,
 Json team_json(const RobotReport& robot, const ReplayOutput::Names& names) {
   Json team;
   team["robots"] = Json::array();
-  for (const TeamRobotStatus& one : robot.status.team->robots)
+  for (const TeamRobotStatus& one : robot.status.team->robots) {
     team["robots"].push_back(team_robot_json(one, name_in(names, one.calibration.robot),
                                              robot.robot, TeamDetail::kFull));
+  }
   return team;
 }
 
