@@ -181,12 +181,11 @@ void put_network(Json& json, const SystemStatus& status) {
   json["queues"] = Json::object();
   for (const QueueStatus& queue : status.queues)
     put_total(json["queues"], queue.name, queue.dropped);
-  json["estimator"] =
-      totals_json({{"unknown_senders", status.estimator.unknown_senders},
-                   {"refused_samples", status.estimator.refused_samples},
-                   {"ids_confirmed", status.estimator.predicted_ids.confirmed},
-                   {"ids_unconfirmed", status.estimator.predicted_ids.unconfirmed},
-                   {"foreign_boards", status.estimator.foreign_boards}});
+  json["estimator"] = totals_json({{"unknown_senders", status.estimator.unknown_senders},
+                                   {"refused_samples", status.estimator.refused_samples},
+                                   {"ids_confirmed", status.estimator.predicted_ids.confirmed},
+                                   {"ids_unconfirmed", status.estimator.predicted_ids.unconfirmed},
+                                   {"foreign_boards", status.estimator.foreign_boards}});
   put_refused_imu(json["estimator"], status.estimator.refused_imu);
   json["mesh"] = mesh_json(status.mesh);
   json["network"] = totals_json(status.network);
