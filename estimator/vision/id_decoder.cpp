@@ -136,9 +136,10 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
   if (now < evidence.compared_at + code.period / kComparisonsPerPeriod) return;
   evidence.compared_at = now;
   const std::size_t phase = best_phase(SourceModels::scores_of(evidence, code));
-  const double log_ratio = foreign_log_ratio(evidence.window, code, phase);
-  evidence.is_foreign = log_ratio > kForeign;
-  if (log_ratio > kHardlyOurs) return;
+  const bool is_hardly_ours = is_explained_better(evidence.window, code, phase, kHardlyOurs);
+  evidence.is_foreign =
+      is_hardly_ours && is_explained_better(evidence.window, code, phase, kForeign);
+  if (is_hardly_ours) return;
   evidence.assigned = {best, phase};
   if (evidence.expected != best) evidence.assigned_since = now;
   evidence.confidence = posterior.probability();
@@ -158,7 +159,7 @@ void IdDecoder::review(BlinkEvidence& evidence, Timestamp now) const {
     evidence.forget();
     evidence.last_lit = now;
   } else if (!evidence.is_obstructed &&
-             foreign_log_ratio(evidence.window, code, phase) > kForeign) {
+             is_explained_better(evidence.window, code, phase, kForeign)) {
     read_again(evidence);
   }
 }

@@ -211,8 +211,7 @@ void study_hands(std::size_t n) {
     std::printf(
         "%3.0f..%3.0f Hz, %2.0f %% flipped: %zu tracks lost the ID after (pattern lengths) "
         "p50 %.2f p90 %.2f p99 %.2f p99.9 %.2f max %.2f; %zu have the new one; before: %.2f %% of "
-        "lit frames "
-        "named\n",
+        "lit frames named\n",
         from_hz, to_hz, 100.0 * flips, periods.size(), periods[periods.size() / 2],
         periods[periods.size() * 9 / 10], periods[periods.size() * 99 / 100],
         periods[periods.size() * 999 / 1000], periods.back(), passed_on,

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 namespace crepes {
 namespace {
@@ -63,20 +62,23 @@ class SlotPattern {
 
 }  // namespace
 
-double foreign_log_ratio(const BlinkWindow& window, const CodeModel& code, std::size_t phase) {
-  if (code.slots == 0) return 0.0;
+bool is_explained_better(const BlinkWindow& window, const CodeModel& code, std::size_t phase,
+                         double nats) {
+  if (code.slots == 0) return false;
   double ours = 0.0;
   for (std::size_t i = 0; i < window.size(); ++i) {
     const double p = code.lit_probability(phase, window[i].stamp);
     ours += std::log(window[i].lit ? p : 1.0 - p);
   }
-  double best = std::numeric_limits<double>::lowest();
-  const std::size_t shifts = code.phases / code.slots + 1;
-  for (std::size_t k = 0; k < shifts; ++k) {
-    const double shift = static_cast<double>(k) / static_cast<double>(shifts);
-    best = std::max(best, SlotPattern(window, code, shift).log_likelihood(window));
-  }
-  return std::max(best - ours, 0.0);
+  // No pattern explains more than every frame. This settles it for most boards in the clear.
+  const double most = static_cast<double>(window.size()) * std::log(1.0 - code.flip_rate);
+  if (most - ours <= nats) return false;
+  const double step = static_cast<double>(code.slots) / static_cast<double>(code.phases);
+  const double shift = step * static_cast<double>(phase);
+  return std::ranges::any_of(std::array{shift, shift - step, shift + step}, [&](double begin) {
+    const double from_slot = begin - std::floor(begin);
+    return SlotPattern(window, code, from_slot).log_likelihood(window) - ours > nats;
+  });
 }
 
 }  // namespace crepes

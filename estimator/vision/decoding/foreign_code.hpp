@@ -8,11 +8,11 @@
 
 namespace crepes {
 
-/// How much better [nats] the best of all patterns with as many slots explains the window than
-/// `code` in `phase`: the generalized likelihood ratio. About zero for a board that blinks the
-/// code; its flipped frames seldom repeat in each period. About four nats a frame for one whose
-/// code differs. Zero for codes that are no patterns.
-[[nodiscard]] double foreign_log_ratio(const BlinkWindow& window, const CodeModel& code,
-                                       std::size_t phase);
+/// Whether the best of all patterns with as many slots, beginning when those of `code` in `phase`
+/// do, explains the window better by more than `nats`: the generalized likelihood ratio. It is
+/// about zero for a board that blinks the code, since flipped frames seldom repeat in each period,
+/// and about four nats a frame for one whose code differs. Never for codes that are no patterns.
+[[nodiscard]] bool is_explained_better(const BlinkWindow& window, const CodeModel& code,
+                                       std::size_t phase, double nats);
 
 }  // namespace crepes

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "estimator/vision/decoding/code_model.hpp"
 #include "estimator/vision/decoding/phase_scores.hpp"
