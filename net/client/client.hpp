@@ -181,7 +181,8 @@ struct Status {
   std::vector<Clock> clocks;
   Totals queues;
   Totals network;
-  Totals estimator;  ///< inputs that it could not use, lights that are no members
+  Totals estimator;    ///< inputs that it could not use, lights that are no members
+  Totals refused_imu;  ///< samples of our IMU, by reason
   std::optional<Mesh> mesh;
   std::optional<Team> team;   ///< only if asked for
   std::optional<Pair> pair;   ///< only if asked for

@@ -72,8 +72,14 @@ Pose pose_from(const json& object) {
   return pose;
 }
 
+/// The numbers under `key`; what else may stand beside them is of no concern here.
 Status::Totals totals_from(const json& object, const char* key) {
-  return object.value(key, Status::Totals());
+  const json entries = object.value(key, json::object());
+  Status::Totals totals;
+  for (const auto& [name, value] : entries.items()) {
+    if (value.is_number_unsigned()) totals.emplace(name, value.get<std::uint64_t>());
+  }
+  return totals;
 }
 
 Status::Reports reports_from(const json& object) {
@@ -214,6 +220,7 @@ Status status_from(const json& object) {
   status.queues = totals_from(object, "queues");
   status.network = totals_from(object, "network");
   status.estimator = totals_from(object, "estimator");
+  status.refused_imu = totals_from(object.value("estimator", json::object()), "refused_imu");
   if (const auto mesh = object.find("mesh"); mesh != object.end()) status.mesh = mesh_from(*mesh);
   if (const auto team = object.find("team"); team != object.end()) status.team = team_from(*team);
   if (const auto pair = object.find("pair"); pair != object.end()) status.pair = pair_from(*pair);

@@ -100,6 +100,28 @@ TEST(ClientMessages, ReadAllAboutOneNeighbor) {
   EXPECT_EQ(read.neighbors.at(0).reports.value().lost, 3U);
 }
 
+TEST(ClientMessages, ReadWhatTheEstimatorCouldNotUse) {
+  SystemStatus status;
+  status.estimator.refused_samples = 40;
+  status.estimator.refused_imu[static_cast<std::size_t>(ImuFault::kHangs)] = 40;
+  status.estimator.foreign_boards = 2;
+
+  const auto read = std::get<Status>(parse(status_json(status)).value());
+
+  EXPECT_EQ(read.estimator, (Status::Totals{{"refused_samples", 40}, {"foreign_boards", 2}}));
+  EXPECT_EQ(read.refused_imu, (Status::Totals{{"hangs", 40}}));
+}
+
+TEST(ClientMessages, ReadPastWhatLaterVersionsAdd) {
+  const auto read = parse(
+      R"({"class":"STATUS","self":1,"later":{"a":1},"queues":{"graph":3,"by_cause":{"slow":1}},)"
+      R"("estimator":{"refused_samples":40,"names":["x"]}})");
+
+  ASSERT_TRUE(read);
+  EXPECT_EQ(std::get<Status>(*read).queues, (Status::Totals{{"graph", 3}}));
+  EXPECT_EQ(std::get<Status>(*read).estimator, (Status::Totals{{"refused_samples", 40}}));
+}
+
 TEST(ClientMessages, RefuseWhatTheyCannotRead) {
   const std::string pose =
       R"({"class":"POSE","self":1,"peer":2,"t_ns":"5","position":{"x":0,"y":0,"z":0},)"
