@@ -52,6 +52,10 @@ struct BasicBearing {
   double sigma_rad = 0.0;                           ///< one sigma across the direction
   Naming how = Naming::kRead;                       ///< those of a report are read
   double peak = 0.0;                                ///< gray levels; reports do not say
+  /// From the camera to the center of the ring, by the ring's size in the picture [m]; 0: it was
+  /// not measured. Reports do not say.
+  double distance_m = 0.0;
+  double distance_sigma_m = 0.0;  ///< one sigma of what is another error in each frame
 };
 
 /// The lever arms that readings of a pair refer to: rings of LEDs and antennas, in each one's body.
@@ -101,6 +105,18 @@ using Report = BasicReport<Timestamp>;
 /// A peer's report as it came, in the peer's time.
 using PeerReport = BasicReport<PeerTimestamp>;
 
+/// The ellipse as which the ring of a near board appears, about the center of its spot: the
+/// points A q with |q| = 1, of which this is A A^T. All zeros: its LEDs were not told apart.
+struct RingEllipse {
+  int leds = 0;
+  double uu_px2 = 0.0;
+  double uv_px2 = 0.0;
+  double vv_px2 = 0.0;
+  double sigma = 0.0;  ///< of its size, relative, by how well the LEDs fit it
+
+  [[nodiscard]] bool is_known() const { return leds > 0; }
+};
+
 /// A bright spot of one camera image; pixel centers have integer coordinates.
 struct Spot {
   double u_px = 0.0;
@@ -108,6 +124,7 @@ struct Spot {
   double area_px2 = 0.0;
   double peak = 0.0;        ///< grey level 0..255
   double elongation = 1.0;  ///< ratio of principal axes, 1 for round
+  RingEllipse ring{};
 };
 
 /// All spots of one image; an empty frame is information too.

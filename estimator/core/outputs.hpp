@@ -107,19 +107,20 @@ inline constexpr std::size_t kVerdictCount = 6;
 
 /// Who measured what.
 enum class MeasurementKind : std::uint8_t {
-  kBearing,      ///< our camera, the neighbor's ring
-  kPeerBearing,  ///< its camera, our ring
-  kRange,        ///< our module
-  kPeerRange,    ///< its module
-  kRawPose,      ///< paper III-C
+  kBearing,       ///< our camera, the neighbor's ring
+  kPeerBearing,   ///< its camera, our ring
+  kRange,         ///< our module
+  kPeerRange,     ///< its module
+  kRingDistance,  ///< our camera, by the size of the neighbor's ring
+  kRawPose,       ///< paper III-C
   kGraphPose,
 };
-inline constexpr std::size_t kMeasurementKindCount = 6;
+inline constexpr std::size_t kMeasurementKindCount = 7;
 
 /// As it is called in STATUS and in files.
 [[nodiscard]] constexpr std::string_view name_of(MeasurementKind kind) {
   constexpr std::array<std::string_view, kMeasurementKindCount> kNames{
-      "bearing", "peer_bearing", "range", "peer_range", "raw_pose", "graph_pose"};
+      "bearing", "peer_bearing", "range", "peer_range", "ring_distance", "raw_pose", "graph_pose"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -136,11 +137,11 @@ struct Fusion {
 };
 
 /// What a sensor read, as it came: of a bearing u and the camera's place, both in the seeing
-/// robot's body; of a range the distance [m]. Poses have no numbers.
+/// robot's body; of a range or a ring the distance [m]. Poses have no numbers.
 using SensorReading = std::array<double, 6>;
 /// How many of its numbers a kind has.
 [[nodiscard]] constexpr std::size_t reading_size(MeasurementKind kind) {
-  constexpr std::array<std::size_t, kMeasurementKindCount> kSizes{6, 6, 1, 1, 0, 0};
+  constexpr std::array<std::size_t, kMeasurementKindCount> kSizes{6, 6, 1, 1, 1, 0, 0};
   return kSizes[static_cast<std::size_t>(kind)];
 }
 

@@ -310,6 +310,18 @@ Fusion NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& 
   return update.fusion;
 }
 
+Fusion NeighborFilter::fuse_ring_distance(const RingReading& z, const Eigen::Vector3d& p_N_M,
+                                          double gate_nis) {
+  const auto innovation = linearize_ring_distance(state_, z.camera, p_N_M, z.distance_m, z.sigma_m);
+  if (!innovation) return {};
+  const double distance_m = z.distance_m - innovation->residual(0);
+  const double shared_m = kRingScaleSigma * z.distance_m;
+  const RangeUpdate update =
+      update_by_range(*innovation, distance_m, gate_nis, P_, shared_m * shared_m);
+  if (update.fusion.verdict == Verdict::kFused) apply(update.correction);
+  return update.fusion;
+}
+
 Fusion NeighborFilter::fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis) {
   const double own = intersection_weight(pose_covariance(), T_B_N.covariance);
   if (own == 1.0) return {.verdict = Verdict::kFused};

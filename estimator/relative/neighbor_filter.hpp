@@ -36,6 +36,13 @@ struct RangeReading {
   double sigma_m = 0.0;
 };
 
+/// The distance of a camera, in the body of its robot, to an LED ring, by the ring's size.
+struct RingReading {
+  Eigen::Vector3d camera = Eigen::Vector3d::Zero();
+  double distance_m = 0.0;
+  double sigma_m = 0.0;  ///< without kRingScaleSigma
+};
+
 /// ErrorState::kSize error states: relative motion, both IMUs' biases and scales, the pair's
 /// range bias and both cameras' misalignment. Advances forward only; corrections apply at
 /// `stamp()`.
@@ -66,6 +73,9 @@ class NeighborFilter {
   /// Corrects the state by the distance between two antennas.
   Fusion fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
                     const Eigen::Vector3d& p_N_Q, double gate_nis);
+  /// Corrects the state by the distance of our camera to the neighbor's ring. Antenna delays are
+  /// not in it.
+  Fusion fuse_ring_distance(const RingReading& z, const Eigen::Vector3d& p_N_M, double gate_nis);
   /// A pose whose errors may be correlated with this filter and with earlier such poses: covariance
   /// intersection (Julier and Uhlmann 1997).
   Fusion fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis);

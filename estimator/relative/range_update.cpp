@@ -39,14 +39,15 @@ E::Vector along_line(const E::Vector& gain, const Eigen::RowVector3d& line) {
 }  // namespace
 
 RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double gate_nis,
-                            E::Covariance& P) {
+                            E::Covariance& P, double shared_m2) {
   const Eigen::RowVector3d line = z.H.middleCols<3>(E::kP);
   const Moments curvature = curvature_of(line, distance_m, P.block<E::kP, E::kP, 3, 3>());
   const double curved = curvature.variance_m2;
   const E::Vector PHt = P.seen_columns().lazyProduct(z.H.transpose());
   const double predicted = z.H * PHt.head<E::kSeen>();
   const double residual = z.residual(0) - curvature.mean_m;
-  const double expected = predicted + z.cov_z(0, 0) + curved;
+  const double shared = curved + shared_m2;
+  const double expected = predicted + z.cov_z(0, 0) + shared;
 
   RangeUpdate update;
   Fusion& fusion = update.fusion;
@@ -60,13 +61,14 @@ RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double 
   const double is_true = density / (density + kFalseRangeDensity);
   const bool fits = fusion.nis <= gate_nis && is_true >= 0.5;
   fusion.verdict = fits ? Verdict::kFused : Verdict::kGated;
-  if (fusion.verdict == Verdict::kGated || predicted <= curved) return update;
+  if (fusion.verdict == Verdict::kGated || predicted <= shared) return update;
 
   // The error across hardly changes between ranges, so that their curvature does not average out.
-  // The variance after the update is at least that of the curvature (compare a consider state,
-  // Schmidt 1966). Otherwise ranges make a direction known that they do not depend on.
+  // The variance after the update is at least that of the curvature and of what is shared (compare
+  // a consider state, Schmidt 1966). Otherwise ranges make a direction known that they do not
+  // depend on.
   const double variance =
-      std::max(z.cov_z(0, 0) + curved, predicted * curved / (predicted - curved));
+      std::max(z.cov_z(0, 0) + shared, predicted * shared / (predicted - shared));
   const E::Vector G = PHt / std::sqrt(predicted + variance);
   const double white = residual / std::sqrt(predicted + variance);
 

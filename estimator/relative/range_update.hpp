@@ -14,8 +14,11 @@ struct RangeUpdate {
   ErrorState::Vector correction = ErrorState::Vector::Zero();  ///< to be injected
 };
 
-/// Corrects P by a range, linearized at antennas `distance_m` apart.
+/// Corrects P by a range, linearized at antennas `distance_m` apart. `shared_m2` is the variance of
+/// an error that all these ranges have in common and that is no state: however many there are, the
+/// range is not known better afterwards (compare a consider state, Schmidt 1966).
 [[nodiscard]] RangeUpdate update_by_range(const RangeInnovation& z, double distance_m,
-                                          double gate_nis, ErrorState::Covariance& P);
+                                          double gate_nis, ErrorState::Covariance& P,
+                                          double shared_m2 = 0.0);
 
 }  // namespace crepes

@@ -5,11 +5,19 @@
 namespace crepes {
 namespace {
 
+/// Null for what no camera saw.
+const Eigen::Vector3d* camera_of(const Measurement& measurement) {
+  if (const auto* bearing = std::get_if<DirectionReading>(&measurement.reading))
+    return &bearing->camera;
+  const auto* ring = std::get_if<RingReading>(&measurement.reading);
+  return ring == nullptr ? nullptr : &ring->camera;
+}
+
 bool are_alternatives(const Measurement& a, const Measurement& b) {
   if (a.stamp != b.stamp || a.kind != b.kind) return false;
-  const auto* bearing = std::get_if<DirectionReading>(&a.reading);
-  const auto* other = std::get_if<DirectionReading>(&b.reading);
-  return bearing == nullptr || other == nullptr || bearing->camera == other->camera;
+  const Eigen::Vector3d* camera = camera_of(a);
+  const Eigen::Vector3d* other = camera_of(b);
+  return camera == nullptr || other == nullptr || *camera == *other;
 }
 
 }  // namespace
@@ -20,6 +28,7 @@ SensorReading reading_of(const Measurement& measurement) {
     const Eigen::Vector3d& p = bearing->camera;
     return {u.x(), u.y(), u.z(), p.x(), p.y(), p.z()};
   }
+  if (const auto* ring = std::get_if<RingReading>(&measurement.reading)) return {ring->distance_m};
   const auto* range = std::get_if<RangeReading>(&measurement.reading);
   return range == nullptr ? SensorReading{} : SensorReading{range->range_m};
 }

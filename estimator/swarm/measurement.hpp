@@ -28,8 +28,8 @@ struct OneWayInitialization {
 struct Measurement {
   Timestamp stamp{};
   MeasurementKind kind = MeasurementKind::kBearing;
-  std::variant<DirectionReading, RangeReading, MutualInitialization, OneWayInitialization,
-               GraphPose>
+  std::variant<DirectionReading, RangeReading, RingReading, MutualInitialization,
+               OneWayInitialization, GraphPose>
       reading;
 };
 

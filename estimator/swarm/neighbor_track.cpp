@@ -49,6 +49,9 @@ Fusion fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounti
     case MeasurementKind::kPeerRange:
       return filter.fuse_range(std::get<RangeReading>(m.reading), mounting.p_B_U, mounting.p_N_Q,
                                gates.range);
+    case MeasurementKind::kRingDistance:
+      return filter.fuse_ring_distance(std::get<RingReading>(m.reading), mounting.p_N_M,
+                                       gates.range);
     case MeasurementKind::kGraphPose:
       return filter.fuse_correlated_pose(std::get<GraphPose>(m.reading).T_B_N, gates.pose);
     case MeasurementKind::kRawPose:

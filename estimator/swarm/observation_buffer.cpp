@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "estimator/core/quantile.hpp"
+#include "estimator/relative/range_measurement.hpp"
 
 namespace crepes {
 namespace {
@@ -117,6 +118,15 @@ std::optional<RangeReading> ObservationBuffer::range_at(Timestamp t) const {
   return RangeReading{upper_median(near), sigma_m};
 }
 
+/// Between the antennas, whose places relative to camera and ring are not known before the pose.
+std::optional<RangeReading> ObservationBuffer::range_by_ring(const Bearing& bearing) const {
+  if (bearing.distance_m <= 0.0) return std::nullopt;
+  const double arms_m = (self_.p_body_uwb - bearing.p_B_C).norm() +
+                        (neighbor_.p_body_uwb - neighbor_.p_body_led).norm();
+  const double scale_m = kRingScaleSigma * bearing.distance_m;
+  return RangeReading{bearing.distance_m, std::hypot(bearing.distance_sigma_m, scale_m, arms_m)};
+}
+
 Sighting ObservationBuffer::sighting(const Bearing& bearing, const Tilt& tilt,
                                      const MemberConfig& member) const {
   return {.u = bearing.u_B,
@@ -136,12 +146,13 @@ ObservationBuffer::mutual_initializations(const Bearing& peer_bearing, const Rob
   if (!is_confirmed_by_next(peer_bearing, peer_, neighbor.imu)) return NoPoseReason::kDoesNotSeeUs;
   const std::vector<Bearing> own = own_at(t, self.imu);
   if (own.empty()) return NoPoseReason::kNotSeen;
-  const auto range = range_at(t);
-  if (!range) return NoPoseReason::kNoRange;
+  const auto measured = range_at(t);
 
   std::vector<MutualInitialization> found;
   NoPoseReason reason = NoPoseReason::kNone;
   for (const Bearing& bearing : own) {
+    const auto range = measured ? measured : range_by_ring(bearing);
+    if (!range) return NoPoseReason::kNoRange;
     auto result = compute_raw_pose({.B = sighting(bearing, *tilt_B, self_),
                                     .N = sighting(peer_bearing, *tilt_N, neighbor_),
                                     .range_m = range->range_m,
@@ -167,7 +178,8 @@ std::optional<Measurement> ObservationBuffer::one_way_initialization(
   const Bearing& bearing = own_.all().back();
   const auto tilt_B = self.tilt_at(bearing.stamp);
   const auto tilt_N = neighbor.tilt_at(bearing.stamp);
-  const auto range = range_at(bearing.stamp);
+  const auto measured = range_at(bearing.stamp);
+  const auto range = measured ? measured : range_by_ring(bearing);
   if (!tilt_B || !tilt_N || !range) return std::nullopt;
   // Only now: without a tilt there may be no inertial sample either.
   if (!is_confirmed(bearing, own_, self.imu)) return std::nullopt;

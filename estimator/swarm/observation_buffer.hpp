@@ -35,7 +35,7 @@ class ObservationBuffer {
   void add_range(Timestamp stamp, double range_m);
 
   /// Raw poses at the stamp of `peer_bearing`, one for each own bearing near that instant; or why
-  /// there is none. A bearing counts only if another one within 0.1 s has about its direction: a
+  /// there is none. Where there is no range, the size of the ring gives the distance, if it may. A bearing counts only if another one within 0.1 s has about its direction: a
   /// single flicker is not a robot. If the peer sent none within 0.1 s, one within 0.3 s counts.
   [[nodiscard]] std::variant<std::vector<MutualInitialization>, NoPoseReason>
   mutual_initializations(const Bearing& peer_bearing, const RobotState& self,
@@ -51,6 +51,7 @@ class ObservationBuffer {
                                   const MemberConfig& member) const;
   [[nodiscard]] std::vector<Bearing> own_at(Timestamp t, const ImuHistory& imu) const;
   [[nodiscard]] std::optional<RangeReading> range_at(Timestamp t) const;
+  [[nodiscard]] std::optional<RangeReading> range_by_ring(const Bearing& bearing) const;
 
   struct StampedRange {
     Timestamp stamp{};

@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace crepes {
+namespace {
+
+constexpr Duration kRingPeriod = std::chrono::milliseconds{200};
+constexpr Duration kWithoutRange = std::chrono::seconds{1};
+
+}  // namespace
 
 ReadingIntake::ReadingIntake(RobotId neighbor, const FilterSettings& settings)
     : settings_(settings), buffer_(settings.lag), outcomes_(neighbor) {}
@@ -22,6 +28,13 @@ void ReadingIntake::add_bearing(const Bearing& bearing) {
   last_.seen = std::max(last_.seen, bearing.stamp);
   enqueue({bearing.stamp, MeasurementKind::kBearing,
            DirectionReading{bearing.u_B, bearing.p_B_C, bearing.sigma_rad}});
+  if (bearing.distance_m <= 0.0 || bearing.stamp - last_.ranged < kWithoutRange) return;
+  // Those of one frame are alternatives: of the board and of its image in a mirror.
+  const Duration since = bearing.stamp - ring_distance_;
+  if (since != Duration::zero() && since < kRingPeriod) return;
+  ring_distance_ = bearing.stamp;
+  enqueue({bearing.stamp, MeasurementKind::kRingDistance,
+           RingReading{bearing.p_B_C, bearing.distance_m, bearing.distance_sigma_m}});
 }
 
 void ReadingIntake::add_peer_bearing(const Bearing& bearing, double sigma_rad) {

@@ -21,6 +21,7 @@ BlinkTracker::BlinkTracker(const CameraCalibration& camera, CameraModel model,
       decoder_(library, config, camera.rate_hz, own) {
   timeout_ = std::max(from_seconds(config.track_timeout_ms * 1e-3), decoder_.longest_dark());
   for (const auto& [id, code] : library.entries()) counts_.decodes[id] = 0;
+  sizes_ = library.sizes();
 }
 
 void BlinkTracker::add_imu(const ImuSample& sample) {
@@ -171,14 +172,18 @@ void BlinkTracker::name(LightTrack& track, Timestamp stamp, std::vector<Bearing>
   const double lit =
       decoder_.lit_probability(track.evidence, track.seen.exposed).value_or(kUnknownLit);
   if (!id || lit < kLeastLit) return;
-  const Bearing bearing{
-      .stamp = stamp,
-      .neighbor = *id,
-      .u_B = track.seen.u_B,
-      .p_B_C = view_.p_B_C(),
-      .sigma_rad = track.light.sigma_px(config_.bearing_sigma_px) * track.seen.px_rad,
-      .how = read ? Naming::kRead : Naming::kPredicted,
-      .peak = track.seen.peak};
+  Bearing bearing{.stamp = stamp,
+                  .neighbor = *id,
+                  .u_B = track.seen.u_B,
+                  .p_B_C = view_.p_B_C(),
+                  .sigma_rad = track.light.sigma_px(config_.bearing_sigma_px) * track.seen.px_rad,
+                  .how = read ? Naming::kRead : Naming::kPredicted,
+                  .peak = track.seen.peak};
+  const auto size = sizes_.find(*id);
+  if (size != sizes_.end() && size->second.has(track.seen.ring_leds)) {
+    bearing.distance_m = size->second.ring_radius_m / track.seen.ring_tan;
+    bearing.distance_sigma_m = bearing.distance_m * track.seen.ring_sigma;
+  }
   bearings.push_back(bearing);
   if (!read) track.predicted.push_back(bearing);
 }

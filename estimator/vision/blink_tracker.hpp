@@ -51,6 +51,8 @@ struct TrackerStatus {
 /// A light that appears alone where a board is expected, by the gyro or by the pose of a robot, and
 /// in the phase in which that board blinks, has its ID from the first frame on. Such bearings are
 /// marked `predicted`, for 0.3 s at most; then the ID has been read, or there is none.
+///
+/// If the radius of a board is known, the size of its ring in the picture gives the distance, too.
 class BlinkTracker {
  public:
   /// `own`: the robot that carries the camera. It sees itself in mirrors only; never reported.
@@ -92,6 +94,7 @@ class BlinkTracker {
   Duration timeout_{};
   Duration period_{};  ///< of frames
   IdDecoder decoder_;
+  std::map<RobotId, IdLibrary::BoardSize> sizes_;  ///< of boards, as far as they are known
   ImuHistory imu_;
   PhaseMemory phases_;
   std::vector<LightTrack> tracks_;

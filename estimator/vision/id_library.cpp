@@ -118,6 +118,7 @@ Result<IdLibrary> IdLibrary::from(const SwarmConfig& swarm) {
       }
     }
     library.entries_.push_back({member.id, *std::move(code)});
+    if (member.ring_radius_m) library.sizes_[member.id] = {*member.ring_radius_m, member.ring_leds};
   }
   return library;
 }

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -57,9 +59,22 @@ class IdLibrary {
   [[nodiscard]] static Result<IdLibrary> from(const SwarmConfig& swarm);
 
   [[nodiscard]] std::span<const Entry> entries() const { return entries_; }
+  /// How large a board is.
+  struct BoardSize {
+    double ring_radius_m = 0.0;
+    std::optional<int> leds;
+
+    /// Whether a ring of so many LEDs in a picture may be this one. Four may be a part of a ring.
+    [[nodiscard]] bool has(int ring_leds) const {
+      return leds ? ring_leds == *leds : ring_leds > 4;
+    }
+  };
+  /// Of the boards whose radius is configured.
+  [[nodiscard]] const std::map<RobotId, BoardSize>& sizes() const { return sizes_; }
 
  private:
   std::vector<Entry> entries_;
+  std::map<RobotId, BoardSize> sizes_;
 };
 
 }  // namespace crepes

@@ -27,10 +27,21 @@ constexpr int kMaxMended = 100;  // px; the center of what is larger does not de
 constexpr double kRim = 1.25;       // of a ring's radius: what is nearer belongs to it
 constexpr double kSmallRing = 5.0;  // px radius; the center of its light is surer than that of LEDs
 constexpr double kSharpRing = 0.04;      // of its radius, the error of LEDs that stand apart
+constexpr double kLedSigma = 0.1;        // px; the least, of the center of an LED
 constexpr double kSmallRingShift = 0.3;  // of its radius; an arc's light is further away
 constexpr double kOtherLight = 0.6;      // of its radius; light of another board is in its blob
 
 double distance(double u, double v) { return std::sqrt(u * u + v * v); }
+
+/// Of a whole ring. Each LED says as much of its size as of one of the axes.
+RingEllipse ellipse_of(const Ring& ring) {
+  const Eigen::Matrix2d squared = ring.view.axes * ring.view.axes.transpose();
+  return {.leds = ring.leds,
+          .uu_px2 = squared(0, 0),
+          .uv_px2 = squared(0, 1),
+          .vv_px2 = squared(1, 1),
+          .sigma = std::max(ring.rms, kLedSigma) / ring.view.radius() * std::sqrt(2.0 / ring.leds)};
+}
 
 Exposure judge(const Detection& found, bool is_noise) {
   if (is_noise || found.background >= kTooBrightBackground ||
@@ -259,6 +270,7 @@ void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& 
     spot.u_px = center.x();
     spot.v_px = center.y();
   }
+  if (is_sharp && ring.is_whole()) spot.ring = ellipse_of(ring);
   candidates_.push_back({spot, whole.box});
 }
 

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kPrincipalPointSigma = 0.4;  // px
 constexpr std::uint64_t kCalibrationKey = 0x63616c69U;
+constexpr std::uint64_t kBoardKey = 0x626f6172U;
 
 std::vector<ImuSample> record_imu(const SimWorld& world, const DemoRobot& robot,
                                   double duration_s) {
@@ -59,6 +60,16 @@ void miscalibrate(Config& config, int seed) {
   const SeededNoise noise{kCalibrationKey, static_cast<std::uint64_t>(seed), config.robot.id.value};
   std::vector<double>& intrinsics = config.cameras.front().calibration.intrinsics;
   for (std::size_t i = 4; i < 6; ++i) intrinsics.at(i) += kPrincipalPointSigma * noise.gaussian(i);
+}
+
+/// As their builders measured the boards; all robots have the same numbers.
+void measure_boards(const LedBoard& board, int seed, Config& config) {
+  constexpr double kMeasured = 0.02;  // one sigma, relative
+  for (MemberConfig& member : config.swarm.members) {
+    const SeededNoise noise{kBoardKey, static_cast<std::uint64_t>(seed), member.id.value};
+    member.ring_radius_m = board.radius_m * (1.0 + kMeasured * noise.gaussian(0));
+    member.ring_leds = board.leds;
+  }
 }
 
 Trajectory record_truth(const SimWorld& world, RobotId robot, double duration_s) {
@@ -123,6 +134,7 @@ Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vecto
                                         disturbance.obstacles, duration_s);
     recording.cameras.push_back({.spots = spots_of(robot), .images = {}});
     miscalibrate(robot.config, seed);
+    if (scenario.are_boards_measured) measure_boards(*scenario.pictured, seed, robot.config);
     recording.config = std::move(robot.config);
     dataset.robots.push_back(std::move(recording));
     paths.emplace(id, SwarmTruth::Robot{entry.clock, record_truth(world, id, duration_s)});

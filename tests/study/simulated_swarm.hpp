@@ -32,6 +32,7 @@ struct Scenario {
   double sight_m = 1e3;  ///< no camera sees further
   /// Spots are what the detector finds in rendered pictures of such boards, without disturbances.
   std::optional<LedBoard> pictured{};
+  bool are_boards_measured = false;  ///< robots know their size, within 2 %
 };
 
 inline constexpr std::array kScenarios{

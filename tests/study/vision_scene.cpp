@@ -12,6 +12,7 @@
 #include "estimator/vision/blink_tracker.hpp"
 #include "estimator/vision/codebook.hpp"
 #include "estimator/vision/spot_detector.hpp"
+#include "estimator/vision/tracking/camera_view.hpp"
 
 namespace crepes::study {
 namespace {
@@ -341,7 +342,10 @@ RingScore score_rings(const RingPictures& rings) {
   CameraCalibration small = fisheye();
   small.intrinsics = {-0.1723, 0.5931, 316.8, 316.6, 240.2, 191.6};
   small.resolution = {480, 384};
+  small.T_cam_imu = {};
   const CameraModel model = CameraModel::from(small).value();
+  const CameraView view(small, model);
+  std::vector<LightSighting> sightings;
   SpotDetector detector{VisionConfig{}};
   std::mt19937 random(rings.seed);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
@@ -373,6 +377,12 @@ RingScore score_rings(const RingPictures& rings) {
     const Eigen::Vector2d center = model.project(T_C_M.p).value();
     const double off = (center - Eigen::Vector2d(found.spots[0].u_px, found.spots[0].v_px)).norm();
     score.centered += off <= 1.0 ? 1 : 0;
+    (void)view.unproject({.spots = {found.spots[0]}}, {}, {}, 1, sightings);
+    const LightSighting& sighting = sightings.at(0);
+    if (sighting.ring_leds != board.leds) continue;
+    // The corners of a square of four are a ring of four.
+    const double radius_m = board.radius_m * (board.is_square && board.leds == 4 ? M_SQRT2 : 1.0);
+    score.distance_errors.push_back(radius_m / sighting.ring_tan / range - 1.0);
   }
   return score;
 }

@@ -77,8 +77,9 @@ struct RingPictures {
 
 struct RingScore {
   int pictures = 0;
-  int one_spot = 0;  ///< exactly one
-  int centered = 0;  ///< exactly one, within a pixel
+  int one_spot = 0;                     ///< exactly one
+  int centered = 0;                     ///< exactly one, within a pixel
+  std::vector<double> distance_errors;  ///< by the rings' sizes, relative; where there is one
 };
 
 [[nodiscard]] RingScore score_rings(const RingPictures& rings);

@@ -2,6 +2,9 @@
 /// cameras, ranges, and datagrams between two clocks.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -20,10 +23,13 @@ namespace crepes::test {
 
 /// What may be wrong.
 struct Conditions {
-  bool in_view = true;         ///< of each other
-  double decoy_rad = 0.0;      ///< our cameras see the neighbor's ring this far to the left instead
-  bool is_lamp = false;        ///< that light is a lamp, which does not blink; the ring is hidden
-  double ghost_rad = 0.0;      ///< beside it, this far to the left, a foreign board with its code
+  bool in_view = true;     ///< of each other
+  double decoy_rad = 0.0;  ///< our cameras see the neighbor's ring this far to the left instead
+  bool is_lamp = false;    ///< that light is a lamp, which does not blink; the ring is hidden
+  double ghost_rad = 0.0;  ///< beside it, this far to the left, a foreign board with its code
+  double ring_size = 0.0;  ///< of the neighbor's ring in our pictures, as a part of the true one;
+                           ///< 0: its LEDs cannot be told apart
+  bool has_ranges = true;  ///< of either module
   double peer_turn_rad = 0.0;  ///< the neighbor's bearings of us point this far to the left
   bool peer_is_on = true;
   std::function<ImuSample(const ImuSample&)> own_imu{};  ///< what the IMU makes of the truth
@@ -177,7 +183,7 @@ class EstimatorPair {
     pair_.sample_imus(Timestamp{now_});
     deliver(with);
     if (now_ % SimulatedPair::kImuPeriod == Duration{}) sample_imus(with);
-    if (now_ % (2 * kTick) == kFrame) measure_ranges(with);
+    if (with.has_ranges && now_ % (2 * kTick) == kFrame) measure_ranges(with);
     look(with);
     if (now_ % kTick == Duration{}) {
       if (with.in_view && with.peer_is_on) {
@@ -240,7 +246,8 @@ class EstimatorPair {
                                   pair_.bearing(Timestamp{now_}, T_B_C.p, misalignment).u;
       const auto uv = camera.project(T_B_C.q.conjugate() * u_B);
       if (is_lit && uv && camera.contains(*uv))
-        frame.spots.push_back({uv->x(), uv->y(), 12.0, 255.0, 1.0});
+        frame.spots.push_back(
+            {uv->x(), uv->y(), 12.0, 255.0, 1.0, ring_at(*uv, camera, T_B_C.p, with.ring_size)});
       if (with.ghost_rad != 0.0 && library.entries()[1].code.is_lit(now_ + kGhostPhase)) {
         const auto ghost =
             camera.project(T_B_C.q.conjugate() * (so3_exp({0.0, 0.0, with.ghost_rad}) * u_B));
@@ -261,6 +268,19 @@ class EstimatorPair {
       if (std::exchange(seeing_camera_, k) != k) ++camera_changes_;
       last_seen_ = now_;
     }
+  }
+
+  /// Facing the camera.
+  [[nodiscard]] RingEllipse ring_at(const Eigen::Vector2d& uv, const CameraModel& camera,
+                                    const Eigen::Vector3d& p_B_C, double size) const {
+    const MemberConfig& other = settings_.swarm.members[1];
+    if (size == 0.0 || !other.ring_radius_m) return {};
+    const Pose T_B_N = pair_.truth(Timestamp{now_}).motion.T_B_N;
+    const double tangent = size * *other.ring_radius_m / (T_B_N * other.p_body_led - p_B_C).norm();
+    CameraModel::UnprojectionJacobian J;
+    EXPECT_TRUE(camera.unproject(uv, &J));
+    const Eigen::Matrix2d M = tangent * tangent * (J.transpose() * J).inverse();
+    return {.leds = 6, .uu_px2 = M(0, 0), .uv_px2 = M(0, 1), .vv_px2 = M(1, 1), .sigma = 0.01};
   }
 
   void report_for_peer(const Conditions& with) {

@@ -6,6 +6,25 @@
 #include <utility>
 
 namespace crepes {
+namespace {
+
+/// Radius over distance. A ring of radius r at distance d appears as the pixels A q about its
+/// center, |q| = 1, to first order of r / d. Across the line of sight that is J A q, and the
+/// longest of these vectors is that of the diameter which is not foreshortened: r / d.
+double ring_tan(const RingEllipse& ring, const CameraModel::UnprojectionJacobian& J) {
+  if (!ring.is_known()) return 0.0;
+  Eigen::Matrix2d M;
+  M << ring.uu_px2, ring.uv_px2, ring.uv_px2, ring.vv_px2;
+  const Eigen::Matrix2d G = J.transpose() * J;
+  // The eigenvalues of J M J^T that are not 0 are those of M G.
+  const double half_trace = 0.5 * (M * G).trace();
+  const double determinant = M.determinant() * G.determinant();
+  const double largest =
+      half_trace + std::sqrt(std::max(0.0, half_trace * half_trace - determinant));
+  return std::isfinite(largest) ? std::sqrt(largest) : 0.0;
+}
+
+}  // namespace
 
 CameraView::CameraView(const CameraCalibration& camera, CameraModel model)
     : model_(std::move(model)),
@@ -48,6 +67,9 @@ std::size_t CameraView::unproject(const SpotFrame& frame, Timestamp stamp, const
                          .radius_rad = std::sqrt(spot.area_px2 / std::numbers::pi) * px_rad,
                          .px_rad = px_rad,
                          .peak = spot.peak,
+                         .ring_leds = spot.ring.leds,
+                         .ring_tan = ring_tan(spot.ring, J),
+                         .ring_sigma = spot.ring.sigma,
                          .exposed = row_exposure(spot.v_px, stamp)});
     LightSighting& sighting = sightings.back();
     if (row_delay_s_ != 0.0 && !imu.empty())

@@ -13,6 +13,9 @@ struct LightSighting {
   double radius_rad = 0.0;  ///< of the blob
   double px_rad = 0.0;      ///< what a pixel subtends here
   double peak = 0.0;        ///< gray levels
+  int ring_leds = 0;        ///< of its ring; 0: they were not told apart
+  double ring_tan = 0.0;    ///< radius over distance of the ring
+  double ring_sigma = 0.0;  ///< of `ring_tan`, relative
   Timestamp exposed{};      ///< middle of its row's exposure, body time
 };
 

@@ -151,6 +151,29 @@ TEST(RangeMeasurement, JacobianIsTheDerivativeOfTheModel) {
   }
 }
 
+TEST(RingDistanceMeasurement, JacobianIsTheDerivativeOfTheModel) {
+  RandomGeometry random(6);
+  for (int i = 0; i < kStates; ++i) {
+    const NominalState state = random_state(random);
+    const Eigen::Vector3d p_B_C = random.vector(0.1);
+    const Eigen::Vector3d p_N_M = random.vector(0.1);
+    const auto model = [&](const NominalState& x) {
+      return (x.motion.T_B_N * p_N_M - p_B_C).norm();
+    };
+    if (model(state) < 0.5) continue;
+
+    const auto z = linearize_ring_distance(state, p_B_C, p_N_M, model(state) + 0.3, 0.05);
+
+    ASSERT_TRUE(z.has_value());
+    EXPECT_NEAR(z->residual(0), 0.3, 1e-12);
+    EXPECT_DOUBLE_EQ(z->cov_z(0, 0), 0.05 * 0.05);
+    const auto H = numeric_jacobian<1, E::kSize>([&](const E::Vector& dx) {
+      return Eigen::Matrix<double, 1, 1>(model(injected(state, dx)));
+    });
+    expect_equal(z->H, H);
+  }
+}
+
 TEST(RangeMeasurement, RefusesAntennasThatCoincide) {
   NominalState state;
   state.motion.T_B_N.p = {0.2, 0.0, 0.0};

@@ -54,6 +54,26 @@ TEST(RangeUpdate, ErrorsAreAsLargeAsItSaysAboutABadlyKnownDirection) {
   EXPECT_GT(sum / kRuns, 0.5);
 }
 
+TEST(RangeUpdate, DoesNotKnowTheRangeBetterThanTheErrorThatAllShare) {
+  constexpr double kShared = 0.15;
+  Scene scene(1.0, 0.1);
+  for (int i = 0; i < 100; ++i) {
+    const auto z = linearize_ring_distance(scene.state, Eigen::Vector3d::Zero(),
+                                           Eigen::Vector3d::Zero(), 5.3, kNoise);
+    const RangeUpdate update =
+        update_by_range(*z, scene.state.motion.T_B_N.p.norm(), kNoGate, scene.P, kShared * kShared);
+    inject(update.correction, scene.state);
+  }
+  EXPECT_GE(scene.sigma(0), kShared);
+  EXPECT_LT(scene.sigma(0), 1.05 * kShared);
+  EXPECT_NEAR(scene.state.motion.T_B_N.p.x(), 5.3, 0.02);
+
+  const auto z = linearize_ring_distance(scene.state, Eigen::Vector3d::Zero(),
+                                         Eigen::Vector3d::Zero(), 5.6, kNoise);
+  scene.P.diagonal()(E::kP) = 0.1 * 0.1;
+  EXPECT_TRUE(update_by_range(*z, 5.3, kNoGate, scene.P, kShared * kShared).correction.isZero());
+}
+
 TEST(RangeUpdate, RangesDoNotMakeABadlyKnownDirectionKnown) {
   Scene scene(0.2, 1.0);
   for (int i = 0; i < 1000; ++i) {

@@ -78,6 +78,22 @@ TEST_F(Sighted, JoinsReadingsOfOneInstantToTheTruePose) {
   EXPECT_LT(pose_difference(truth, first(result).raw.T_B_N).norm(), 1e-9);
 }
 
+// Antennas are some centimeters from camera and ring, in directions that are not known yet.
+TEST_F(Sighted, TakesTheDistanceByTheRingWhereThereIsNoRange) {
+  Bearing bearing = own(kNow);
+  bearing.distance_m =
+      (pair_.truth(kNow).motion.T_B_N * pair_.mounting_N.led - bearing.p_B_C).norm();
+  bearing.distance_sigma_m = 0.2;
+  buffer_.add_own_bearing(bearing);
+
+  const auto result = buffer_.mutual_initializations(peer(kNow), self_, neighbor_);
+
+  ASSERT_EQ(count(result), 1U);
+  const RawPose& raw = first(result).raw;
+  EXPECT_LT((pair_.truth(kNow).motion.T_B_N.p - raw.T_B_N.p).norm(), 0.2);
+  EXPECT_GT(std::sqrt(raw.gaussian().covariance.topLeftCorner<3, 3>().trace()), 0.2);
+}
+
 TEST_F(Sighted, TurnsABearingOfANearbyInstantByTheGyroscope) {
   buffer_.add_own_bearing(own(kNow - 15ms));
   add_range(kNow);

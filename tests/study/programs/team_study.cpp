@@ -33,6 +33,8 @@ struct Options {
   std::string liar;
   std::string write_dir;
   int leds = 0;
+  double ring_radius_m = LedBoard{}.radius_m;
+  bool measured = false;
 };
 
 bool complain(const std::string& message) {
@@ -99,7 +101,10 @@ class Study {
 };
 
 bool add_seeds(const Options& options, Scenario scenario, Study& study) {
-  if (options.leds > 0) scenario.pictured = LedBoard{.leds = options.leds};
+  if (options.leds > 0) {
+    scenario.pictured = LedBoard{.leds = options.leds, .radius_m = options.ring_radius_m};
+    scenario.are_boards_measured = options.measured;
+  }
   for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
     const std::string name = std::string(scenario.name) + " " + std::to_string(seed);
     const Swarm swarm = simulate_swarm(scenario, seed, options.duration_s);
@@ -161,6 +166,11 @@ int main(int argc, char** argv) {
   app.add_option("--leds", options.leds,
                  "render every picture, with boards of so many LEDs, instead of projecting spots")
       ->check(CLI::Range(1, 64));
+  app.add_option("--ring-radius", options.ring_radius_m, "with --leds: radius of the boards [m]")
+      ->capture_default_str()
+      ->check(CLI::Range(0.005, 1.0));
+  app.add_flag("--measured", options.measured,
+               "with --leds: the robots know the radius within 2 %, and so measure distances");
   app.add_option("--liar", options.liar,
                  "make the last robot faulty; errors of the others with it over without it")
       ->check(CLI::IsMember(liars));

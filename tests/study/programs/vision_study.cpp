@@ -57,14 +57,22 @@ void print_rings(const char* name, RingPictures rings) {
     sum.pictures += score.pictures;
     sum.one_spot += score.one_spot;
     sum.centered += score.centered;
+    for (const double error : score.distance_errors)
+      sum.distance_errors.push_back(100.0 * std::abs(error));
   }
-  std::printf("%-40s %5d  %6.2f  %6.2f\n", name, sum.pictures, 100.0 * sum.one_spot / sum.pictures,
-              100.0 * sum.centered / sum.pictures);
+  const auto off = static_cast<std::size_t>(
+      std::ranges::count_if(sum.distance_errors, [](double percent) { return percent > 5.0; }));
+  std::printf("%-40s %5d  %6.2f  %6.2f  %6.1f %6.2f %6.2f %6.2f\n", name, sum.pictures,
+              100.0 * sum.one_spot / sum.pictures, 100.0 * sum.centered / sum.pictures,
+              100.0 * per(sum.distance_errors.size(), static_cast<std::size_t>(sum.pictures)),
+              share_of(sum.distance_errors, 0.5), share_of(sum.distance_errors, 0.95),
+              100.0 * per(off, sum.distance_errors.size()));
   std::fflush(stdout);
 }
 
 void print_all_rings() {
-  std::printf("%-40s %5s  %6s  %6s\n", "single pictures", "n", "one %", "centered %");
+  std::printf("%-40s %5s  %6s  %6s  %6s %6s %6s %6s\n", "single pictures", "n", "one %", "cent.%",
+              "sized%", "med %", "95 %", "> 5 %");
   const std::vector<double> radii{0.01, 0.02, 0.03, 0.045, 0.06};
   print_rings("six, 3 cm, to 45 deg", {.leds = {6}, .radii_m = {0.03}, .tilt_rad = 0.785});
   print_rings("eight, 3 cm, to 45 deg", {.leds = {8}, .radii_m = {0.03}, .tilt_rad = 0.785});
