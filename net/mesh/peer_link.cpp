@@ -19,9 +19,10 @@ Report to_local(const PeerReport& theirs, const ClockOffset& clock) {
   ours.tilt = {clock.to_local(theirs.tilt.stamp), theirs.tilt.up_B, theirs.tilt.sigma_rad};
   for (const auto& [stamp, gyro, accel] : theirs.imu)
     ours.imu.push_back({clock.to_local(stamp), gyro, accel});
-  for (const auto& z : theirs.bearings)
+  for (const auto& z : theirs.bearings) {
     ours.bearings.push_back(
         {clock.to_local(z.stamp), z.neighbor, z.u_B, z.p_B_C, z.sigma_rad, z.how});
+  }
   for (const auto& [stamp, neighbor, range, first_path, received] : theirs.ranges)
     ours.ranges.push_back({clock.to_local(stamp), neighbor, range, first_path, received});
   for (const auto& [stamp, neighbor, T_B_N, v_B_N] : theirs.estimates)
