@@ -31,8 +31,8 @@ class ReadingIntake {
 
   /// A report of the neighbor arrived.
   void add_report_stamp(Timestamp stamp);
-  /// A bearing of our cameras. The distances that come with bearings count while there are no ranges,
-  /// five a second: their errors are nearly the same.
+  /// A bearing of our cameras. The distances that come with bearings count while there are no
+  /// ranges, five a second: their errors are nearly the same.
   void add_bearing(const Bearing& bearing);
   /// `sigma_rad` replaces that of the bearing.
   void add_peer_bearing(const Bearing& bearing, double sigma_rad);
