@@ -152,7 +152,10 @@ ObservationBuffer::mutual_initializations(const Bearing& peer_bearing, const Rob
   NoPoseReason reason = NoPoseReason::kNone;
   for (const Bearing& bearing : own) {
     const auto range = measured ? measured : range_by_ring(bearing);
-    if (!range) return NoPoseReason::kNoRange;
+    if (!range) {
+      reason = NoPoseReason::kNoRange;
+      continue;
+    }
     auto result = compute_raw_pose({.B = sighting(bearing, *tilt_B, self_),
                                     .N = sighting(peer_bearing, *tilt_N, neighbor_),
                                     .range_m = range->range_m,

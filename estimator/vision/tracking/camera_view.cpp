@@ -63,12 +63,13 @@ std::size_t CameraView::unproject(const SpotFrame& frame, Timestamp stamp, const
       continue;
     }
     const double px_rad = std::sqrt(0.5 * J.squaredNorm());
+    const double tangent = ring_tan(spot.ring, J);
     sightings.push_back({.u_B = T_B_C_.q * *u_C,
                          .radius_rad = std::sqrt(spot.area_px2 / std::numbers::pi) * px_rad,
                          .px_rad = px_rad,
                          .peak = spot.peak,
-                         .ring_leds = spot.ring.leds,
-                         .ring_tan = ring_tan(spot.ring, J),
+                         .ring_leds = tangent > 0.0 ? spot.ring.leds : 0,
+                         .ring_tan = tangent,
                          .ring_sigma = spot.ring.sigma,
                          .exposed = row_exposure(spot.v_px, stamp)});
     LightSighting& sighting = sightings.back();

@@ -94,6 +94,22 @@ TEST_F(Sighted, TakesTheDistanceByTheRingWhereThereIsNoRange) {
   EXPECT_GT(std::sqrt(raw.gaussian().covariance.topLeftCorner<3, 3>().trace()), 0.2);
 }
 
+// As a mirror image whose LEDs are not told apart.
+TEST_F(Sighted, ABearingWithoutADistanceDoesNotSpoilOneThatHasIt) {
+  for (const bool is_before : {true, false}) {
+    buffer_ =
+        ObservationBuffer(member(1, pair_.mounting_B), member(2, pair_.mounting_N), 0.003, 0.1);
+    see_once(own(kNow - 60ms), peer(kNow - 60ms));
+    Bearing sized = own(kNow);
+    sized.distance_m = 4.0;
+    sized.distance_sigma_m = 0.2;
+    if (is_before) buffer_.add_own_bearing(own(kNow));
+    buffer_.add_own_bearing(sized);
+    if (!is_before) buffer_.add_own_bearing(own(kNow));
+    EXPECT_EQ(count(buffer_.mutual_initializations(peer(kNow), self_, neighbor_)), 1U);
+  }
+}
+
 TEST_F(Sighted, TurnsABearingOfANearbyInstantByTheGyroscope) {
   buffer_.add_own_bearing(own(kNow - 15ms));
   add_range(kNow);

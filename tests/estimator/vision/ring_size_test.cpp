@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <string>
 #include <vector>
@@ -69,7 +70,18 @@ TEST(RingSize, IsRightOffTheAxis) {
   }
 }
 
-TEST(RingSize, IsUnknownWhereLedsAreOneLight) {
+TEST(RingSize, IsUnknownWhereItIsNoNumberOrNoEllipse) {
+  const CameraView view({}, small_fisheye());
+  std::vector<LightSighting> sightings;
+  for (const double bad : {std::nan(""), 0.0, std::numeric_limits<double>::infinity()}) {
+    Spot spot{.u_px = 240.0, .v_px = 190.0, .area_px2 = 20.0, .peak = 200.0};
+    spot.ring = {.leds = 6, .uu_px2 = bad, .uv_px2 = 0.0, .vv_px2 = bad, .sigma = 0.01};
+    EXPECT_EQ(view.unproject({.spots = {spot}}, {}, {}, 1, sightings), 0U);
+    EXPECT_EQ(sightings.at(0).ring_leds, 0) << bad;
+  }
+}
+
+TEST(RingSize, IsUnknownWhereLedsLedsAreOneLight) {
   EXPECT_TRUE(distance_errors({.leds = 6, .radius_m = 0.03}, 4.0, 0.0).empty());
 }
 
