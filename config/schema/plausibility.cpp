@@ -29,8 +29,8 @@ void doubt_members(const SwarmConfig& swarm, Doubts& doubts) {
     doubt_arm("p_body_led", member.p_body_led, "center of the LED ring");
     doubt_arm("p_body_uwb", member.p_body_uwb, "UWB antenna");
     if (member.ring_leds && !member.ring_radius_m) {
-      doubts.push_back({fmt::format("swarm.members[{}].ring_leds", i),
-                        "has no effect without ring_radius_m"});
+      doubts.push_back(
+          {fmt::format("swarm.members[{}].ring_leds", i), "has no effect without ring_radius_m"});
     }
   }
 }

@@ -42,10 +42,11 @@ struct MemberConfig {
     v.field("p_body_led", p_body_led, Bounds{-5, 5},
             "center of the LED ring in the body frame [m]");
     v.field("p_body_uwb", p_body_uwb, Bounds{-5, 5}, "UWB antenna in the body frame [m]");
-    v.field("ring_radius_m", ring_radius_m, Bounds{0.005, 1},
-            "radius of the LED ring, of a square board half its edge (of four LEDs half its "
-            "diagonal); with it, a camera that can tell the LEDs apart measures the distance by the "
-            "ring's size; if omitted: not used");
+    v.field(
+        "ring_radius_m", ring_radius_m, Bounds{0.005, 1},
+        "radius of the LED ring, of a square board half its edge (of four LEDs half its "
+        "diagonal); with it, a camera that can tell the LEDs apart measures the distance by the "
+        "ring's size; if omitted: not used");
     v.field("ring_leds", ring_leds, Bounds{4, 16},
             "LEDs of the ring; if omitted: of any number but four, which may be a part of a ring");
     v.field(

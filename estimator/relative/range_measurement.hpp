@@ -21,8 +21,8 @@ using RangeInnovation = Innovation<1, ErrorState::kSeen>;
                                                              const Eigen::Vector3d& p_N_Q,
                                                              double range_m, double sigma_m);
 
-/// The same without a bias: z = | p_B_N + R_B_N p_N_M - p_B_C |, with `p_B_C` the camera and `p_N_M`
-/// the LED ring.
+/// The same without a bias: z = | p_B_N + R_B_N p_N_M - p_B_C |, with `p_B_C` the camera and
+/// `p_N_M` the LED ring.
 [[nodiscard]] std::optional<RangeInnovation> linearize_ring_distance(const NominalState& state,
                                                                      const Eigen::Vector3d& p_B_C,
                                                                      const Eigen::Vector3d& p_N_M,

@@ -35,8 +35,9 @@ class ObservationBuffer {
   void add_range(Timestamp stamp, double range_m);
 
   /// Raw poses at the stamp of `peer_bearing`, one for each own bearing near that instant; or why
-  /// there is none. Where there is no range, the size of the ring gives the distance, if it may. A bearing counts only if another one within 0.1 s has about its direction: a
-  /// single flicker is not a robot. If the peer sent none within 0.1 s, one within 0.3 s counts.
+  /// there is none. Where there is no range, the size of the ring gives the distance, if it may. A
+  /// bearing counts only if another one within 0.1 s has about its direction: a single flicker is
+  /// not a robot. If the peer sent none within 0.1 s, one within 0.3 s counts.
   [[nodiscard]] std::variant<std::vector<MutualInitialization>, NoPoseReason>
   mutual_initializations(const Bearing& peer_bearing, const RobotState& self,
                          const RobotState& neighbor) const;

@@ -137,8 +137,7 @@ Json measured_json(const NeighborStatus& neighbor) {
   put_reading(MeasurementKind::kRange, range);
   put_reading(MeasurementKind::kPeerRange, range);
   put_reading(MeasurementKind::kRingDistance, [&mounting](const SensorReading& z) {
-    return Json{{"m", numbers_json(std::span(z).first(1))[0]},
-                {"to", vector_json(mounting.p_N_M)}};
+    return Json{{"m", numbers_json(std::span(z).first(1))[0]}, {"to", vector_json(mounting.p_N_M)}};
   });
   return json;
 }
