@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -191,41 +192,89 @@ struct CameraTurn {
   }
 };
 
-GyroCheck check_of(std::span<const Change> changes) {
+/// What one robot's cameras see, against its gyroscope.
+struct Evidence {
+  double chi2 = 0.0;
+  double explained = 0.0;  ///< of `chi2`, by another rate
+  double rate_radps = 0.0;
+  std::ptrdiff_t sights = 0;
+  std::ptrdiff_t unlikely = 0;  ///< of the sights
+
+  [[nodiscard]] bool is_explained() const { return explained > kExplained * chi2; }
+};
+
+Evidence evidence_of(std::span<const Change> changes) {
   const CameraTurn turn(changes);
-  std::ptrdiff_t unlikely = 0;
-  GyroCheck check;
+  Evidence evidence{.sights = std::ssize(changes)};
   LeastSquares rate(kAnyRate);
   for (const Change& change : changes) {
     const Eigen::Vector2d residual = change.residual(turn.R);
     const Matrix23 by_turn = change.by_turn();
     const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
     const double chi2 = residual.dot(S.llt().solve(residual));
-    unlikely += chi2 > kUnlikely ? 1 : 0;
-    check.chi2 += chi2;
-    check.dimension += 2;
+    evidence.unlikely += chi2 > kUnlikely ? 1 : 0;
+    evidence.chi2 += chi2;
     rate.add(residual, S, change.by_rate());
   }
   const Eigen::Vector3d mean = rate.mean();
-  const double explained = rate.weighed.dot(mean);
-  const bool is_common = unlikely >= 2 && 2 * unlikely > std::ssize(changes);
-  if (is_common && explained > kExplained * check.chi2)
-    check.contradiction = {.chi2 = explained, .rate_radps = mean.norm()};
-  return check;
+  evidence.explained = rate.weighed.dot(mean);
+  evidence.rate_radps = mean.norm();
+  return evidence;
 }
+
+/// Whether a robot's bearings to another one agreed with its place until now: it is no mirror
+/// image.
+bool has_agreed(const TeamBelief& belief, RobotId observer, RobotId neighbor) {
+  constexpr double kAgreed = 2.0;  // times what contradicts
+  Agreement all;
+  for (const TeamCamera& camera : belief.robots.at(observer).cameras) {
+    const auto one = camera.agreement.find(neighbor);
+    if (one == camera.agreement.end()) continue;
+    all.fused += one->second.fused;
+    all.gated += one->second.gated;
+  }
+  return all.fused > 4.0 && all.fused > kAgreed * all.gated;
+}
+
+/// The changes of what one robot sees.
+struct Seen {
+  std::vector<Change> changes;
+  std::set<RobotId> neighbors;
+};
 
 }  // namespace
 
 std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
                                          const TeamTrajectories& paths, const TeamBelief& belief) {
   const TeamInstant instant(belief, paths, 0.5 * to_seconds(interval.to - interval.from));
-  std::map<RobotId, std::vector<Change>> changes;
+  std::map<RobotId, Seen> seen;
   for (const Sight& sight : all_sights(interval, belief)) {
-    if (const auto change = change_of(interval, paths, instant, belief, sight))
-      changes[sight.observer].push_back(*change);
+    const auto change = change_of(interval, paths, instant, belief, sight);
+    if (!change) continue;
+    seen[sight.observer].changes.push_back(*change);
+    seen[sight.observer].neighbors.insert(sight.neighbor);
   }
+  std::map<RobotId, Evidence> all;
+  for (const auto& [robot, one] : seen) all.emplace(robot, evidence_of(one.changes));
+  // A robot that moves otherwise than it is believed to is seen so by us and sees us so.
+  const auto is_confirmed_by = [&](RobotId neighbor, RobotId robot) {
+    const auto back = seen.find(neighbor);
+    return back != seen.end() && back->second.neighbors.contains(robot) &&
+           all.at(neighbor).unlikely == 0;
+  };
   std::map<RobotId, GyroCheck> checks;
-  for (const auto& [robot, seen] : changes) checks.emplace(robot, check_of(seen));
+  for (const auto& [robot, evidence] : all) {
+    GyroCheck& check = checks[robot];
+    check.chi2 = evidence.chi2;
+    check.dimension = 2 * static_cast<int>(evidence.sights);
+    const bool is_common = evidence.unlikely >= 2 && 2 * evidence.unlikely > evidence.sights;
+    const RobotId only = *seen.at(robot).neighbors.begin();
+    const bool is_single = evidence.sights == 1 && evidence.unlikely == 1 &&
+                           has_agreed(belief, robot, only) && is_confirmed_by(only, robot);
+    if ((is_common || is_single) && evidence.is_explained())
+      check.contradiction = {
+          .chi2 = evidence.explained, .rate_radps = evidence.rate_radps, .is_single = is_single};
+  }
   return checks;
 }
 

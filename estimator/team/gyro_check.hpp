@@ -13,6 +13,7 @@ namespace crepes {
 struct GyroContradiction {
   double chi2 = 0.0;        ///< improvement by that rate; three degrees of freedom
   double rate_radps = 0.0;  ///< the difference
+  bool is_single = false;   ///< one robot alone shows it: a leap of its light would, too
 };
 
 /// How well a gyroscope agrees with what its cameras see.

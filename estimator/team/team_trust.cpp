@@ -40,6 +40,9 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
   for (const auto& [id, check] : checks) {
     if (!check.contradiction) continue;
     GyroDoubt& doubt = gyro_doubts_[id];
+    // A leap ends within an interval; a rate goes on.
+    if (check.contradiction->is_single && std::exchange(doubt.single, interval.to) < interval.from)
+      continue;
     doubt.chi2 += check.contradiction->chi2;
     if (doubt.chi2 <= kFalseGyro) continue;
     doubt.found = belief.stamp;

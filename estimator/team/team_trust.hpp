@@ -62,6 +62,7 @@ class TeamTrust {
     double chi2 = 0.0;               ///< of the latest intervals
     std::optional<Timestamp> found;  ///< when it was last too large
     double rate_radps = 0.0;         ///< how wrong the gyroscope was then
+    Timestamp single{};              ///< when it was last contradicted by a single robot
     Losses as_trusted;               ///< when it was found although the robot was trusted
   };
   struct Verdict {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/core/constants.hpp"
 #include "tests/faults/fault_table.hpp"
 #include "tests/faults/kept.hpp"
 #include "tests/faults/trial.hpp"
@@ -24,6 +25,7 @@ struct Options {
   bool flies_kept = false;
   std::string log;
   std::string trial;
+  std::string errors;
   std::vector<std::string> tables;
 };
 
@@ -34,13 +36,28 @@ void print(const Verdict& verdict) {
   std::fflush(stdout);
 }
 
+/// A line for every pose of a schedule, and of the same swarm without faults.
+bool write_errors(const Trial& trial, const std::string& file) {
+  std::ofstream out(file);
+  out << "faults,observer,neighbor,t_s,mode,error_m,error_deg,mahalanobis2\n";
+  for (const bool with_faults : {false, true})
+    for (const auto& [pair, trace] : traces_of(trial, with_faults))
+      for (const PoseError& e : trace.errors())
+        out << fmt::format("{:d},{},{},{:.3f},{},{:.4f},{:.3f},{:.2f}\n", with_faults,
+                           pair.first.value, pair.second.value, e.true_s, name_of(e.mode),
+                           e.error_m, e.error_rad * kDegPerRad, e.mahalanobis2);
+  if (!out.flush()) fmt::print(stderr, "{}: cannot be written\n", file);
+  return out.good();
+}
+
 /// One schedule, as it is printed or kept.
-std::uint64_t run_one(const std::string& line) {
+std::uint64_t run_one(const std::string& line, const std::string& errors) {
   const auto trial = parse_trial(line);
   if (!trial) {
     fmt::print(stderr, "no schedule: {}\n", line);
     return 1;
   }
+  if (!errors.empty()) return write_errors(*trial, errors) ? 0 : 1;
   std::uint64_t failed = 0;
   try_all({*trial}, [&](const Verdict& verdict) {
     failed += verdict.broken.empty() ? 0 : 1;
@@ -80,7 +97,7 @@ std::uint64_t run_kept(const Options& options) {
 /// Whole worlds, every `parts`-th.
 std::uint64_t run(const Options& options) {
   const FaultTimes& times = options.takes_long ? kLong : kShort;
-  if (!options.trial.empty()) return run_one(options.trial);
+  if (!options.trial.empty()) return run_one(options.trial, options.errors);
   if (options.flies_kept) return run_kept(options);
   std::ofstream log(options.log);
   std::uint64_t failed = 0;
@@ -115,6 +132,9 @@ int main(int argc, char** argv) {
   app.add_flag("--long", options.takes_long, "faults of up to half a minute");
   app.add_option("--log", options.log, "a line for every trial goes to this file");
   app.add_option("--trial", options.trial, "only flies this schedule, as kept.txt has it");
+  app.add_option("--errors", options.errors,
+                 "with --trial: only writes the error of every pose, with and without the faults")
+      ->needs("--trial");
   app.add_flag("--kept", options.flies_kept, "only flies the schedules of kept.txt");
   app.add_option("--table", options.tables, "only prints the table of these logs");
   CLI11_PARSE(app, argc, argv);

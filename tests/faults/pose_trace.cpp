@@ -29,23 +29,24 @@ void PoseTrace::add(const NeighborPose& pose, const Pose& truth, double true_s) 
   errors_.push_back({.true_s = true_s,
                      .error_m = error.head<3>().norm(),
                      .error_rad = error.tail<3>().norm(),
-                     .mahalanobis2 = larger(mahalanobis2(0), mahalanobis2(3))});
+                     .mahalanobis2 = larger(mahalanobis2(0), mahalanobis2(3)),
+                     .mode = pose.mode});
 }
 
 Beyond PoseTrace::beyond(const Span& span) const {
   Beyond beyond;
   std::optional<double> since_s;
   double latest_s = 0.0;
-  for (const auto& [true_s, error_m, error_rad, mahalanobis2] : errors_) {
-    if (!span.contains(true_s)) continue;
-    const bool is_beyond = !(mahalanobis2 <= kBeyond5Sigma);
-    const bool goes_on = is_beyond && since_s && true_s - latest_s < kLongestGap_s;
-    if (!goes_on) since_s = is_beyond ? std::optional(true_s) : std::nullopt;
-    latest_s = true_s;
+  for (const PoseError& e : errors_) {
+    if (!span.contains(e.true_s)) continue;
+    const bool is_beyond = !(e.mahalanobis2 <= kBeyond5Sigma);
+    const bool goes_on = is_beyond && since_s && e.true_s - latest_s < kLongestGap_s;
+    if (!goes_on) since_s = is_beyond ? std::optional(e.true_s) : std::nullopt;
+    latest_s = e.true_s;
     if (!since_s) continue;
-    beyond.longest_s = std::max(beyond.longest_s, true_s - *since_s);
-    beyond.worst_m = std::max(beyond.worst_m, error_m);
-    beyond.worst_rad = std::max(beyond.worst_rad, error_rad);
+    beyond.longest_s = std::max(beyond.longest_s, e.true_s - *since_s);
+    beyond.worst_m = std::max(beyond.worst_m, e.error_m);
+    beyond.worst_rad = std::max(beyond.worst_rad, e.error_rad);
   }
   return beyond;
 }

@@ -26,6 +26,7 @@ struct PoseError {
   double error_m = 0.0;
   double error_rad = 0.0;
   double mahalanobis2 = 0.0;  ///< of position or attitude, whichever is larger
+  PoseMode mode = PoseMode::kPredicted;
 };
 
 /// Poses off by more than 5 sigma, on end.

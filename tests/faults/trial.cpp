@@ -25,6 +25,9 @@ double first_s(const std::vector<Fault>& faults) {
   return std::ranges::min_element(faults, {}, &Fault::from_s)->from_s;
 }
 
+constexpr double kMargin_s = 0.5;  ///< of the simulation, beyond what is flown
+constexpr double kBefore_s = 1e-3;
+
 double end_s(const std::vector<Fault>& faults) { return recovered_s(faults) + kJudged_s; }
 
 bool is_of(const Fault& fault, const Pair& pair) {
@@ -180,7 +183,7 @@ class Branches {
 
   [[nodiscard]] Verdict judge(const Trial& trial,
                               const std::function<bool(const Verdict&)>& is_to_shrink) {
-    flight_.fly_until(first_s(trial.faults) - 1e-3);
+    flight_.fly_until(first_s(trial.faults) - kBefore_s);
     Verdict verdict = fly(trial.faults);
     verdict.trial = trial;
     verdict.smallest = trial.faults;
@@ -282,6 +285,16 @@ std::vector<Broken> broken_promises(const std::vector<Fault>& faults, const Trac
   return broken;
 }
 
+Traces traces_of(const Trial& trial, bool with_faults) {
+  const double last_s = end_s(trial.faults);
+  const study::Swarm swarm = simulate(trial.world, last_s + kMargin_s);
+  Flight flight(swarm, trial.world.sealed);
+  flight.fly_until(first_s(trial.faults) - kBefore_s);
+  if (with_faults) flight.strike(trial.faults);
+  flight.fly_until(last_s);
+  return flight.traces();
+}
+
 void try_all(const std::vector<Trial>& trials,
              const std::function<void(const Verdict&)>& on_verdict,
              const std::function<bool(const Verdict&)>& is_to_shrink) {
@@ -289,7 +302,6 @@ void try_all(const std::vector<Trial>& trials,
   const World& world = trials.front().world;
   double last_s = 0.0;
   for (const Trial& trial : trials) last_s = std::max(last_s, end_s(trial.faults));
-  constexpr double kMargin_s = 0.5;
   const study::Swarm swarm = simulate(world, last_s + kMargin_s);
   Flight healthy(swarm, world.sealed);
   healthy.fly_until(last_s);

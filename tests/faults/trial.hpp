@@ -66,6 +66,9 @@ void try_all(const std::vector<Trial>& trials,
              const std::function<void(const Verdict&)>& on_verdict,
              const std::function<bool(const Verdict&)>& is_to_shrink = is_broken);
 
+/// The poses of a swarm with these faults, or without any, as long as they would be judged.
+[[nodiscard]] Traces traces_of(const Trial& trial, bool with_faults);
+
 /// When the swarm must have recovered from the faults.
 [[nodiscard]] double recovered_s(const std::vector<Fault>& faults);
 /// What of a flight with faults was not as promised. `reference`: without faults.

@@ -304,7 +304,7 @@ TEST_F(TrustOfFour, ARobotThatSetAWrongScaleIsFoundOnce) {
 
 TEST_F(TrustOfFour, AGyroscopeIsFalseAfterSomeContradictionsAndForASecond) {
   const std::map<RobotId, GyroCheck> checks{
-      {kAccused, {.chi2 = 50.0, .dimension = 6, .contradiction = {{40.0, 0.5}}}},
+      {kAccused, {.chi2 = 50.0, .dimension = 6, .contradiction = {{40.0, 0.5, false}}}},
       {kSecond, {.chi2 = 6.0, .dimension = 6, .contradiction = {}}}};
   EXPECT_TRUE(trust_.false_gyros(interval_, belief_, checks).empty());
   EXPECT_EQ(trust_.false_gyros(interval_, belief_, checks), Ids{kAccused});
@@ -312,6 +312,21 @@ TEST_F(TrustOfFour, AGyroscopeIsFalseAfterSomeContradictionsAndForASecond) {
   EXPECT_EQ(trust_.gyro_faults(belief_.stamp).front().robot, kAccused);
   EXPECT_EQ(trust_.gyro_faults(belief_.stamp).front().size, 0.5);
   EXPECT_TRUE(trust_.gyro_faults(belief_.stamp + 1s).empty());
+}
+
+// The light of a single robot may have leapt, as to its mirror image.
+TEST_F(TrustOfFour, OneRobotMustContradictAGyroscopeInTwoIntervalsOnEnd) {
+  const std::map<RobotId, GyroCheck> checks{
+      {kAccused, {.chi2 = 200.0, .dimension = 2, .contradiction = {{200.0, 0.5, true}}}}};
+  const auto next = [&](const std::map<RobotId, GyroCheck>& of_interval) {
+    interval_.from = interval_.to;
+    interval_.to += 100ms;
+    return trust_.false_gyros(interval_, belief_, of_interval);
+  };
+  EXPECT_TRUE(next(checks).empty());
+  EXPECT_TRUE(next({}).empty());
+  EXPECT_TRUE(next(checks).empty());
+  EXPECT_EQ(next(checks), Ids{kAccused});
 }
 
 TEST_F(TrustOfFour, NamesWhatCalibrationsAndRangesShow) {
