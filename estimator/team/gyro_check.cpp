@@ -222,8 +222,7 @@ Evidence evidence_of(std::span<const Change> changes) {
   return evidence;
 }
 
-/// Whether a robot's bearings to another one agreed with its place until now: it is no mirror
-/// image.
+/// Whether a robot's bearings to another one agreed with its place until now.
 bool has_agreed(const TeamBelief& belief, RobotId observer, RobotId neighbor) {
   constexpr double kAgreed = 2.0;  // times what contradicts
   Agreement all;
@@ -236,44 +235,59 @@ bool has_agreed(const TeamBelief& belief, RobotId observer, RobotId neighbor) {
   return all.fused > 4.0 && all.fused > kAgreed * all.gated;
 }
 
-/// The changes of what one robot sees.
+/// What one robot sees.
 struct Seen {
   std::vector<Change> changes;
   std::set<RobotId> neighbors;
+  Evidence evidence;
 };
+using SeenByAll = std::map<RobotId, Seen>;
+
+SeenByAll seen_by_all(const TeamInterval& interval, const TeamTrajectories& paths,
+                      const TeamBelief& belief) {
+  const TeamInstant instant(belief, paths, 0.5 * to_seconds(interval.to - interval.from));
+  SeenByAll all;
+  for (const Sight& sight : all_sights(interval, belief)) {
+    const auto change = change_of(interval, paths, instant, belief, sight);
+    if (!change) continue;
+    all[sight.observer].changes.push_back(*change);
+    all[sight.observer].neighbors.insert(sight.neighbor);
+  }
+  for (auto& [robot, seen] : all) seen.evidence = evidence_of(seen.changes);
+  return all;
+}
+
+/// Most of the robots that it sees, and at least two, change their directions unexpectedly.
+bool is_common(const Evidence& evidence) {
+  return evidence.unlikely >= 2 && 2 * evidence.unlikely > evidence.sights;
+}
+
+/// The only robot that it sees does so. That one moves as it is believed to, since it sees this
+/// robot where it expects it, and it is no mirror image.
+bool is_single(const TeamBelief& belief, const SeenByAll& all, RobotId robot) {
+  const Seen& seen = all.at(robot);
+  if (seen.evidence.sights != 1 || seen.evidence.unlikely != 1) return false;
+  const RobotId only = *seen.neighbors.begin();
+  const auto back = all.find(only);
+  return back != all.end() && back->second.neighbors.contains(robot) &&
+         back->second.evidence.unlikely == 0 && has_agreed(belief, robot, only);
+}
 
 }  // namespace
 
 std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
                                          const TeamTrajectories& paths, const TeamBelief& belief) {
-  const TeamInstant instant(belief, paths, 0.5 * to_seconds(interval.to - interval.from));
-  std::map<RobotId, Seen> seen;
-  for (const Sight& sight : all_sights(interval, belief)) {
-    const auto change = change_of(interval, paths, instant, belief, sight);
-    if (!change) continue;
-    seen[sight.observer].changes.push_back(*change);
-    seen[sight.observer].neighbors.insert(sight.neighbor);
-  }
-  std::map<RobotId, Evidence> all;
-  for (const auto& [robot, one] : seen) all.emplace(robot, evidence_of(one.changes));
-  // A robot that moves otherwise than it is believed to is seen so by us and sees us so.
-  const auto is_confirmed_by = [&](RobotId neighbor, RobotId robot) {
-    const auto back = seen.find(neighbor);
-    return back != seen.end() && back->second.neighbors.contains(robot) &&
-           all.at(neighbor).unlikely == 0;
-  };
+  const SeenByAll all = seen_by_all(interval, paths, belief);
   std::map<RobotId, GyroCheck> checks;
-  for (const auto& [robot, evidence] : all) {
+  for (const auto& [robot, seen] : all) {
+    const Evidence& evidence = seen.evidence;
     GyroCheck& check = checks[robot];
     check.chi2 = evidence.chi2;
     check.dimension = 2 * static_cast<int>(evidence.sights);
-    const bool is_common = evidence.unlikely >= 2 && 2 * evidence.unlikely > evidence.sights;
-    const RobotId only = *seen.at(robot).neighbors.begin();
-    const bool is_single = evidence.sights == 1 && evidence.unlikely == 1 &&
-                           has_agreed(belief, robot, only) && is_confirmed_by(only, robot);
-    if ((is_common || is_single) && evidence.is_explained())
+    const bool is_only_one = is_single(belief, all, robot);
+    if (evidence.is_explained() && (is_common(evidence) || is_only_one))
       check.contradiction = {
-          .chi2 = evidence.explained, .rate_radps = evidence.rate_radps, .is_single = is_single};
+          .chi2 = evidence.explained, .rate_radps = evidence.rate_radps, .is_single = is_only_one};
   }
   return checks;
 }

@@ -24,7 +24,8 @@ struct GyroCheck {
 };
 
 /// Of each robot that sees others long enough. Most of the robots that it sees, and at least two,
-/// must agree on a rate that contradicts its gyroscope. Their places and a constant misalignment of
+/// must agree on a rate that contradicts its gyroscope; or the only one that it sees, if that one
+/// sees it where it expects it and agreed until then. Their places and a constant misalignment of
 /// the camera cancel. The uncertainty of velocities and of the gyroscope is included.
 [[nodiscard]] std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
                                                        const TeamTrajectories& paths,

@@ -30,6 +30,16 @@ constexpr Duration kGyroRecord = std::chrono::seconds{60};  // then it is as goo
 constexpr Duration kStrained = std::chrono::seconds{2};     // by a false gyroscope
 constexpr int kLeastRefused = 3;                            // pairs
 
+/// Whether a camera contradicts a robot and agrees with none.
+bool contradicts_all(const TeamCamera& camera) {
+  const auto any = [&](auto holds) {
+    return std::ranges::any_of(camera.agreement,
+                               [&](const auto& entry) { return holds(entry.second); });
+  };
+  return any([](const Agreement& a) { return a.is_contradiction(); }) &&
+         !any([](const Agreement& a) { return !a.is_contradiction() && a.fused > 1.0; });
+}
+
 }  // namespace
 
 std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const TeamBelief& belief,
@@ -56,7 +66,18 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
     if (const auto verdict = verdicts_.find(id); verdict != verdicts_.end())
       verdict->second.is_withdrawn = true;
   }
+  for (const auto& [id, robot] : belief.robots)
+    if (is_disoriented(belief, id) && std::ranges::find(robots, id) == robots.end())
+      robots.push_back(id);
   return robots;
+}
+
+/// Its gyroscope may have been false for longer than its cameras saw anybody.
+bool TeamTrust::is_disoriented(const TeamBelief& belief, RobotId id) const {
+  return is_strained(id, belief.stamp) &&
+         std::ranges::any_of(belief.robots.at(id).cameras, [&](const TeamCamera& camera) {
+           return contradicts_all(camera) || looks_turned(belief, id, camera, false);
+         });
 }
 
 /// Whether its gyroscope was recently false. The states that it has disturbed may still look as if
@@ -93,7 +114,7 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
            is_alone(belief, id, camera) && !is_turned_of(id, camera);
   };
   const Witnesses all = witnesses_of(belief, [&](RobotId id, const TeamCamera& camera) {
-    return is_turned_of(id, camera) || is_alone_of(id, camera);
+    return is_turned_of(id, camera) || is_alone_of(id, camera) || is_disoriented(belief, id);
   });
   std::vector<RobotId> lost;
   for (const auto& [id, robot] : belief.robots) {
@@ -106,7 +127,8 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
     const bool has_imu = interval.member(id) != nullptr;
     const bool is_wrong = has_imu && is_contradicted(belief, all, id);
     const bool is_restarted =
-        has_imu && std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
+        has_imu && !is_disoriented(belief, id) &&
+        std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
     if (is_wrong) count(losses_, id, belief.stamp);
     if (is_restarted) count(restarts_, id, belief.stamp);
     if (is_wrong || is_restarted || !has_imu || !(variance < kMaxPosition * kMaxPosition))

@@ -21,7 +21,9 @@ class TeamTrust {
   /// for so long that it is tried again.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
-  /// Robots whose gyroscope has contradicted for some intervals what their cameras see.
+  /// Robots whose gyroscope has contradicted for some intervals what their cameras see, and robots
+  /// whose gyroscope was found false of late and whose camera now contradicts most of what it sees:
+  /// their attitude is wrong.
   [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval,
                                                  const TeamBelief& belief,
                                                  const std::map<RobotId, GyroCheck>& checks);
@@ -75,6 +77,7 @@ class TeamTrust {
   void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
   void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
   [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool is_disoriented(const TeamBelief& belief, RobotId id) const;
   [[nodiscard]] bool is_realigned(RobotId robot) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] Duration probation(RobotId robot, Timestamp now) const;

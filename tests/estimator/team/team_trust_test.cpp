@@ -329,6 +329,36 @@ TEST_F(TrustOfFour, OneRobotMustContradictAGyroscopeInTwoIntervalsOnEnd) {
   EXPECT_EQ(next(checks), Ids{kAccused});
 }
 
+// Its gyroscope may have been false for longer than it saw anybody. So its attitude is wrong, and
+// neither its camera nor what it sees.
+TEST_F(TrustOfFour, AfterAFalseGyroscopeACameraThatAgreesWithNobodyShowsAWrongAttitude) {
+  const auto false_gyros = [&](const std::map<RobotId, GyroCheck>& checks) {
+    return trust_.false_gyros(interval_, belief_, checks);
+  };
+  const auto sees_one_in_the_wrong_place = [&] {
+    camera_of(kAccused).agreement = {{kSecond, kContradicts}};
+    for (const RobotId other : {kSelf, kThird}) camera_of(other).agreement.erase(kSecond);
+  };
+  const std::map<RobotId, GyroCheck> contradiction{
+      {kAccused, {.chi2 = 100.0, .dimension = 6, .contradiction = {{100.0, 0.5, false}}}}};
+  contradict_what_it_sees(kAccused);
+  EXPECT_TRUE(false_gyros({}).empty()) << "nothing was wrong with its gyroscope";
+
+  all_agree_again();
+  EXPECT_EQ(false_gyros(contradiction), Ids{kAccused});
+  wait(1s);
+  EXPECT_TRUE(false_gyros({}).empty());
+  contradict_what_it_sees(kAccused);
+  EXPECT_TRUE(lost().empty());
+  EXPECT_TRUE(turned().empty());
+  EXPECT_EQ(false_gyros({}), Ids{kAccused});
+  sees_one_in_the_wrong_place();
+  EXPECT_TRUE(lost().empty());
+  EXPECT_EQ(false_gyros({}), Ids{kAccused});
+  wait(1s);
+  EXPECT_TRUE(false_gyros({}).empty()) << "it was long ago";
+}
+
 TEST_F(TrustOfFour, NamesWhatCalibrationsAndRangesShow) {
   TeamCamera& camera = camera_of(kAccused);
   camera.misalignment = Eigen::Vector3d(0.0, 0.0, radians(2.0));
