@@ -285,9 +285,10 @@ std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
     check.chi2 = evidence.chi2;
     check.dimension = 2 * static_cast<int>(evidence.sights);
     const bool is_only_one = is_single(belief, all, robot);
-    if (evidence.is_explained() && (is_common(evidence) || is_only_one))
+    if (evidence.is_explained() && (is_common(evidence) || is_only_one)) {
       check.contradiction = {
           .chi2 = evidence.explained, .rate_radps = evidence.rate_radps, .is_single = is_only_one};
+    }
   }
   return checks;
 }

@@ -66,9 +66,13 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
     if (const auto verdict = verdicts_.find(id); verdict != verdicts_.end())
       verdict->second.is_withdrawn = true;
   }
-  for (const auto& [id, robot] : belief.robots)
-    if (is_disoriented(belief, id) && std::ranges::find(robots, id) == robots.end())
-      robots.push_back(id);
+  for (const auto& [id, robot] : belief.robots) {
+    if (!is_disoriented(belief, id) || std::ranges::find(robots, id) != robots.end()) continue;
+    robots.push_back(id);
+    // Once: a camera that is really turned must be found in the end.
+    GyroDoubt& doubt = gyro_doubts_.at(id);
+    if (belief.stamp - *doubt.found < kStrained) doubt.disoriented = belief.stamp;
+  }
   return robots;
 }
 
@@ -84,8 +88,11 @@ bool TeamTrust::is_disoriented(const TeamBelief& belief, RobotId id) const {
 /// its camera were turned.
 bool TeamTrust::is_strained(RobotId robot, Timestamp now) const {
   const auto doubt = gyro_doubts_.find(robot);
-  return doubt != gyro_doubts_.end() && doubt->second.found &&
-         now - *doubt->second.found < kStrained;
+  if (doubt == gyro_doubts_.end()) return false;
+  const auto is_recent = [&](const std::optional<Timestamp>& t) {
+    return t && now - *t < kStrained;
+  };
+  return is_recent(doubt->second.found) || is_recent(doubt->second.disoriented);
 }
 
 bool TeamTrust::is_everybody_strained(Timestamp now) const {
@@ -126,9 +133,8 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
     const double variance = belief.P.diagonal().segment<3>(robot.motion_index).sum();
     const bool has_imu = interval.member(id) != nullptr;
     const bool is_wrong = has_imu && is_contradicted(belief, all, id);
-    const bool is_restarted =
-        has_imu && !is_disoriented(belief, id) &&
-        std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
+    const bool is_restarted = has_imu && !is_disoriented(belief, id) &&
+                              std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
     if (is_wrong) count(losses_, id, belief.stamp);
     if (is_restarted) count(restarts_, id, belief.stamp);
     if (is_wrong || is_restarted || !has_imu || !(variance < kMaxPosition * kMaxPosition))

@@ -63,9 +63,11 @@ class TeamTrust {
   struct GyroDoubt {
     double chi2 = 0.0;               ///< of the latest intervals
     std::optional<Timestamp> found;  ///< when it was last too large
-    double rate_radps = 0.0;         ///< how wrong the gyroscope was then
-    Timestamp single{};              ///< when it was last contradicted by a single robot
-    Losses as_trusted;               ///< when it was found although the robot was trusted
+    /// When its attitude was last wrong because the gyroscope had gone on being false.
+    std::optional<Timestamp> disoriented;
+    double rate_radps = 0.0;  ///< how wrong the gyroscope was then
+    Timestamp single{};       ///< when it was last contradicted by a single robot
+    Losses as_trusted;        ///< when it was found although the robot was trusted
   };
   struct Verdict {
     Timestamp shown{};  ///< when its camera was last found turned; after a while it may be repaired
