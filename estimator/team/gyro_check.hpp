@@ -13,7 +13,6 @@ namespace crepes {
 struct GyroContradiction {
   double chi2 = 0.0;        ///< improvement by that rate; three degrees of freedom
   double rate_radps = 0.0;  ///< the difference
-  bool is_single = false;   ///< one robot alone shows it: a leap of its light would, too
 };
 
 /// How well a gyroscope agrees with what its cameras see.
@@ -24,8 +23,7 @@ struct GyroCheck {
 };
 
 /// Of each robot that sees others long enough. Most of the robots that it sees, and at least two,
-/// must agree on a rate that contradicts its gyroscope; or the only one that it sees, if that one
-/// sees it where it expects it and agreed until then. Their places and a constant misalignment of
+/// must agree on a rate that contradicts its gyroscope. Their places and a constant misalignment of
 /// the camera cancel. The uncertainty of velocities and of the gyroscope is included.
 [[nodiscard]] std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
                                                        const TeamTrajectories& paths,

@@ -30,16 +30,6 @@ constexpr Duration kGyroRecord = std::chrono::seconds{60};  // then it is as goo
 constexpr Duration kStrained = std::chrono::seconds{2};     // by a false gyroscope
 constexpr int kLeastRefused = 3;                            // pairs
 
-/// Whether a camera contradicts a robot and agrees with none.
-bool contradicts_all(const TeamCamera& camera) {
-  const auto any = [&](auto holds) {
-    return std::ranges::any_of(camera.agreement,
-                               [&](const auto& entry) { return holds(entry.second); });
-  };
-  return any([](const Agreement& a) { return a.is_contradiction(); }) &&
-         !any([](const Agreement& a) { return !a.is_contradiction() && a.fused > 1.0; });
-}
-
 }  // namespace
 
 std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const TeamBelief& belief,
@@ -50,9 +40,6 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
   for (const auto& [id, check] : checks) {
     if (!check.contradiction) continue;
     GyroDoubt& doubt = gyro_doubts_[id];
-    // A leap ends within an interval; a rate goes on.
-    if (check.contradiction->is_single && std::exchange(doubt.single, interval.to) < interval.from)
-      continue;
     doubt.chi2 += check.contradiction->chi2;
     if (doubt.chi2 <= kFalseGyro) continue;
     doubt.found = belief.stamp;
@@ -66,33 +53,15 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
     if (const auto verdict = verdicts_.find(id); verdict != verdicts_.end())
       verdict->second.is_withdrawn = true;
   }
-  for (const auto& [id, robot] : belief.robots) {
-    if (!is_disoriented(belief, id) || std::ranges::find(robots, id) != robots.end()) continue;
-    robots.push_back(id);
-    // Once: a camera that is really turned must be found in the end.
-    GyroDoubt& doubt = gyro_doubts_.at(id);
-    if (belief.stamp - *doubt.found < kStrained) doubt.disoriented = belief.stamp;
-  }
   return robots;
-}
-
-/// Its gyroscope may have been false for longer than its cameras saw anybody.
-bool TeamTrust::is_disoriented(const TeamBelief& belief, RobotId id) const {
-  return is_strained(id, belief.stamp) &&
-         std::ranges::any_of(belief.robots.at(id).cameras, [&](const TeamCamera& camera) {
-           return contradicts_all(camera) || looks_turned(belief, id, camera, false);
-         });
 }
 
 /// Whether its gyroscope was recently false. The states that it has disturbed may still look as if
 /// its camera were turned.
 bool TeamTrust::is_strained(RobotId robot, Timestamp now) const {
   const auto doubt = gyro_doubts_.find(robot);
-  if (doubt == gyro_doubts_.end()) return false;
-  const auto is_recent = [&](const std::optional<Timestamp>& t) {
-    return t && now - *t < kStrained;
-  };
-  return is_recent(doubt->second.found) || is_recent(doubt->second.disoriented);
+  return doubt != gyro_doubts_.end() && doubt->second.found &&
+         now - *doubt->second.found < kStrained;
 }
 
 bool TeamTrust::is_everybody_strained(Timestamp now) const {
@@ -121,7 +90,7 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
            is_alone(belief, id, camera) && !is_turned_of(id, camera);
   };
   const Witnesses all = witnesses_of(belief, [&](RobotId id, const TeamCamera& camera) {
-    return is_turned_of(id, camera) || is_alone_of(id, camera) || is_disoriented(belief, id);
+    return is_turned_of(id, camera) || is_alone_of(id, camera);
   });
   std::vector<RobotId> lost;
   for (const auto& [id, robot] : belief.robots) {
@@ -133,8 +102,8 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
     const double variance = belief.P.diagonal().segment<3>(robot.motion_index).sum();
     const bool has_imu = interval.member(id) != nullptr;
     const bool is_wrong = has_imu && is_contradicted(belief, all, id);
-    const bool is_restarted = has_imu && !is_disoriented(belief, id) &&
-                              std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
+    const bool is_restarted =
+        has_imu && std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
     if (is_wrong) count(losses_, id, belief.stamp);
     if (is_restarted) count(restarts_, id, belief.stamp);
     if (is_wrong || is_restarted || !has_imu || !(variance < kMaxPosition * kMaxPosition))
