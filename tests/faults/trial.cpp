@@ -25,8 +25,8 @@ double first_s(const std::vector<Fault>& faults) {
   return std::ranges::min_element(faults, {}, &Fault::from_s)->from_s;
 }
 
-constexpr double kMargin_s = 0.5;  ///< of the simulation, beyond what is flown
-constexpr double kBefore_s = 1e-3;
+constexpr double kMargin_s = 0.5;   ///< of the simulation, beyond what is flown
+constexpr double kBefore_s = 1e-3;  ///< the first fault, when they are announced
 
 double end_s(const std::vector<Fault>& faults) { return recovered_s(faults) + kJudged_s; }
 
