@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -191,41 +192,111 @@ struct CameraTurn {
   }
 };
 
-GyroCheck check_of(std::span<const Change> changes) {
+/// What one robot's cameras see, against its gyroscope.
+struct Evidence {
+  double chi2 = 0.0;
+  double explained = 0.0;  ///< of `chi2`, by another rate
+  double rate_radps = 0.0;
+  std::ptrdiff_t sights = 0;
+  std::ptrdiff_t unlikely = 0;  ///< of the sights
+
+  [[nodiscard]] bool is_explained() const { return explained > kExplained * chi2; }
+};
+
+Evidence evidence_of(std::span<const Change> changes) {
   const CameraTurn turn(changes);
-  std::ptrdiff_t unlikely = 0;
-  GyroCheck check;
+  Evidence evidence{.sights = std::ssize(changes)};
   LeastSquares rate(kAnyRate);
   for (const Change& change : changes) {
     const Eigen::Vector2d residual = change.residual(turn.R);
     const Matrix23 by_turn = change.by_turn();
     const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
     const double chi2 = residual.dot(S.llt().solve(residual));
-    unlikely += chi2 > kUnlikely ? 1 : 0;
-    check.chi2 += chi2;
-    check.dimension += 2;
+    evidence.unlikely += chi2 > kUnlikely ? 1 : 0;
+    evidence.chi2 += chi2;
     rate.add(residual, S, change.by_rate());
   }
   const Eigen::Vector3d mean = rate.mean();
-  const double explained = rate.weighed.dot(mean);
-  const bool is_common = unlikely >= 2 && 2 * unlikely > std::ssize(changes);
-  if (is_common && explained > kExplained * check.chi2)
-    check.contradiction = {.chi2 = explained, .rate_radps = mean.norm()};
-  return check;
+  evidence.explained = rate.weighed.dot(mean);
+  evidence.rate_radps = mean.norm();
+  return evidence;
+}
+
+/// Whether a robot's bearings to another one agreed with its place until now.
+bool has_agreed(const TeamBelief& belief, RobotId observer, RobotId neighbor) {
+  constexpr double kAgreed = 2.0;  // times what contradicts
+  Agreement all;
+  for (const TeamCamera& camera : belief.robots.at(observer).cameras) {
+    const auto one = camera.agreement.find(neighbor);
+    if (one == camera.agreement.end()) continue;
+    all.fused += one->second.fused;
+    all.gated += one->second.gated;
+  }
+  return all.fused > 4.0 && all.fused > kAgreed * all.gated;
+}
+
+/// What one robot sees.
+struct Seen {
+  std::vector<Change> changes;
+  std::set<RobotId> neighbors;
+  Evidence evidence;
+};
+using SeenByAll = std::map<RobotId, Seen>;
+
+SeenByAll seen_by_all(const TeamInterval& interval, const TeamTrajectories& paths,
+                      const TeamBelief& belief) {
+  const TeamInstant instant(belief, paths, 0.5 * to_seconds(interval.to - interval.from));
+  SeenByAll all;
+  for (const Sight& sight : all_sights(interval, belief)) {
+    const auto change = change_of(interval, paths, instant, belief, sight);
+    if (!change) continue;
+    all[sight.observer].changes.push_back(*change);
+    all[sight.observer].neighbors.insert(sight.neighbor);
+  }
+  for (auto& [robot, seen] : all) seen.evidence = evidence_of(seen.changes);
+  return all;
+}
+
+/// Most of the robots that it sees, and at least two, change their directions unexpectedly.
+bool is_common(const Evidence& evidence) {
+  return evidence.unlikely >= 2 && 2 * evidence.unlikely > evidence.sights;
+}
+
+/// The only robot that it sees does so. That one moves as it is believed to, since it sees this
+/// robot where it expects it, and it is no mirror image.
+bool is_single(const TeamBelief& belief, const SeenByAll& all, RobotId robot) {
+  const Seen& seen = all.at(robot);
+  if (seen.evidence.sights != 1 || seen.evidence.unlikely != 1) return false;
+  const RobotId only = *seen.neighbors.begin();
+  const auto back = all.find(only);
+  return back != all.end() && back->second.neighbors.contains(robot) &&
+         back->second.evidence.unlikely == 0 && has_agreed(belief, robot, only);
+}
+
+/// Of robots that have just been placed, anything is likely.
+bool is_known_well(const TeamBelief& belief, RobotId observer, const std::set<RobotId>& neighbors) {
+  const auto is_trusted = [&](RobotId id) { return belief.robots.at(id).is_trusted; };
+  return is_trusted(observer) && std::ranges::any_of(neighbors, is_trusted);
 }
 
 }  // namespace
 
 std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
                                          const TeamTrajectories& paths, const TeamBelief& belief) {
-  const TeamInstant instant(belief, paths, 0.5 * to_seconds(interval.to - interval.from));
-  std::map<RobotId, std::vector<Change>> changes;
-  for (const Sight& sight : all_sights(interval, belief)) {
-    if (const auto change = change_of(interval, paths, instant, belief, sight))
-      changes[sight.observer].push_back(*change);
-  }
+  const SeenByAll all = seen_by_all(interval, paths, belief);
   std::map<RobotId, GyroCheck> checks;
-  for (const auto& [robot, seen] : changes) checks.emplace(robot, check_of(seen));
+  for (const auto& [robot, seen] : all) {
+    const Evidence& evidence = seen.evidence;
+    GyroCheck& check = checks[robot];
+    check.chi2 = evidence.chi2;
+    check.dimension = 2 * static_cast<int>(evidence.sights);
+    check.is_confirmed = evidence.unlikely == 0 && is_known_well(belief, robot, seen.neighbors);
+    const bool is_only_one = is_single(belief, all, robot);
+    if (evidence.is_explained() && (is_common(evidence) || is_only_one)) {
+      check.contradiction = {
+          .chi2 = evidence.explained, .rate_radps = evidence.rate_radps, .is_single = is_only_one};
+    }
+  }
   return checks;
 }
 

@@ -28,7 +28,18 @@ constexpr double kFalseGyro = 60.0;   // chi-square within that time
 constexpr Duration kGyroRefusal = std::chrono::seconds{1};
 constexpr Duration kGyroRecord = std::chrono::seconds{60};  // then it is as good as any other
 constexpr Duration kStrained = std::chrono::seconds{2};     // by a false gyroscope
+constexpr Duration kUnconfirmed = std::chrono::seconds{2};  // a gyroscope may go on being false
 constexpr int kLeastRefused = 3;                            // pairs
+
+/// Whether a camera contradicts a robot and agrees with none.
+bool contradicts_all(const TeamCamera& camera) {
+  const auto any = [&](auto holds) {
+    return std::ranges::any_of(camera.agreement,
+                               [&](const auto& entry) { return holds(entry.second); });
+  };
+  return any([](const Agreement& a) { return a.is_contradiction(); }) &&
+         !any([](const Agreement& a) { return !a.is_contradiction() && a.fused > 1.0; });
+}
 
 }  // namespace
 
@@ -38,13 +49,26 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
   for (auto& [id, doubt] : gyro_doubts_) doubt.chi2 *= kept;
   std::vector<RobotId> robots;
   for (const auto& [id, check] : checks) {
-    if (!check.contradiction) continue;
+    if (!check.contradiction) {
+      const auto doubt = gyro_doubts_.find(id);
+      if (check.is_confirmed && doubt != gyro_doubts_.end() && !doubt->second.confirmed)
+        doubt->second.confirmed = belief.stamp;
+      continue;
+    }
     GyroDoubt& doubt = gyro_doubts_[id];
+    // A leap ends within an interval; a rate goes on.
+    if (check.contradiction->is_single && std::exchange(doubt.single, interval.to) < interval.from)
+      continue;
     doubt.chi2 += check.contradiction->chi2;
     if (doubt.chi2 <= kFalseGyro) continue;
     doubt.found = belief.stamp;
     doubt.rate_radps = check.contradiction->rate_radps;
-    if (belief.robots.at(id).is_trusted) {
+    const bool is_trusted = belief.robots.at(id).is_trusted;
+    if (is_trusted || may_be_disoriented(id, belief.stamp)) {
+      doubt.unconfirmed = belief.stamp;
+      doubt.confirmed.reset();
+    }
+    if (is_trusted) {
       const bool is_repeated = belief.stamp - doubt.as_trusted.last < kGyroRecord;
       doubt.as_trusted = {belief.stamp, is_repeated ? doubt.as_trusted.count + 1 : 1};
     }
@@ -53,15 +77,36 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
     if (const auto verdict = verdicts_.find(id); verdict != verdicts_.end())
       verdict->second.is_withdrawn = true;
   }
+  for (const auto& [id, robot] : belief.robots) {
+    if (is_disoriented(belief, id) && std::ranges::find(robots, id) == robots.end())
+      robots.push_back(id);
+  }
   return robots;
 }
 
-/// Whether its gyroscope was recently false. The states that it has disturbed may still look as if
-/// its camera were turned.
+/// Whether its gyroscope was recently false, so that the states that it has disturbed may still
+/// look as if its camera were turned.
 bool TeamTrust::is_strained(RobotId robot, Timestamp now) const {
   const auto doubt = gyro_doubts_.find(robot);
-  return doubt != gyro_doubts_.end() && doubt->second.found &&
-         now - *doubt->second.found < kStrained;
+  if (doubt == gyro_doubts_.end() || !doubt->second.found) return false;
+  return now - *doubt->second.found < kStrained || may_be_disoriented(robot, now);
+}
+
+/// Whether its gyroscope was false while it was trusted, and its cameras have not confirmed it
+/// since, or only of late: it may have been false for longer than it was found to be.
+bool TeamTrust::may_be_disoriented(RobotId robot, Timestamp now) const {
+  const auto entry = gyro_doubts_.find(robot);
+  if (entry == gyro_doubts_.end() || !entry->second.unconfirmed) return false;
+  const GyroDoubt& doubt = entry->second;
+  const Timestamp last = std::min(doubt.confirmed.value_or(now), *doubt.unconfirmed + kUnconfirmed);
+  return now - last < kStrained;
+}
+
+bool TeamTrust::is_disoriented(const TeamBelief& belief, RobotId id) const {
+  return may_be_disoriented(id, belief.stamp) &&
+         std::ranges::any_of(belief.robots.at(id).cameras, [&](const TeamCamera& camera) {
+           return contradicts_all(camera) || looks_turned(belief, id, camera, false);
+         });
 }
 
 bool TeamTrust::is_everybody_strained(Timestamp now) const {
@@ -90,7 +135,7 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
            is_alone(belief, id, camera) && !is_turned_of(id, camera);
   };
   const Witnesses all = witnesses_of(belief, [&](RobotId id, const TeamCamera& camera) {
-    return is_turned_of(id, camera) || is_alone_of(id, camera);
+    return is_turned_of(id, camera) || is_alone_of(id, camera) || is_disoriented(belief, id);
   });
   std::vector<RobotId> lost;
   for (const auto& [id, robot] : belief.robots) {
@@ -102,8 +147,8 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
     const double variance = belief.P.diagonal().segment<3>(robot.motion_index).sum();
     const bool has_imu = interval.member(id) != nullptr;
     const bool is_wrong = has_imu && is_contradicted(belief, all, id);
-    const bool is_restarted =
-        has_imu && std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
+    const bool is_restarted = has_imu && !is_disoriented(belief, id) &&
+                              std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
     if (is_wrong) count(losses_, id, belief.stamp);
     if (is_restarted) count(restarts_, id, belief.stamp);
     if (is_wrong || is_restarted || !has_imu || !(variance < kMaxPosition * kMaxPosition))

@@ -21,7 +21,9 @@ class TeamTrust {
   /// for so long that it is tried again.
   [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
 
-  /// Robots whose gyroscope has contradicted for some intervals what their cameras see.
+  /// Robots whose gyroscope has contradicted for some intervals what their cameras see, and robots
+  /// whose gyroscope was found false of late and whose camera now contradicts most of what it sees:
+  /// their attitude is wrong.
   [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval,
                                                  const TeamBelief& belief,
                                                  const std::map<RobotId, GyroCheck>& checks);
@@ -61,8 +63,12 @@ class TeamTrust {
   struct GyroDoubt {
     double chi2 = 0.0;               ///< of the latest intervals
     std::optional<Timestamp> found;  ///< when it was last too large
-    double rate_radps = 0.0;         ///< how wrong the gyroscope was then
-    Losses as_trusted;               ///< when it was found although the robot was trusted
+    /// The same, of a robot that was trusted; it was not while what followed may be its effect.
+    std::optional<Timestamp> unconfirmed;
+    std::optional<Timestamp> confirmed;  ///< when its cameras first agreed with it after that
+    double rate_radps = 0.0;             ///< how wrong the gyroscope was then
+    Timestamp single{};                  ///< when it was last contradicted by a single robot
+    Losses as_trusted;                   ///< when it was found although the robot was trusted
   };
   struct Verdict {
     Timestamp shown{};  ///< when its camera was last found turned; after a while it may be repaired
@@ -74,6 +80,8 @@ class TeamTrust {
   void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
   void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
   [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool may_be_disoriented(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool is_disoriented(const TeamBelief& belief, RobotId id) const;
   [[nodiscard]] bool is_realigned(RobotId robot) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] Duration probation(RobotId robot, Timestamp now) const;

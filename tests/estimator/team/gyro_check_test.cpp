@@ -99,16 +99,64 @@ TEST(GyroCheck, MirrorImagesThatRemainAloneAreNoContradiction) {
   }
 }
 
-// One robot that moves otherwise than expected is that robot's affair.
-TEST(GyroCheck, OneNeighborAloneProvesNothing) {
-  SimulatedTeam team(1);
-  team.sees = [](RobotId i, RobotId j) { return i != kOther || j == RobotId{2}; };
-  team.damage = [&](TeamInterval& interval) {
-    for (TeamMember& member : interval.members)
-      if (member.robot == kOther)
-        for (ImuMean& mean : member.imu) mean.gyro_radps.z() += 1.0;
+/// A robot that sees only one other.
+class OneSight : public testing::Test {
+ protected:
+  static constexpr RobotId kOnly{2};
+
+  explicit OneSight() {
+    team_.sees = [](RobotId i, RobotId j) { return i != kOther || j == kOnly; };
+  }
+  void make_gyro_false() {
+    team_.damage = [](TeamInterval& interval) {
+      for (TeamMember& member : interval.members)
+        if (member.robot == kOther)
+          for (ImuMean& mean : member.imu) mean.gyro_radps.z() += 1.0;
+    };
+  }
+  /// Bearings that were used and refused before.
+  static void set_agreement(Scene& scene, double fused, double gated) {
+    scene.belief.robots.at(kOther).cameras.front().agreement[kOnly] = {fused, gated};
+  }
+
+  SimulatedTeam team_{1};
+};
+
+TEST_F(OneSight, ProvesAFalseGyroscopeIfTheOtherRobotSeesNothingUnusual) {
+  make_gyro_false();
+  Scene scene(team_);
+  set_agreement(scene, 30.0, 4.0);
+  const auto checks = scene.checks();
+  ASSERT_TRUE(checks.at(kOther).contradiction);
+  EXPECT_TRUE(checks.at(kOther).contradiction->is_single);
+  EXPECT_GT(checks.at(kOther).contradiction->chi2, 10.0);
+}
+
+TEST_F(OneSight, ThatDisagreedBeforeMayBeAMirrorImage) {
+  make_gyro_false();
+  Scene scene(team_);
+  EXPECT_FALSE(scene.checks().at(kOther).contradiction) << "it was never seen before";
+  set_agreement(scene, 10.0, 10.0);
+  EXPECT_FALSE(scene.checks().at(kOther).contradiction);
+  EXPECT_GT(scene.checks().at(kOther).chi2, 10.0);
+}
+
+TEST_F(OneSight, OfARobotThatDoesNotSeeUsProvesNothing) {
+  make_gyro_false();
+  team_.sees = [](RobotId i, RobotId j) {
+    return (i != kOther || j == kOnly) && (i != kOnly || j != kOther);
   };
-  const auto checks = Scene(team).checks();
+  Scene scene(team_);
+  set_agreement(scene, 30.0, 4.0);
+  EXPECT_FALSE(scene.checks().at(kOther).contradiction);
+}
+
+// Then it sees us otherwise than expected, too.
+TEST_F(OneSight, OfARobotThatMovesOtherwiseThanBelievedProvesNothing) {
+  Scene scene(team_);
+  set_agreement(scene, 30.0, 4.0);
+  scene.belief.robots.at(kOnly).motion.v_F += Eigen::Vector3d(0.0, 3.0, 3.0);
+  const auto checks = scene.checks();
   EXPECT_FALSE(checks.at(kOther).contradiction);
   EXPECT_GT(checks.at(kOther).chi2, 10.0);
 }
