@@ -237,6 +237,7 @@ void TeamTrust::count(std::map<RobotId, Losses>& all, RobotId robot, Timestamp n
 bool TeamTrust::is_misled(const TeamBelief& belief) {
   int refused = 0;
   int fitting = 0;
+  std::map<RobotId, int> refused_of;
   std::map<RobotId, int> fitting_of;
   for (const auto& [pair, range] : belief.ranges) {
     const auto has = [&agreement = range.agreement](auto holds) {
@@ -244,6 +245,8 @@ bool TeamTrust::is_misled(const TeamBelief& belief) {
     };
     if (has([](const Agreement& a) { return a.is_contradiction(); })) {
       ++refused;
+      ++refused_of[pair.first];
+      ++refused_of[pair.second];
     } else if (has([](const Agreement& a) { return a.fused > 1.0; })) {
       ++fitting;
       ++fitting_of[pair.first];
@@ -251,6 +254,9 @@ bool TeamTrust::is_misled(const TeamBelief& belief) {
     }
   }
   if (refused < kLeastRefused || refused < fitting) return false;
+  // If one robot is part of all, its ranges are false, and not the others'.
+  const auto is_in_all = [&](const auto& entry) { return entry.second == refused; };
+  if (std::ranges::any_of(refused_of, is_in_all)) return false;
   bool is_misled = false;
   for (const auto& [id, pairs] : fitting_of) {
     if (id == belief.self || pairs < fitting || has_misled(id, belief.stamp)) continue;

@@ -34,7 +34,8 @@ class TeamTrust {
   [[nodiscard]] std::vector<RobotId> turned(const TeamInterval& interval, const TeamBelief& belief);
 
   /// Whether a robot that was trusted too early was newly found to have set a wrong scale: the
-  /// ranges of at least half of the pairs are refused, and the robot is part of every other pair.
+  /// ranges of at least half of the pairs are refused, and the robot is part of every other pair,
+  /// but no robot of every refused one.
   /// All robots must be restarted, and this one is trusted last.
   [[nodiscard]] bool is_misled(const TeamBelief& belief);
   /// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.

@@ -302,6 +302,16 @@ TEST_F(TrustOfFour, ARobotThatSetAWrongScaleIsFoundOnce) {
   EXPECT_TRUE(robot.is_trusted);
 }
 
+// That the second robot is part of all pairs that fit says nothing: one pair is not measured.
+TEST_F(TrustOfFour, ARobotWhoseRangesAreAllRefusedShowsNoWrongScale) {
+  for (auto& [pair, range] : belief_.ranges) {
+    if (pair == ordered(kSelf, kThird)) continue;
+    const bool has_part = pair.first == kAccused || pair.second == kAccused;
+    range.agreement[pair.first] = has_part ? kContradicts : kAgrees;
+  }
+  EXPECT_FALSE(trust_.is_misled(belief_));
+}
+
 TEST_F(TrustOfFour, AGyroscopeIsFalseAfterSomeContradictionsAndForASecond) {
   const std::map<RobotId, GyroCheck> checks{
       {kAccused, {.chi2 = 50.0, .dimension = 6, .contradiction = {{40.0, 0.5, false}}}},
