@@ -114,8 +114,12 @@ std::optional<SquareOutline> fit_square(std::span<const Eigen::Vector2d> points,
   for (int start = 0; start < kStarts; ++start) {
     std::optional<SquareOutline> outline =
         square_in(first, 0.5 * std::numbers::pi * start / kStarts);
-    for (int round = 0; round < kOutlineRounds && outline; ++round)
-      outline = improved(*outline, points);
+    for (int round = 0; round < kOutlineRounds && outline; ++round) {
+      const auto next = improved(*outline, points);
+      const bool is_same = next && *next == *outline;  // as all later ones would be
+      outline = next;
+      if (is_same) break;
+    }
     if (!outline) continue;
     const double square = mean_square(*outline, points);
     if (best && square >= least) continue;

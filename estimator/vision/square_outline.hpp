@@ -23,6 +23,7 @@ struct SquareOutline {
     [[nodiscard]] double from_middle(const Eigen::Vector2d& uv) const {
       return normal.dot(uv) - middle;
     }
+    [[nodiscard]] bool operator==(const Edges&) const = default;
   };
   std::array<Edges, 2> pairs;
 
@@ -30,6 +31,7 @@ struct SquareOutline {
   [[nodiscard]] double distance_from(const Eigen::Vector2d& uv) const;
   /// As the view of a square with half edges of 1.
   [[nodiscard]] RingView view() const;
+  [[nodiscard]] bool operator==(const SquareOutline&) const = default;
 };
 
 /// The parallelogram nearest to the points, which may be unevenly dense along it. `first` is a view

@@ -22,19 +22,6 @@ constexpr double kFrame_s = 0.005;
 constexpr double kNear_px = 2.0;
 constexpr Timestamp kStart{std::chrono::seconds{100}};
 
-CameraCalibration fisheye(double row_delay_s = 0.0) {
-  CameraCalibration camera;
-  camera.name = "cam0";
-  camera.intrinsics = {-0.1723, 0.5931, 316.8, 316.6, 638.2, 512.5};
-  camera.resolution = {1280, 1024};
-  camera.rate_hz = 1.0 / kFrame_s;
-  camera.rolling_shutter_us_per_row = 1e6 * row_delay_s;
-  Eigen::Matrix3d R_C_B;
-  R_C_B << 0, -1, 0, 0, 0, -1, 1, 0, 0;
-  camera.T_cam_imu.q = Eigen::Quaterniond(R_C_B);
-  return camera;
-}
-
 const std::vector<std::string>& patterns(bool is_foreign) {
   const auto search = [](std::uint64_t seed, std::size_t slots) {
     return search_codebook({.slots = slots, .distance = 4, .max_dark = 2}, 64,
@@ -146,7 +133,7 @@ class Trial {
   explicit Trial(const VisionScene& scene)
       : scene_(scene),
         stage_(scene),
-        camera_(fisheye(scene.effects.row_delay_s)),
+        camera_(scene_camera(scene.effects)),
         model_(CameraModel::from(camera_).value()),
         ours_(library_of(patterns(false))),
         blinking_(library_of(patterns(scene.is_foreign))),
@@ -314,6 +301,19 @@ class Trial {
 
 }  // namespace
 
+CameraCalibration scene_camera(const PictureEffects& effects) {
+  CameraCalibration camera;
+  camera.name = "cam0";
+  camera.intrinsics = {-0.1723, 0.5931, 316.8, 316.6, 638.2, 512.5};
+  camera.resolution = {1280, 1024};
+  camera.rate_hz = 1.0 / kFrame_s;
+  camera.rolling_shutter_us_per_row = 1e6 * effects.row_delay_s;
+  Eigen::Matrix3d R_C_B;
+  R_C_B << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  camera.T_cam_imu.q = Eigen::Quaterniond(R_C_B);
+  return camera;
+}
+
 VisionScore score_vision(const VisionScene& scene) { return Trial(scene).run(); }
 
 double VisionScore::right_percent() const {
@@ -339,7 +339,7 @@ void VisionScore::add(const VisionScore& other) {
 }
 
 RingScore score_rings(const RingPictures& rings) {
-  CameraCalibration small = fisheye();
+  CameraCalibration small = scene_camera({});
   small.intrinsics = {-0.1723, 0.5931, 316.8, 316.6, 240.2, 191.6};
   small.resolution = {480, 384};
   small.T_cam_imu = {};

@@ -35,6 +35,9 @@ struct VisionScene {
   std::function<bool(std::size_t board, double t_s)> is_hidden{};
 };
 
+/// The camera of all scenes, with the shutter of these effects.
+[[nodiscard]] CameraCalibration scene_camera(const PictureEffects& effects);
+
 /// Counted from `score_from_s` on, but wrong and astray bearings from the start.
 struct VisionScore {
   std::size_t lit = 0;          ///< boards in frames
