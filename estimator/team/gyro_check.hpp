@@ -20,7 +20,7 @@ struct GyroContradiction {
 struct GyroCheck {
   double chi2 = 0.0;          ///< of all that its cameras see, by what its gyroscope reads
   int dimension = 0;          ///< of `chi2`
-  bool is_confirmed = false;  ///< trusted robots see trusted ones as is likely
+  bool is_confirmed = false;  ///< nothing is unlikely; the robot and one that it sees are trusted
   std::optional<GyroContradiction> contradiction;
 };
 

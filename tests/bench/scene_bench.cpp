@@ -2,10 +2,12 @@
 // on one thread. The table at the end gives the medians, and their ratios to a plain sum of bytes.
 #include <benchmark/benchmark.h>
 
+#include <cstdint>
 #include <cstdio>
 #include <map>
 #include <numeric>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/vision/spot_detector.hpp"

@@ -1,6 +1,7 @@
 #include "tests/study/scene_pictures.hpp"
 
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "estimator/core/constants.hpp"

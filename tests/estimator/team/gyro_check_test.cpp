@@ -44,6 +44,18 @@ TEST(GyroCheck, HonestGyroscopesAgreeWithWhatTheirCamerasSee) {
   EXPECT_GT(chi2 / dimension, 0.0);
 }
 
+// Of a robot that has just been placed, anything is likely.
+TEST(GyroCheck, OnlyTrustedRobotsThatSeeTrustedOnesConfirmAGyroscope) {
+  SimulatedTeam team(1);
+  Scene scene(team);
+  for (const auto& [robot, check] : scene.checks()) EXPECT_TRUE(check.is_confirmed) << robot.value;
+  scene.belief.robots.at(kOther).is_trusted = false;
+  for (const auto& [robot, check] : scene.checks())
+    EXPECT_EQ(check.is_confirmed, robot != kOther) << robot.value;
+  for (auto& [id, robot] : scene.belief.robots) robot.is_trusted = id == test::kSelf;
+  for (const auto& [robot, check] : scene.checks()) EXPECT_FALSE(check.is_confirmed) << robot.value;
+}
+
 TEST(GyroCheck, MeasuresByHowMuchAGyroscopeIsOff) {
   const Eigen::Vector3d error(0.0, 0.4, -0.3);  // rad/s
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {

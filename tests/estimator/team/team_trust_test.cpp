@@ -3,61 +3,21 @@
 #include <gtest/gtest.h>
 
 #include "estimator/team/team_faults.hpp"
-#include "tests/support/simulated_belief.hpp"
+#include "tests/estimator/team/trust_of_four.hpp"
 
 namespace crepes::team_trust_test {
 namespace {
 
+using test::Ids;
+using test::kAccused;
+using test::kAgrees;
+using test::kContradicts;
+using test::kSecond;
 using test::kSelf;
-using test::SimulatedTeam;
+using test::kThird;
 using namespace std::chrono_literals;
 
-constexpr RobotId kSecond{2};
-constexpr RobotId kThird{3};
-constexpr RobotId kAccused{4};
-constexpr Agreement kAgrees{.fused = 10.0};
-constexpr Agreement kContradicts{.gated = 10.0};
-
-using Ids = std::vector<RobotId>;
-
-/// Four robots that see each other, and what each camera thinks of what it sees.
-class TrustOfFour : public testing::Test {
- protected:
-  TrustOfFour() {
-    const test::TrueMotions motions = test::motions_of(team_);
-    interval_ = team_.next();
-    belief_ = test::true_belief(motions, interval_);
-    for (auto& [id, robot] : belief_.robots)
-      for (const RobotId other : {kSelf, kSecond, kThird, kAccused})
-        if (other != id) robot.cameras[0].agreement[other] = kAgrees;
-  }
-
-  TeamCamera& camera_of(RobotId robot) { return belief_.robots.at(robot).cameras[0]; }
-  void contradict_what_it_sees(RobotId observer) {
-    for (auto& [other, agreement] : camera_of(observer).agreement) agreement = kContradicts;
-  }
-  void contradict_its_place(RobotId robot) {
-    for (const RobotId observer : {kSelf, kSecond, kThird, kAccused})
-      if (observer != robot) camera_of(observer).agreement[robot] = kContradicts;
-  }
-  void all_agree_again() {
-    for (auto& [id, robot] : belief_.robots)
-      for (auto& [other, agreement] : robot.cameras[0].agreement) agreement = kAgrees;
-  }
-  /// Without anything that happens.
-  void wait(Duration time) {
-    belief_.stamp += time;
-    interval_.from += time;
-    interval_.to += time;
-  }
-  Ids lost() { return trust_.lost(interval_, belief_); }
-  Ids turned() { return trust_.turned(interval_, belief_); }
-
-  SimulatedTeam team_{1};
-  TeamInterval interval_;
-  TeamBelief belief_;
-  TeamTrust trust_;
-};
+using TrustOfFour = test::TrustOfFour;
 
 TEST_F(TrustOfFour, NobodyIsAccusedIfAllAgree) {
   EXPECT_TRUE(lost().empty());
@@ -310,83 +270,6 @@ TEST_F(TrustOfFour, ARobotWhoseRangesAreAllRefusedShowsNoWrongScale) {
     range.agreement[pair.first] = has_part ? kContradicts : kAgrees;
   }
   EXPECT_FALSE(trust_.is_misled(belief_));
-}
-
-TEST_F(TrustOfFour, AGyroscopeIsFalseAfterSomeContradictionsAndForASecond) {
-  const std::map<RobotId, GyroCheck> checks{
-      {kAccused, {.chi2 = 50.0, .dimension = 6, .contradiction = {{40.0, 0.5, false}}}},
-      {kSecond, {.chi2 = 6.0, .dimension = 6, .contradiction = {}}}};
-  EXPECT_TRUE(trust_.false_gyros(interval_, belief_, checks).empty());
-  EXPECT_EQ(trust_.false_gyros(interval_, belief_, checks), Ids{kAccused});
-  ASSERT_EQ(trust_.gyro_faults(belief_.stamp).size(), 1U);
-  EXPECT_EQ(trust_.gyro_faults(belief_.stamp).front().robot, kAccused);
-  EXPECT_EQ(trust_.gyro_faults(belief_.stamp).front().size, 0.5);
-  EXPECT_TRUE(trust_.gyro_faults(belief_.stamp + 1s).empty());
-}
-
-// The light of a single robot may have leapt, as to its mirror image.
-TEST_F(TrustOfFour, OneRobotMustContradictAGyroscopeInTwoIntervalsOnEnd) {
-  const std::map<RobotId, GyroCheck> checks{
-      {kAccused, {.chi2 = 200.0, .dimension = 2, .contradiction = {{200.0, 0.5, true}}}}};
-  const auto next = [&](const std::map<RobotId, GyroCheck>& of_interval) {
-    interval_.from = interval_.to;
-    interval_.to += 100ms;
-    return trust_.false_gyros(interval_, belief_, of_interval);
-  };
-  EXPECT_TRUE(next(checks).empty());
-  EXPECT_TRUE(next({}).empty());
-  EXPECT_TRUE(next(checks).empty());
-  EXPECT_EQ(next(checks), Ids{kAccused});
-}
-
-// Its gyroscope may have been false for longer than it saw anybody. So its attitude is wrong, and
-// neither its camera nor what it sees.
-TEST_F(TrustOfFour, AfterAFalseGyroscopeACameraThatAgreesWithNobodyShowsAWrongAttitude) {
-  const auto false_gyros = [&](const std::map<RobotId, GyroCheck>& checks) {
-    return trust_.false_gyros(interval_, belief_, checks);
-  };
-  const auto sees_one_in_the_wrong_place = [&] {
-    camera_of(kAccused).agreement = {{kSecond, kContradicts}};
-    for (const RobotId other : {kSelf, kThird}) camera_of(other).agreement.erase(kSecond);
-  };
-  const std::map<RobotId, GyroCheck> contradiction{
-      {kAccused, {.chi2 = 100.0, .dimension = 6, .contradiction = {{100.0, 0.5, false}}}}};
-  contradict_what_it_sees(kAccused);
-  EXPECT_TRUE(false_gyros({}).empty()) << "nothing was wrong with its gyroscope";
-
-  all_agree_again();
-  EXPECT_EQ(false_gyros(contradiction), Ids{kAccused});
-  wait(1s);
-  EXPECT_TRUE(false_gyros({}).empty());
-  contradict_what_it_sees(kAccused);
-  EXPECT_TRUE(lost().empty());
-  EXPECT_TRUE(turned().empty());
-  EXPECT_EQ(false_gyros({}), Ids{kAccused});
-  sees_one_in_the_wrong_place();
-  EXPECT_TRUE(lost().empty());
-  EXPECT_EQ(false_gyros({}), Ids{kAccused});
-  wait(1500ms);
-  EXPECT_EQ(false_gyros({}), Ids{kAccused}) << "nothing has confirmed its gyroscope";
-  const std::map<RobotId, GyroCheck> confirmation{
-      {kAccused, {.chi2 = 3.0, .dimension = 2, .is_confirmed = true, .contradiction = {}}}};
-  EXPECT_EQ(false_gyros(confirmation), Ids{kAccused}) << "it may just have ended";
-  wait(1400ms);
-  EXPECT_EQ(false_gyros({}), Ids{kAccused});
-  wait(100ms);  // two seconds after the time until which it may have been false at most
-  EXPECT_TRUE(false_gyros({}).empty());
-}
-
-TEST_F(TrustOfFour, AConfirmedGyroscopeExcusesNothingAfterTwoSeconds) {
-  const std::map<RobotId, GyroCheck> contradiction{
-      {kAccused, {.chi2 = 100.0, .dimension = 6, .contradiction = {{100.0, 0.5, false}}}}};
-  const std::map<RobotId, GyroCheck> confirmation{
-      {kAccused, {.chi2 = 3.0, .dimension = 6, .is_confirmed = true, .contradiction = {}}}};
-  EXPECT_EQ(trust_.false_gyros(interval_, belief_, contradiction), Ids{kAccused});
-  EXPECT_TRUE(trust_.false_gyros(interval_, belief_, confirmation).empty());
-  wait(2s);
-  contradict_what_it_sees(kAccused);
-  EXPECT_TRUE(trust_.false_gyros(interval_, belief_, confirmation).empty());
-  EXPECT_EQ(turned(), Ids{kAccused});
 }
 
 TEST_F(TrustOfFour, NamesWhatCalibrationsAndRangesShow) {
