@@ -95,9 +95,12 @@ std::span<const JoinedArcs> ArcJoiner::join_squares(std::span<const Blob> blobs,
                                                     std::span<const std::uint32_t> open,
                                                     const BlobFinder& finder) {
   return join_where(open, blobs.size(), [&](std::uint32_t edge) {
-    return blobs[edge].area >= kEdgeArea * kLeastLed &&
-           blobs[edge].elongation() >= kEdgeElongation && gather(edge, blobs, open) &&
-           is_square(blobs, finder);
+    if (blobs[edge].area < kEdgeArea * kLeastLed || blobs[edge].elongation() < kEdgeElongation ||
+        !gather(edge, blobs, open) || !has_led_)
+      return false;
+    if (is_square(blobs, finder)) return true;
+    for (const std::uint32_t i : ring_.members()) is_taken_[i] = 1;  // from each, the same
+    return false;
   });
 }
 

@@ -1,6 +1,7 @@
 #include "estimator/vision/blob_finder.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace crepes {
@@ -10,6 +11,7 @@ namespace {
 constexpr int kBlock = 256;
 constexpr int kPart = 64;
 constexpr int kChunk = 16;
+constexpr std::uint32_t kChunkBits = (1U << kChunk) - 1U;
 constexpr std::size_t kUsualRuns = 1U << 12U;
 constexpr std::size_t kMaxRuns = 1U << 15U;
 constexpr std::size_t kMostFaintPeaks = 1U << 11U;
@@ -32,13 +34,19 @@ bool is_uniform(const std::uint8_t* pixels, bool is_open, std::uint8_t threshold
              : extreme<kCount>(pixels, [](Level a, Level b) { return a > b ? a : b; }) < threshold;
 }
 
+/// Of each pixel, from the lowest bit on, whether it is at or above the threshold.
+std::uint32_t bright_ones(const std::uint8_t* pixels, std::uint8_t threshold) {
+  std::uint32_t ones = 0;
+  for (int i = 0; i < kChunk; ++i) ones |= (pixels[i] >= threshold ? 1U : 0U) << i;
+  return ones;
+}
+
 /// Calls on_run(begin, end) for the runs of pixels at or above the threshold in [from, to).
 template <class OnRun>
 void scan(const std::uint8_t* row, int from, int to, std::uint8_t threshold, const OnRun& on_run) {
   bool is_open = false;
   int begin = from;
-  const auto visit = [&](int u) {
-    if ((row[u] >= threshold) == is_open) return;
+  const auto turn = [&](int u) {
     if (is_open) on_run(begin, u);
     begin = u;
     is_open = !is_open;
@@ -46,8 +54,10 @@ void scan(const std::uint8_t* row, int from, int to, std::uint8_t threshold, con
   const auto search_part = [&](int first) {
     if (is_uniform<kPart>(row + first, is_open, threshold)) return;
     for (int chunk = first; chunk < first + kPart; chunk += kChunk) {
-      if (is_uniform<kChunk>(row + chunk, is_open, threshold)) continue;
-      for (int u = chunk; u < chunk + kChunk; ++u) visit(u);
+      const std::uint32_t ones = bright_ones(row + chunk, threshold);
+      const std::uint32_t before = (ones << 1U) | (is_open ? 1U : 0U);
+      std::uint32_t changes = (ones ^ before) & kChunkBits;
+      for (; changes != 0; changes &= changes - 1) turn(chunk + std::countr_zero(changes));
     }
   };
   int u = from;
@@ -56,7 +66,8 @@ void scan(const std::uint8_t* row, int from, int to, std::uint8_t threshold, con
     for (int part = u; part < u + kBlock; part += kPart) search_part(part);
   }
   for (; u + kPart <= to; u += kPart) search_part(u);
-  for (; u < to; ++u) visit(u);
+  for (; u < to; ++u)
+    if ((row[u] >= threshold) != is_open) turn(u);
   if (is_open) on_run(begin, to);
 }
 

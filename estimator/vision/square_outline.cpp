@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace crepes {
@@ -109,24 +110,22 @@ RingView SquareOutline::view() const {
 
 std::optional<SquareOutline> fit_square(std::span<const Eigen::Vector2d> points,
                                         const RingView& first) {
-  std::optional<SquareOutline> best;
-  double least = 0.0;
-  for (int start = 0; start < kStarts; ++start) {
-    std::optional<SquareOutline> outline =
-        square_in(first, 0.5 * std::numbers::pi * start / kStarts);
-    for (int round = 0; round < kOutlineRounds && outline; ++round) {
-      const auto next = improved(*outline, points);
-      const bool is_same = next && *next == *outline;  // as all later ones would be
-      outline = next;
-      if (is_same) break;
-    }
-    if (!outline) continue;
-    const double square = mean_square(*outline, points);
-    if (best && square >= least) continue;
-    best = outline;
+  std::optional<SquareOutline> outline;
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kStarts; ++k) {
+    const auto start = improved(square_in(first, 0.5 * std::numbers::pi * k / kStarts), points);
+    const double square = start ? mean_square(*start, points) : least;
+    if (square >= least) continue;
+    outline = start;
     least = square;
   }
-  return best;
+  for (int round = 1; round < kOutlineRounds && outline; ++round) {
+    const auto next = improved(*outline, points);
+    const bool is_same = next && *next == *outline;  // as all later ones would be
+    outline = next;
+    if (is_same) break;
+  }
+  return outline;
 }
 
 double share_covered(const SquareOutline& outline, std::span<const Eigen::Vector2d> points) {
