@@ -1,5 +1,6 @@
 #include "estimator/team/frame_change.hpp"
 
+#include <iterator>
 #include <vector>
 
 #include "estimator/core/so3.hpp"
@@ -60,8 +61,11 @@ void carry(const std::vector<Moved>& all, const MotionMatrix& self_noise, Eigen:
   std::vector<MotionImage> images;
   images.reserve(all.size());
   for (const Moved& m : all) images.push_back(m.image);
-  const Eigen::MatrixXd with_all = covariance_with(images, P);
-  const Eigen::MatrixXd own = covariance_with(images, with_all.transpose());
+  const Eigen::Index count = kMotionStates * std::ssize(all);
+  Eigen::MatrixXd with_all(P.rows(), count);
+  set_covariance_with(images, P, with_all);
+  Eigen::MatrixXd own(count, count);
+  set_covariance_of(images, with_all, own);
   const auto first = [](std::size_t i) { return kMotionStates * static_cast<Eigen::Index>(i); };
   for (std::size_t a = 0; a < all.size(); ++a) {
     P.middleCols<kMotionStates>(all[a].index) = with_all.middleCols<kMotionStates>(first(a));

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "estimator/relative/small_product.hpp"
 #include "estimator/team/robot_trajectory.hpp"
 
 namespace crepes {
@@ -22,8 +23,13 @@ struct MotionImage {
 };
 
 /// Nine columns an image. If the columns of `P` are the covariances of something with all states,
-/// the result's are those of the same with the images.
-[[nodiscard]] Eigen::MatrixXd covariance_with(const std::vector<MotionImage>& images,
-                                              const Eigen::MatrixXd& P);
+/// `with` becomes that of the same with the images.
+void set_covariance_with(const std::vector<MotionImage>& images, const Eigen::MatrixXd& P,
+                         MatrixRef with);
+
+/// Nine rows and columns an image. `with` is the covariance of all states with the images; `own`
+/// becomes that of the images, symmetric to the bit.
+void set_covariance_of(const std::vector<MotionImage>& images, const ConstMatrixRef& with,
+                       MatrixRef own);
 
 }  // namespace crepes

@@ -42,21 +42,27 @@ TeamInstant::TeamInstant(const TeamBelief& belief, const TeamTrajectories& paths
   motions_.reserve(belief.robots.size());
   for (const auto& [id, robot] : belief.robots)
     motions_.push_back(image_at(robot, paths.at(id).nearest(t_s)));
-  const Eigen::MatrixXd with_motions = covariance_with(motions_, belief.P);
-  const Eigen::Index count = with_motions.cols();
+  const Eigen::Index count = states_.size - std::ssize(states_.constants);
   with_belief_.resize(belief.P.rows(), states_.size);
-  with_belief_.leftCols(count) = with_motions;
+  auto with_motions = with_belief_.leftCols(count);
+  set_covariance_with(motions_, belief.P, with_motions);
   with_belief_.rightCols(states_.size - count) = belief.P(Eigen::all, states_.constants);
   covariance_.resize(states_.size, states_.size);
-  covariance_.topRows(count) = covariance_with(motions_, with_belief_.transpose()).transpose();
+  set_covariance_of(motions_, with_motions, covariance_.topLeftCorner(count, count));
   covariance_.bottomRows(states_.size - count) = with_belief_(states_.constants, Eigen::all);
+  covariance_.topRightCorner(count, states_.size - count) =
+      covariance_.bottomLeftCorner(states_.size - count, count).transpose();
 }
 
 Eigen::VectorXd TeamInstant::image_of(const Eigen::VectorXd& dx) const {
-  Eigen::VectorXd dy(states_.size);
-  const Eigen::Index count = states_.size - std::ssize(states_.constants);
-  dy.head(count) = covariance_with(motions_, dx.transpose()).transpose();
-  dy.tail(states_.size - count) = dx(states_.constants);
+  Eigen::VectorXd dy = Eigen::VectorXd::Zero(states_.size);
+  for (Eigen::Index first = 0; const MotionImage& motion : motions_) {
+    auto of_motion = dy.segment<FreeMotionAt::kMotion>(first);
+    for (const MotionImage::Part& part : motion.parts)
+      of_motion += part.by * dx.segment(part.from, part.by.cols());
+    first += FreeMotionAt::kMotion;
+  }
+  dy.tail(std::ssize(states_.constants)) = dx(states_.constants);
   return dy;
 }
 

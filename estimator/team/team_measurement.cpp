@@ -1,6 +1,7 @@
 #include "estimator/team/team_measurement.hpp"
 
 #include <cmath>
+#include <span>
 
 #include "estimator/core/so3.hpp"
 
@@ -64,14 +65,18 @@ LineOfSight line_of_sight(const TeamPair& pair, const TeamCamera& camera, const 
 }  // namespace
 
 Eigen::Matrix2d TeamRow::covariance(const Eigen::MatrixXd& P) const {
-  Eigen::Matrix2d S = variance * Eigen::Matrix2d::Identity();
-  for (int a = 0; a < size; ++a) {
-    Eigen::Vector2d column = Eigen::Vector2d::Zero();
-    for (int b = 0; b < size; ++b)
-      column += P(columns.at(std::size_t(b)), columns.at(std::size_t(a))) * H.col(b);
-    S += column * H.col(a).transpose();
+  using Column = Eigen::Matrix<double, kMaxColumns, 1>;
+  const std::span states = std::span(columns).first(static_cast<std::size_t>(size));
+  Eigen::Matrix<double, kMaxColumns, 2> PH = Eigen::Matrix<double, kMaxColumns, 2>::Zero();
+  Column of_state = Column::Zero();
+  for (Eigen::Index a = 0; const int state : states) {
+    const auto of_all = P.col(state);  // a valid index, as all states then are
+    for (Eigen::Index b = 0; const int other : states) of_state.coeffRef(b++) = of_all.coeff(other);
+    PH.col(0) += H(0, a) * of_state;
+    if (dimension == 2) PH.col(1) += H(1, a) * of_state;
+    ++a;
   }
-  return S;
+  return H.leftCols(size) * PH.topRows(size) + variance * Eigen::Matrix2d::Identity();
 }
 
 std::optional<SightModel> SightModel::at(const TeamPair& pair, const TeamCamera& camera, double t_s,
