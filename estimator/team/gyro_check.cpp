@@ -239,7 +239,20 @@ bool has_agreed(const TeamBelief& belief, RobotId observer, RobotId neighbor) {
 struct Seen {
   std::vector<Change> changes;
   std::set<RobotId> neighbors;
+  bool are_trusted = false;  ///< these neighbors
   Evidence evidence;
+
+  /// Of robots that have just been placed, anything is likely: they count where no others are seen.
+  void add(const Change& change, RobotId neighbor, bool is_trusted) {
+    if (is_trusted && !are_trusted) {
+      changes.clear();
+      neighbors.clear();
+    }
+    if (are_trusted && !is_trusted) return;
+    are_trusted = is_trusted;
+    changes.push_back(change);
+    neighbors.insert(neighbor);
+  }
 };
 using SeenByAll = std::map<RobotId, Seen>;
 
@@ -250,8 +263,7 @@ SeenByAll seen_by_all(const TeamInterval& interval, const TeamTrajectories& path
   for (const Sight& sight : all_sights(interval, belief)) {
     const auto change = change_of(interval, paths, instant, belief, sight);
     if (!change) continue;
-    all[sight.observer].changes.push_back(*change);
-    all[sight.observer].neighbors.insert(sight.neighbor);
+    all[sight.observer].add(*change, sight.neighbor, belief.robots.at(sight.neighbor).is_trusted);
   }
   for (auto& [robot, seen] : all) seen.evidence = evidence_of(seen.changes);
   return all;
@@ -273,12 +285,6 @@ bool is_single(const TeamBelief& belief, const SeenByAll& all, RobotId robot) {
          back->second.evidence.unlikely == 0 && has_agreed(belief, robot, only);
 }
 
-/// Of robots that have just been placed, anything is likely.
-bool is_known_well(const TeamBelief& belief, RobotId observer, const std::set<RobotId>& neighbors) {
-  const auto is_trusted = [&](RobotId id) { return belief.robots.at(id).is_trusted; };
-  return is_trusted(observer) && std::ranges::any_of(neighbors, is_trusted);
-}
-
 }  // namespace
 
 std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
@@ -290,7 +296,8 @@ std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
     GyroCheck& check = checks[robot];
     check.chi2 = evidence.chi2;
     check.dimension = 2 * static_cast<int>(evidence.sights);
-    check.is_confirmed = evidence.unlikely == 0 && is_known_well(belief, robot, seen.neighbors);
+    check.is_confirmed =
+        evidence.unlikely == 0 && seen.are_trusted && belief.robots.at(robot).is_trusted;
     const bool is_only_one = is_single(belief, all, robot);
     if (evidence.is_explained() && (is_common(evidence) || is_only_one)) {
       check.contradiction = {

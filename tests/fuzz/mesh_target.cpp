@@ -1,6 +1,5 @@
 #include "tests/fuzz/mesh_target.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
@@ -100,13 +99,13 @@ class Conversations {
 
 }  // namespace
 
+/// What a datagram leads to later, the next inputs reach.
 void run_mesh(std::span<const std::uint8_t> data) {
-  constexpr std::size_t kLongest = 128;  // bytes that are used
   static Conversations conversations;
   Conversation& conversation = conversations.next();
   conversations.note(data);
-  FuzzBytes input(data.first(std::min(data.size(), kLongest)));
-  while (!input.is_empty()) conversation.hear(input);
+  FuzzBytes input(data);
+  conversation.hear(input);
 }
 
 /// Each field in turn to each of its extremes, and nothing at all.

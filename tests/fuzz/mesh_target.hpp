@@ -8,7 +8,7 @@
 
 namespace crepes {
 
-/// A conversation with a neighbor whose datagrams the input changes: for each a byte with how many
+/// A conversation with a neighbor. Each input changes its next datagram: a byte with how many
 /// fields, then the changes of `BodyChanger`. The pair goes on from input to input and is renewed
 /// from time to time. With CREPES_FUZZ_HISTORY in the environment, that file has all inputs of the
 /// present pair, one a line: `fuzz_corpus run mesh FILE` repeats what failed.

@@ -88,6 +88,27 @@ TEST(GyroCheck, ATurnedCameraIsNoContradiction) {
   }
 }
 
+// They start with wrong velocities here. If they were trusted, two of the three robots that another
+// one sees would contradict its gyroscope.
+TEST(GyroCheck, RobotsThatHaveJustBeenPlacedSayNothingBesideTrustedOnes) {
+  constexpr RobotId kObserver{2};
+  SimulatedTeam team(1);
+  Scene scene(team);
+  for (const RobotId wrong : {RobotId{3}, RobotId{4}})
+    scene.belief.robots.at(wrong).motion.v_F += Eigen::Vector3d(2.0, 0.0, 3.0);
+  EXPECT_EQ(scene.checks().at(kObserver).dimension, 6);
+  for (const RobotId wrong : {RobotId{3}, RobotId{4}})
+    scene.belief.robots.at(wrong).is_trusted = false;
+  const auto checks = scene.checks();
+  EXPECT_EQ(checks.at(kObserver).dimension, 2);
+  EXPECT_LT(checks.at(kObserver).chi2, 6.0);
+  EXPECT_FALSE(checks.at(kObserver).contradiction);
+  // Where it sees no other ones, they count.
+  for (auto& [id, robot] : scene.belief.robots) robot.is_trusted = id == kObserver;
+  EXPECT_EQ(scene.checks().at(kObserver).dimension, 6);
+  EXPECT_GT(scene.checks().at(kObserver).chi2, 30.0);
+}
+
 // The robot sees the images of all others in the floor, and loses sight of the robots themselves.
 TEST(GyroCheck, MirrorImagesThatRemainAloneAreNoContradiction) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
