@@ -51,7 +51,6 @@ struct Change {
   Eigen::Matrix2d first_covariance;  ///< of the first's residual
   Eigen::Matrix2d covariance;        ///< of the difference of the residuals
   double time_s = 0.0;               ///< between the halves
-  Eigen::Vector3d rate_radps;        ///< what the observer's gyroscope reads, in the mean
 
   [[nodiscard]] Eigen::Vector2d residual(const Eigen::Matrix3d& R) const {
     return turn * second.residual(R) - first.residual(R);
@@ -111,16 +110,12 @@ Direction direction_of(const SightModel& model, const Eigen::Vector2d& residual)
           .across = model.across()};
 }
 
-Eigen::Vector3d mean_rate(const TeamMember& member) {
-  Eigen::Vector3d sum_radps = Eigen::Vector3d::Zero();
-  for (const ImuMean& mean : member.imu) sum_radps += mean.gyro_radps;
-  return sum_radps / static_cast<double>(member.imu.size());
-}
-
 /// Of what a gyroscope reads, by its biases and scale errors.
 Eigen::Matrix3d rate_covariance(const TeamBelief& belief, const TeamRobot& robot,
-                                const Eigen::Vector3d& rate_radps) {
-  const Eigen::Vector4d by(1.0, rate_radps.x(), rate_radps.y(), rate_radps.z());
+                                const TeamMember& member) {
+  Eigen::Vector4d by = Eigen::Vector4d::Unit(0);
+  for (const ImuMean& mean : member.imu)
+    by.tail<3>() += mean.gyro_radps / static_cast<double>(member.imu.size());
   constexpr std::array<int, 4> kParts{0, 6, 9, 12};  // the bias, and the scale's columns
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (std::size_t a = 0; a < kParts.size(); ++a) {
@@ -171,11 +166,10 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
                 .turn = turn,
                 .first_covariance = before->row().covariance(instant.covariance()),
                 .covariance = row.covariance(instant.covariance()),
-                .time_s = t2_s - t1_s,
-                .rate_radps = mean_rate(pair.observer_arms)};
+                .time_s = t2_s - t1_s};
   // The instant has no part of the gyroscope's errors from the first half to the second.
   change.covariance += change.by_rate() *
-                       rate_covariance(belief, pair.observer, change.rate_radps) *
+                       rate_covariance(belief, pair.observer, pair.observer_arms) *
                        change.by_rate().transpose();
   return change;
 }
@@ -198,18 +192,6 @@ struct CameraTurn {
   }
 };
 
-/// Log-likelihood ratios of several sights, without the largest.
-struct Ratios {
-  double sum = 0.0;
-  double largest = 0.0;
-
-  void add(double ratio) {
-    sum += ratio;
-    largest = std::max(largest, ratio);
-  }
-  [[nodiscard]] double without_largest() const { return sum - largest; }
-};
-
 /// What one robot's cameras see, against its gyroscope.
 struct Evidence {
   double chi2 = 0.0;
@@ -217,7 +199,6 @@ struct Evidence {
   double rate_radps = 0.0;
   std::ptrdiff_t sights = 0;
   std::ptrdiff_t unlikely = 0;  ///< of the sights
-  std::array<Ratios, 2> scaled{};
 
   [[nodiscard]] bool is_explained() const { return explained > kExplained * chi2; }
 };
@@ -230,13 +211,7 @@ Evidence evidence_of(std::span<const Change> changes) {
     const Eigen::Vector2d residual = change.residual(turn.R);
     const Matrix23 by_turn = change.by_turn();
     const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
-    const Eigen::LLT<Eigen::Matrix2d> factors(S);
-    const double chi2 = residual.dot(factors.solve(residual));
-    for (std::size_t i = 0; i < 2; ++i) {
-      const double share = (i == 0 ? -1.0 : 1.0) * GyroCheck::kScaleError;
-      const Eigen::Vector2d expected = share * change.by_rate() * change.rate_radps;
-      evidence.scaled.at(i).add(expected.dot(factors.solve(residual - 0.5 * expected)));
-    }
+    const double chi2 = residual.dot(S.llt().solve(residual));
     evidence.unlikely += chi2 > kUnlikely ? 1 : 0;
     evidence.chi2 += chi2;
     rate.add(residual, S, change.by_rate());
@@ -321,14 +296,12 @@ std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
     GyroCheck& check = checks[robot];
     check.chi2 = evidence.chi2;
     check.dimension = 2 * static_cast<int>(evidence.sights);
-    check.rate_radps = evidence.rate_radps;
     check.is_confirmed =
         evidence.unlikely == 0 && seen.are_trusted && belief.robots.at(robot).is_trusted;
-    for (std::size_t i = 0; i < 2; ++i)
-      check.scaled.at(i) = evidence.scaled.at(i).without_largest();
     const bool is_only_one = is_single(belief, all, robot);
     if (evidence.is_explained() && (is_common(evidence) || is_only_one)) {
-      check.contradiction = {.chi2 = evidence.explained, .is_single = is_only_one};
+      check.contradiction = {
+          .chi2 = evidence.explained, .rate_radps = evidence.rate_radps, .is_single = is_only_one};
     }
   }
   return checks;

@@ -1,7 +1,6 @@
 /// Whether a robot's gyroscope contradicts what its cameras see.
 #pragma once
 
-#include <array>
 #include <map>
 #include <optional>
 
@@ -12,22 +11,16 @@ namespace crepes {
 /// The bearings of a robot change over the interval as if it turned at another rate than its
 /// gyroscope reads.
 struct GyroContradiction {
-  double chi2 = 0.0;       ///< improvement by that rate; three degrees of freedom
-  bool is_single = false;  ///< one robot alone shows it: a leap of its light would, too
+  double chi2 = 0.0;        ///< improvement by that rate; three degrees of freedom
+  double rate_radps = 0.0;  ///< the difference
+  bool is_single = false;   ///< one robot alone shows it: a leap of its light would, too
 };
 
 /// How well a gyroscope agrees with what its cameras see.
 struct GyroCheck {
-  /// A robot whose gyroscope is scaled wrongly turns by this share of its reading less or more.
-  static constexpr double kScaleError = 0.2;
-
   double chi2 = 0.0;          ///< of all that its cameras see, by what its gyroscope reads
   int dimension = 0;          ///< of `chi2`
-  double rate_radps = 0.0;    ///< by how much another rate explains it best
   bool is_confirmed = false;  ///< nothing is unlikely; the robot and one that it sees are trusted
-  /// Log-likelihood ratios of a robot that turns less, and one that turns more than it reads by
-  /// `kScaleError`; without the neighbor that says most for it. They add up over intervals.
-  std::array<double, 2> scaled{};
   std::optional<GyroContradiction> contradiction;
 };
 

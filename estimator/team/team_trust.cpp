@@ -25,9 +25,6 @@ constexpr double kDoubtPerLoss = 4.0;
 constexpr double kTurnedChi2 = 25.0;  // exceeded by one right camera in 65,000
 constexpr double kGyroMemory = 0.5;   // s
 constexpr double kFalseGyro = 60.0;   // chi-square within that time
-constexpr double kFalseScale = 16.0;  // log-likelihood ratio; a right one seems so once in e^16
-constexpr double kMostScaled = 18.0;  // so that one that is right again soon seems so
-constexpr double kScaleMemory = 3.0;  // s; a robot that does not turn any more says nothing
 constexpr Duration kGyroRefusal = std::chrono::seconds{1};
 constexpr Duration kGyroRecord = std::chrono::seconds{60};  // then it is as good as any other
 constexpr Duration kStrained = std::chrono::seconds{2};     // by a false gyroscope
@@ -46,40 +43,26 @@ bool contradicts_all(const TeamCamera& camera) {
 
 }  // namespace
 
-/// Adds what an interval says of a gyroscope. It is false if one interval contradicts it strongly,
-/// or many a little: Wald's sequential test, begun anew whenever it speaks for the gyroscope (Page
-/// 1954).
-bool TeamTrust::is_false(const GyroCheck& check, const TeamInterval& interval, GyroDoubt& doubt) {
-  double most = 0.0;
-  for (std::size_t i = 0; i < doubt.scaled.size(); ++i) {
-    double& sum = doubt.scaled.at(i);
-    sum = std::clamp(sum + check.scaled.at(i), 0.0, kMostScaled);
-    most = std::max(most, sum);
-  }
-  const auto& contradiction = check.contradiction;
-  // A leap ends within an interval; a rate goes on.
-  if (contradiction &&
-      !(contradiction->is_single && std::exchange(doubt.single, interval.to) < interval.from))
-    doubt.chi2 += contradiction->chi2;
-  return (contradiction && doubt.chi2 > kFalseGyro) || most > kFalseScale;
-}
-
 std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const TeamBelief& belief,
                                             const std::map<RobotId, GyroCheck>& checks) {
-  const double dt = to_seconds(interval.to - interval.from);
-  for (auto& [id, doubt] : gyro_doubts_) {
-    doubt.chi2 *= std::exp(-dt / kGyroMemory);
-    for (double& sum : doubt.scaled) sum *= std::exp(-dt / kScaleMemory);
-  }
+  const double kept = std::exp(-to_seconds(interval.to - interval.from) / kGyroMemory);
+  for (auto& [id, doubt] : gyro_doubts_) doubt.chi2 *= kept;
   std::vector<RobotId> robots;
   for (const auto& [id, check] : checks) {
-    GyroDoubt& doubt = gyro_doubts_[id];
-    if (!is_false(check, interval, doubt)) {
-      if (check.is_confirmed && !doubt.confirmed) doubt.confirmed = belief.stamp;
+    if (!check.contradiction) {
+      const auto doubt = gyro_doubts_.find(id);
+      if (check.is_confirmed && doubt != gyro_doubts_.end() && !doubt->second.confirmed)
+        doubt->second.confirmed = belief.stamp;
       continue;
     }
+    GyroDoubt& doubt = gyro_doubts_[id];
+    // A leap ends within an interval; a rate goes on.
+    if (check.contradiction->is_single && std::exchange(doubt.single, interval.to) < interval.from)
+      continue;
+    doubt.chi2 += check.contradiction->chi2;
+    if (doubt.chi2 <= kFalseGyro) continue;
     doubt.found = belief.stamp;
-    doubt.rate_radps = check.rate_radps;
+    doubt.rate_radps = check.contradiction->rate_radps;
     const bool is_trusted = belief.robots.at(id).is_trusted;
     if (is_trusted || may_be_disoriented(id, belief.stamp)) {
       doubt.unconfirmed = belief.stamp;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <map>
 #include <optional>
 #include <vector>
@@ -64,7 +63,6 @@ class TeamTrust {
   };
   struct GyroDoubt {
     double chi2 = 0.0;               ///< of the latest intervals
-    std::array<double, 2> scaled{};  ///< sums of `GyroCheck::scaled` that begin anew below zero
     std::optional<Timestamp> found;  ///< when it was last too large
     /// The same, of a robot that was trusted; it was not while what followed may be its effect.
     std::optional<Timestamp> unconfirmed;
@@ -82,8 +80,6 @@ class TeamTrust {
   };
   void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
   void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
-  [[nodiscard]] static bool is_false(const GyroCheck& check, const TeamInterval& interval,
-                                     GyroDoubt& doubt);
   [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
   [[nodiscard]] bool may_be_disoriented(RobotId robot, Timestamp now) const;
   [[nodiscard]] bool is_disoriented(const TeamBelief& belief, RobotId id) const;

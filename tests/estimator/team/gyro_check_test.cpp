@@ -66,30 +66,11 @@ TEST(GyroCheck, MeasuresByHowMuchAGyroscopeIsOff) {
           for (ImuMean& mean : member.imu) mean.gyro_radps += error;
     };
     const auto checks = Scene(team).checks();
-    ASSERT_TRUE(checks.at(kOther).contradiction) << seed;
-    EXPECT_NEAR(checks.at(kOther).rate_radps, error.norm(), 0.15) << seed;
+    const auto& of_liar = checks.at(kOther).contradiction;
+    ASSERT_TRUE(of_liar) << seed;
+    EXPECT_NEAR(of_liar->rate_radps, error.norm(), 0.15) << seed;
     for (const auto& [robot, check] : checks)
       EXPECT_EQ(check.contradiction.has_value(), robot == kOther) << seed;
-  }
-}
-
-// A gyroscope that reads a quarter too much is likely after half a second, and right ones become
-// unlikely to be false.
-TEST(GyroCheck, LittleEvidenceOfAScaledGyroscopeAddsUp) {
-  std::map<RobotId, std::array<double, 2>> sums;
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    SimulatedTeam team(seed);
-    team.damage = [&](TeamInterval& interval) {
-      for (TeamMember& member : interval.members)
-        if (member.robot == kOther)
-          for (ImuMean& mean : member.imu) mean.gyro_radps *= 1.25;
-    };
-    for (const auto& [robot, check] : Scene(team).checks())
-      for (std::size_t i = 0; i < 2; ++i) sums[robot].at(i) += check.scaled.at(i);
-  }
-  for (const auto& [robot, sum] : sums) {
-    EXPECT_EQ(sum[0] > 16.0, robot == kOther) << robot.value;
-    EXPECT_LT(sum[1], 0.0) << robot.value;
   }
 }
 
@@ -107,7 +88,8 @@ TEST(GyroCheck, ATurnedCameraIsNoContradiction) {
   }
 }
 
-// Two of the three robots that another one sees start with wrong velocities here.
+// They start with wrong velocities here. If they were trusted, two of the three robots that another
+// one sees would contradict its gyroscope.
 TEST(GyroCheck, RobotsThatHaveJustBeenPlacedSayNothingBesideTrustedOnes) {
   constexpr RobotId kObserver{2};
   SimulatedTeam team(1);
