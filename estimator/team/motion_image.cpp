@@ -7,9 +7,10 @@ void set_covariance_with(const std::vector<MotionImage>& images, const Eigen::Ma
   constexpr int kMotion = FreeMotionAt::kMotion;
   with.setZero();
   for (Eigen::Index first = 0; const MotionImage& image : images) {
-    for (const MotionImage::Part& part : image.parts)
+    for (const MotionImage::Part& part : image.parts) {
       add_product(P.middleCols(part.from, part.by.cols()), part.by,
                   with.middleCols<kMotion>(first));
+    }
     first += kMotion;
   }
 }

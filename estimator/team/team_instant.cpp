@@ -19,9 +19,10 @@ InstantStates::InstantStates(const TeamBelief& belief, double time_s)
     : t_s(time_s), of_belief(static_cast<std::size_t>(belief.P.rows()), -1) {
   for (const auto& [id, robot] : belief.robots) {
     if (robot.motion_index < 0) self_motion = size;
-    for (int i = 0; i < FreeMotionAt::kMotion; ++i, ++size)
-      if (robot.motion_index >= 0)
-        of_belief[static_cast<std::size_t>(robot.motion_index + i)] = size;
+    for (int i = 0; i < FreeMotionAt::kMotion; ++i, ++size) {
+      const int state = robot.motion_index + i;
+      if (robot.motion_index >= 0) of_belief[static_cast<std::size_t>(state)] = size;
+    }
   }
   const auto add = [this](int state, int count) {
     for (int i = state; i < state + count; ++i) {

@@ -22,7 +22,7 @@ struct InstantStates {
   /// Of nothing.
   InstantStates() = default;
   /// Of all robots in the belief.
-  InstantStates(const TeamBelief& belief, double t_s);
+  InstantStates(const TeamBelief& belief, double time_s);
 
   /// Where a state of the belief is.
   [[nodiscard]] int of(int state) const { return of_belief[static_cast<std::size_t>(state)]; }
