@@ -1,8 +1,10 @@
 #include "estimator/team/team_measurement.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 
+#include "estimator/core/contract.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -67,10 +69,13 @@ LineOfSight line_of_sight(const TeamPair& pair, const TeamCamera& camera, const 
 Eigen::Matrix2d TeamRow::covariance(const Eigen::MatrixXd& P) const {
   using Column = Eigen::Matrix<double, kMaxColumns, 1>;
   const std::span states = std::span(columns).first(static_cast<std::size_t>(size));
+  CREPES_EXPECT(
+      std::ranges::all_of(states, [&](int state) { return state >= 0 && state < P.rows(); }),
+      "a row depends on states of the instant");
   Eigen::Matrix<double, kMaxColumns, 2> PH = Eigen::Matrix<double, kMaxColumns, 2>::Zero();
   Column of_state = Column::Zero();
   for (Eigen::Index a = 0; const int state : states) {
-    const auto of_all = P.col(state);  // a valid index, as all states then are
+    const auto of_all = P.col(state);
     for (Eigen::Index b = 0; const int other : states) of_state.coeffRef(b++) = of_all.coeff(other);
     PH.col(0) += H(0, a) * of_state;
     if (dimension == 2) PH.col(1) += H(1, a) * of_state;
