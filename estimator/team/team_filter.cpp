@@ -79,6 +79,7 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
     belief_.append_range_biases(interval);
     if (!correct(interval)) begin_anew(interval);
   }
+  unseen_.add(interval, belief_);
   belief_.advance(interval);
   if (are_placed) {
     estimates_.add(interval, belief_);
@@ -279,13 +280,14 @@ std::vector<bool> TeamFilter::corrected_states(Stage stage) const {
   return corrected;
 }
 
-/// Robots that estimates connect to a known one, the most certain first; a place is kept for
-/// `first`, if it is one. When the filter is full, the others are located by their chain of
-/// estimates alone. Unless the robots of the belief are placed, they are placed here or removed.
+/// Robots that estimates connect to a known one, or that ranges alone locate, the most certain
+/// first; a place is kept for `first`, if it is one. When the filter is full, the others are
+/// located by their chain of estimates alone. Unless the robots of the belief are placed, they are
+/// placed here or removed.
 void TeamFilter::add_members(const TeamInterval& interval, RobotId first, bool are_placed,
                              TeamSolution& solution) {
   std::map<RobotId, TeamPlace> places;
-  std::map<RobotId, TeamPlace> candidates;
+  std::map<RobotId, TeamPlace> candidates = unseen_places(interval, are_placed);
   const auto add_candidates_from = [&](RobotId known) {
     const TeamPlace& via = places.at(known);
     for (const RelativePoseEdge& edge : interval.edges) {
@@ -333,6 +335,26 @@ void TeamFilter::add_members(const TeamInterval& interval, RobotId first, bool a
   for (const RobotId id : unplaced) remove(id);
 }
 
+/// Of robots to add. Those that are placed already are placed again if ranges show more than what
+/// is left of when they were seen.
+std::map<RobotId, TeamPlace> TeamFilter::unseen_places(const TeamInterval& interval,
+                                                       bool are_placed) {
+  constexpr double kClearlyBetter = 0.5;  // of the variances
+  std::map<RobotId, TeamPlace> places = unseen_.places(interval, belief_);
+  std::erase_if(places, [&](const auto& entry) {
+    const auto& [id, place] = entry;
+    const auto robot = belief_.robots.find(id);
+    if (robot == belief_.robots.end() || !are_placed) return false;
+    if (place.doubt() < kClearlyBetter * TeamPlace::of(belief_, id).doubt()) {
+      place_member(id, place);
+      robot->second.since = belief_.stamp;
+      robot->second.is_trusted = false;
+    }
+    return true;
+  });
+  return places;
+}
+
 void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const TeamPlace& place) {
   TeamRobot& robot = belief_.robots[id];
   robot.motion_index = belief_.append(FreeMotionAt::kMotion, 0.0);
@@ -351,6 +373,7 @@ void TeamFilter::place_member(RobotId id, const TeamPlace& place) {
   if (const auto turn = trust_.turn_covariance(id)) covariance.bottomRightCorner<3, 3>() += *turn;
   belief_.place(id, {place.T_S_N.p, place.v_S_N, place.T_S_N.q}, covariance);
   belief_.robots.at(id).last_sighting = place.last_sighting;
+  belief_.robots.at(id).last_fix = place.last_fix;
 }
 
 void TeamFilter::report(const TeamInterval& interval, bool are_placed,

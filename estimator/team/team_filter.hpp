@@ -1,6 +1,7 @@
 /// The team as one estimate: every robot's motion and calibration in one Kalman filter.
 #pragma once
 
+#include <map>
 #include <vector>
 
 #include "estimator/team/estimate_check.hpp"
@@ -10,6 +11,7 @@
 #include "estimator/team/team_place.hpp"
 #include "estimator/team/team_readings.hpp"
 #include "estimator/team/team_trust.hpp"
+#include "estimator/team/unseen_robots.hpp"
 
 namespace crepes {
 
@@ -57,6 +59,8 @@ class TeamFilter {
   [[nodiscard]] std::vector<bool> corrected_states(Stage stage) const;
   void add_members(const TeamInterval& interval, RobotId first, bool are_placed,
                    TeamSolution& solution);
+  [[nodiscard]] std::map<RobotId, TeamPlace> unseen_places(const TeamInterval& interval,
+                                                           bool are_placed);
   void add_member(const TeamInterval& interval, RobotId id, const TeamPlace& place);
   void place_member(RobotId id, const TeamPlace& place);
   void report(const TeamInterval& interval, bool are_placed, TeamSolution& solution) const;
@@ -65,6 +69,7 @@ class TeamFilter {
   TeamMemory memory_;
   TeamTrust trust_;
   TeamLinks links_;
+  UnseenRobots unseen_;
   EstimateCheck estimates_;
   std::vector<TeamResidual> residuals_;  ///< of the interval
 };

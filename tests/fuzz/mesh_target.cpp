@@ -54,10 +54,11 @@ class Conversation {
     constexpr int kMostChanges = 8;
     const int changes = input.next() % kMostChanges;
     const PacketSeal& seal = seal_;
-    pair_.run_for(EstimatorPair::kTick, {.peer_datagram = [&](FuzzInput& datagram) {
-                    change_body(datagram, input, changes);
-                    datagram = seal.open(seal.seal(datagram)).value();
-                  }});
+    pair_.run_for(EstimatorPair::kFrame, {.report_period = EstimatorPair::kFrame,
+                                          .peer_datagram = [&](FuzzInput& datagram) {
+                                            change_body(datagram, input, changes);
+                                            datagram = seal.open(seal.seal(datagram)).value();
+                                          }});
     for (; checked_ < pair_.found().size(); ++checked_) {
       const GaussianPose& T_B_N = pair_.found()[checked_].pose.T_B_N;
       CREPES_EXPECT(T_B_N.pose.p.allFinite() && T_B_N.pose.q.coeffs().allFinite() &&

@@ -38,7 +38,7 @@ Motion motion_of(const Crowd& crowd, std::size_t index, int seed) {
   const double bearing = 2 * kPi * static_cast<double>(index / crowd.rings) / in_ring;
   const double x =
       crowd.distance_m * static_cast<double>(ring) + crowd.radius_m * std::cos(bearing);
-  const double height = 1.4 + noise.uniform(draw++);
+  const double height = 1.4 + crowd.spread_m * noise.uniform(draw++);
   Motion motion = {.rule = AttitudeRule::kThrust,
                    .x = wander(noise, draw, x, 0.6, 0.17),
                    .y = wander(noise, draw, crowd.radius_m * std::sin(bearing), 0.6, 0.17),
@@ -85,7 +85,7 @@ Swarm simulate_crowd(const Crowd& crowd, int seed, double duration_s) {
   std::map<RobotId, Motion> motions;
   for (std::size_t i = 0; i < crowd.robots; ++i)
     motions.emplace(id_of(i), motion_of(crowd, i, seed));
-  const Scenario scenario{.name = "crowd", .sight_m = crowd.sight_m};
+  const Scenario scenario{.name = "crowd", .sight_m = crowd.sight_m, .covered = crowd.covered};
   return simulate_swarm(scenario, SimWorld(seed, std::move(motions)), robots_of(crowd, seed),
                         duration_s);
 }

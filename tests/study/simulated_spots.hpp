@@ -19,6 +19,7 @@ struct Disturbance {
   double dark_from_s = 0.0;  ///< no spot from here
   double dark_to_s = 0.0;    ///< to here
   double sight_m = 1e3;      ///< no spot of boards beyond
+  RobotId covered{};         ///< nobody sees this robot, and it sees nobody; 0: no such robot
 };
 
 /// One robot's first camera: noise that grows with distance, drop-outs, spots that merge; with

@@ -106,7 +106,8 @@ Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vecto
                                 .hides_images = scenario.hides_images,
                                 .dark_from_s = scenario.dark_from_s,
                                 .dark_to_s = scenario.dark_to_s,
-                                .sight_m = scenario.sight_m};
+                                .sight_m = scenario.sight_m,
+                                .covered = scenario.covered};
   const auto spots_of = [&](const DemoRobot& robot) {
     if (scenario.pictured) {
       RenderedSpots pictures(world, robot.config, *scenario.pictured);

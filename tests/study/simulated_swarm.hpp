@@ -30,6 +30,7 @@ struct Scenario {
   double dark_to_s = 0.0;    ///< to here
   RangeModel ranges = RangeModel::kSimulated;
   double sight_m = 1e3;  ///< no camera sees further
+  RobotId covered{};     ///< nobody sees this robot, and it sees nobody; 0: no such robot
   /// Spots are what the detector finds in rendered pictures of such boards, without disturbances.
   std::optional<LedBoard> pictured{};
   bool are_boards_measured = false;  ///< robots know their size, within 2 %

@@ -32,6 +32,7 @@ struct Conditions {
   bool has_ranges = true;  ///< of either module
   double peer_turn_rad = 0.0;  ///< the neighbor's bearings of us point this far to the left
   bool peer_is_on = true;
+  Duration report_period = std::chrono::milliseconds{20};  ///< of the neighbor; whole frames
   std::function<ImuSample(const ImuSample&)> own_imu{};  ///< what the IMU makes of the truth
   std::function<ImuSample(const ImuSample&)> peer_imu{};
   std::function<void(UwbRange&)> range{};
@@ -77,6 +78,7 @@ class EstimatorPair {
   /// Our estimator goes on with other settings.
   void reconfigure(const std::function<void(EstimatorSettings&)>& change) {
     change(settings_);
+    library_ = IdLibrary::from(settings_.swarm).value();
     estimator_.reconfigure(settings_);
   }
 
@@ -185,16 +187,14 @@ class EstimatorPair {
     if (now_ % SimulatedPair::kImuPeriod == Duration{}) sample_imus(with);
     if (with.has_ranges && now_ % (2 * kTick) == kFrame) measure_ranges(with);
     look(with);
-    if (now_ % kTick == Duration{}) {
-      if (with.in_view && with.peer_is_on) {
-        const DirectionReading z = pair_.peer_bearing(Timestamp{now_});
-        peer_report_.bearings.push_back({Timestamp{now_ + peer_clock_}, kSelf,
-                                         so3_exp({0.0, 0.0, with.peer_turn_rad}) * z.u, z.camera,
-                                         z.sigma_rad});
-      }
-      if (with.peer_is_on) report_for_peer(with);
-      tick();
+    if (now_ % kTick == Duration{} && with.in_view && with.peer_is_on) {
+      const DirectionReading z = pair_.peer_bearing(Timestamp{now_});
+      peer_report_.bearings.push_back({Timestamp{now_ + peer_clock_}, kSelf,
+                                       so3_exp({0.0, 0.0, with.peer_turn_rad}) * z.u, z.camera,
+                                       z.sigma_rad});
     }
+    if (with.peer_is_on && now_ % with.report_period == Duration{}) report_for_peer(with);
+    if (now_ % kTick == Duration{}) tick();
   }
 
   void deliver(const Conditions& with) {
@@ -236,9 +236,8 @@ class EstimatorPair {
     static constexpr Duration kHandover = std::chrono::milliseconds{100};
     static constexpr Duration kPhase = std::chrono::microseconds{37123};  // of the neighbor's board
     static constexpr Duration kGhostPhase = std::chrono::microseconds{99456};
-    const IdLibrary library = IdLibrary::from(settings_.swarm).value();
     const bool is_lit =
-        with.is_lamp || (with.in_view && library.entries()[1].code.is_lit(now_ + kPhase));
+        with.is_lamp || (with.in_view && library_.entries()[1].code.is_lit(now_ + kPhase));
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
       SpotFrame frame{own_time(now_), static_cast<std::uint8_t>(k), {}};
       const auto& [camera, T_B_C, misalignment] = cameras_[k];
@@ -248,7 +247,7 @@ class EstimatorPair {
       if (is_lit && uv && camera.contains(*uv))
         frame.spots.push_back(
             {uv->x(), uv->y(), 12.0, 255.0, 1.0, ring_at(*uv, camera, T_B_C.p, with.ring_size)});
-      if (with.ghost_rad != 0.0 && library.entries()[1].code.is_lit(now_ + kGhostPhase)) {
+      if (with.ghost_rad != 0.0 && library_.entries()[1].code.is_lit(now_ + kGhostPhase)) {
         const auto ghost =
             camera.project(T_B_C.q.conjugate() * (so3_exp({0.0, 0.0, with.ghost_rad}) * u_B));
         if (ghost && camera.contains(*ghost))
@@ -313,6 +312,7 @@ class EstimatorPair {
 
   SimulatedPair pair_;
   EstimatorSettings settings_;
+  IdLibrary library_ = IdLibrary::from(settings_.swarm).value();
   Estimator estimator_;
   std::vector<Camera> cameras_;
   PeerLink own_link_{kSelf, {kSelf, kOther}};

@@ -56,6 +56,9 @@ class SimulatedTeam {
   std::function<void(TeamInterval&)> damage = [](TeamInterval&) {};
   /// How late a robot's IMU samples and bearings are stamped, in whole steps of the interval.
   std::map<RobotId, double> late_s;
+  /// Whether the robots hover, which their IMUs feel. Their motions relative to each other, which
+  /// are all that a team knows, are the same without.
+  bool hovers = false;
 
   /// The next interval, with estimates of direct neighbors that are wrong by a little.
   TeamInterval next() {
@@ -127,7 +130,7 @@ class SimulatedTeam {
       mean.gyro_radps = 0.5 * Eigen::Vector3d(std::sin(2.0 * body.phase), std::cos(body.phase),
                                               std::sin(1.5 * body.phase));
       const Eigen::Vector3d a_F(std::cos(3.0 * body.phase), std::sin(2.0 * body.phase),
-                                std::cos(2.5 * body.phase));
+                                std::cos(2.5 * body.phase) + (hovers ? kGravityMps2 : 0.0));
       mean.accel_mps2 = body.motion.q_F_B.conjugate() * a_F;
     }
     return imu;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -154,6 +155,23 @@ TEST(TwoGroups, ThatMeetBecomeOne) {
             << from.value << " of " << to.value;
       }
     }
+  }
+}
+
+// A robot whose board and camera are covered from the beginning.
+TEST(UnseenRobot, HasAPoseByRangesAlone) {
+  constexpr double kDuration = 12.0;
+  constexpr RobotId kCovered{6};
+  const Swarm swarm = simulate_crowd(
+      {.robots = 6, .rings = 1, .radius_m = 5.0, .spread_m = 4.0, .covered = kCovered}, 1,
+      kDuration);
+  const Traces traces = flown(swarm, {}, {}, kDuration);
+  for (std::uint16_t i = 1; i < kCovered.value; ++i) {
+    const auto trace = traces.find({RobotId{i}, kCovered});
+    ASSERT_NE(trace, traces.end()) << i;
+    EXPECT_LT(trace->second.longest_absence_s({10.0, kDuration}), 0.3) << i;
+    EXPECT_LT(trace->second.rmse_m({10.0, kDuration}), 0.5) << i;
+    EXPECT_EQ(trace->second.beyond({0.0, kDuration}).longest_s, 0.0) << i;
   }
 }
 

@@ -18,6 +18,9 @@ int main(int argc, char** argv) {
   app.add_option("--radius", crowd.radius_m, "of a ring [m]")->capture_default_str();
   app.add_option("--distance", crowd.distance_m, "of rings [m]")->capture_default_str();
   app.add_option("--sight", crowd.sight_m, "of cameras and UWB modules [m]")->capture_default_str();
+  app.add_option("--spread", crowd.spread_m, "of the heights [m]")->capture_default_str();
+  app.add_option("--covered", crowd.covered.value,
+                 "a robot that nobody sees, and that sees nobody");
   app.add_option("--seed", seed)->capture_default_str();
   app.add_option("--duration", duration_s, "[s]")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
