@@ -89,7 +89,7 @@ RangeTrack range_track(const std::vector<RangeSpheres>& all, double side) {
   RangeTrack track;
   for (const RangeSpheres& ranges : all) {
     const Eigen::Vector3d from = track.empty() ? beginning_of(ranges, side) : track.back().p;
-    track.push_back({ranges.interval, ranges.t_s, trilaterated(ranges, from)});
+    track.push_back({ranges.t_s, trilaterated(ranges, from)});
   }
   return track;
 }

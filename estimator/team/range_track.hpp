@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <utility>
 #include <vector>
 
@@ -12,7 +11,6 @@ namespace crepes {
 
 /// Where the antenna was in one interval.
 struct TrackPoint {
-  std::size_t interval = 0;
   double t_s = 0.0;  ///< after the beginning of the first interval
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
 };
@@ -20,7 +18,6 @@ using RangeTrack = std::vector<TrackPoint>;
 
 /// Ranges of one interval, as spheres about those that measured them.
 struct RangeSpheres {
-  std::size_t interval = 0;
   double t_s = 0.0;                                         ///< in the mean
   std::vector<std::pair<Eigen::Vector3d, double>> spheres;  ///< center and radius, four or more
 };

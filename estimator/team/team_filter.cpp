@@ -345,7 +345,8 @@ std::map<RobotId, TeamPlace> TeamFilter::unseen_places(const TeamInterval& inter
     const auto& [id, place] = entry;
     const auto robot = belief_.robots.find(id);
     if (robot == belief_.robots.end() || !are_placed) return false;
-    if (place.doubt() < kClearlyBetter * TeamPlace::of(belief_, id).doubt()) {
+    if (!robot->second.is_trusted ||
+        place.doubt() < kClearlyBetter * TeamPlace::of(belief_, id).doubt()) {
       place_member(id, place);
       robot->second.since = belief_.stamp;
       robot->second.is_trusted = false;

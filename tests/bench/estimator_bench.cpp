@@ -10,6 +10,8 @@
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/neighbor.hpp"
 #include "estimator/team/team_filter.hpp"
+#include "estimator/team/unseen_robots.hpp"
+#include "tests/support/simulated_belief.hpp"
 #include "tests/support/simulated_pair.hpp"
 #include "tests/support/simulated_team.hpp"
 
@@ -183,6 +185,25 @@ void BM_TeamFilter(benchmark::State& state) {
   }
 }
 
+/// A robot that nobody sees is placed by 5 s of ranges to six others.
+void BM_UnseenRobot(benchmark::State& state) {
+  static constexpr RobotId kUnseen{4};
+  test::SimulatedTeam team(2, 7);
+  team.hovers = true;
+  team.sees = [](RobotId i, RobotId j) { return i != kUnseen && j != kUnseen; };
+  UnseenRobots unseen;
+  test::TrueMotions motions = test::motions_of(team);
+  TeamInterval interval = team.next();
+  for (int i = 0; i < 56; ++i) {
+    unseen.add(interval, test::true_belief(motions, interval));
+    motions = test::motions_of(team);
+    if (i < 55) interval = team.next();
+  }
+  const TeamBelief belief = test::true_belief(motions, interval);
+  if (!unseen.places(interval, belief).contains(kUnseen)) state.SkipWithError("no place");
+  for (auto _ : state) benchmark::DoNotOptimize(unseen.places(interval, belief));
+}
+
 /// The pose graph of the same team.
 void BM_PoseGraph(benchmark::State& state) {
   test::SimulatedTeam team(1, static_cast<int>(state.range(0)));
@@ -191,6 +212,7 @@ void BM_PoseGraph(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(solve_pose_graph(problem, GraphConfig{}));
 }
 
+BENCHMARK(BM_UnseenRobot)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_TeamFilter)->Arg(5)->Arg(10)->Arg(20)->Arg(50)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_PoseGraph)->Arg(5)->Arg(10)->Arg(20)->Arg(50)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_MatrixProduct)->Unit(benchmark::kMicrosecond);

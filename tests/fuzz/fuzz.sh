@@ -3,7 +3,7 @@
 #   fuzz.sh [SECONDS [TARGET...]]         a minute each of all targets, unless given
 #   RUNS=10000000 fuzz.sh 0 [TARGET...]   so many executions of each (0: no limit of time)
 # By seconds it explores: long inputs, and comparisons that nearly hold count as progress. By runs it
-# stays below 512 bytes, so that executions are fast.
+# stays below 300 bytes, like the kept inputs, so that executions are fast.
 # Needs libclang-rt-19-dev, which building and testing do not.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -16,7 +16,7 @@ programs=build/fuzz/tests/fuzz/libfuzzer
 [ ${#targets[@]} -gt 0 ] || mapfile -t targets < <("$programs"/fuzz_corpus list)
 
 limits=(-use_value_profile=1 -max_len=4096)
-[ -z "${RUNS:-}" ] || limits=(-max_len=512)
+[ -z "${RUNS:-}" ] || limits=(-max_len=300)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 for target in "${targets[@]}"; do

@@ -33,7 +33,7 @@ struct Conditions {
   double peer_turn_rad = 0.0;  ///< the neighbor's bearings of us point this far to the left
   bool peer_is_on = true;
   Duration report_period = std::chrono::milliseconds{20};  ///< of the neighbor; whole frames
-  std::function<ImuSample(const ImuSample&)> own_imu{};  ///< what the IMU makes of the truth
+  std::function<ImuSample(const ImuSample&)> own_imu{};    ///< what the IMU makes of the truth
   std::function<ImuSample(const ImuSample&)> peer_imu{};
   std::function<void(UwbRange&)> range{};
   std::function<void(Report&)> peer_report{};                       ///< what the neighbor sends

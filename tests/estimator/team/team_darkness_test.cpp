@@ -28,6 +28,7 @@ InTheDark in_the_dark(RobotId dark, double seconds, bool has_ranges) {
   InTheDark result;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SimulatedTeam team(seed, 6);
+    team.hovers = true;
     TeamFilter filter;
     static_cast<void>(solution_after(team, filter, 4.0));
     team.sees = [dark](RobotId i, RobotId j) { return i != dark && j != dark; };
