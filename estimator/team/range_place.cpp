@@ -23,7 +23,8 @@ constexpr std::size_t kLeastTrack = 10;  // intervals with so many
 constexpr double kHiddenSigma = 0.15;           // m; of a beacon's ranges together
 constexpr double kHuber = 3.0;                  // sigmas
 constexpr double kMostOutliers = 0.1;           // of the ranges, beyond that
-constexpr double kMostError = 2.0;              // sigmas; of a beacon's or the IMU's errors
+constexpr double kMostBeaconError = 2.0;        // sigmas; only ranges through things err more
+constexpr double kMostImuError = 4.0;           // sigmas
 constexpr double kMostChi2 = 1.5;               // a range
 constexpr double kMostPosition = 0.7;           // m; sigma of its place
 constexpr double kMostAttitude = radians(8.0);  // rad; sigma about any axis
@@ -237,8 +238,11 @@ class RangeFit {
   }
   [[nodiscard]] bool is_consistent() const {
     const auto n = static_cast<double>(problem_->ranges.size());
-    const double largest_error = errors_.cwiseAbs2().cwiseProduct(problem_->prior).maxCoeff();
-    return is_converged_ && cost() <= kMostChi2 * n && largest_error <= kMostError * kMostError &&
+    const Eigen::VectorXd sigmas = errors_.cwiseAbs().cwiseProduct(problem_->prior.cwiseSqrt());
+    const bool is_likely =
+        sigmas.head<CarriedMotion::kStart>().maxCoeff() <= kMostImuError &&
+        sigmas.tail(sigmas.size() - CarriedMotion::kStart).maxCoeff() <= kMostBeaconError;
+    return is_converged_ && is_likely && cost() <= kMostChi2 * n &&
            static_cast<double>(outliers_) <= kMostOutliers * n;
   }
   /// At the end, in the frame that then falls freely with self, with the noise of both IMUs.
