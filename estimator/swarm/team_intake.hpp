@@ -12,7 +12,7 @@
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/neighbor_track.hpp"
 #include "estimator/swarm/range_screen.hpp"
-#include "estimator/team/team_interval.hpp"
+#include "estimator/team/belief/team_interval.hpp"
 
 namespace crepes {
 

@@ -1,11 +1,17 @@
 #include "estimator/swarm/team_solver.hpp"
 
+#include <optional>
+
 #include "estimator/graph/pose_graph.hpp"
 
 namespace crepes {
 
 Event TeamSolver::solve(const TeamProblem& problem, const GraphConfig& config) {
-  if (const auto* interval = std::get_if<TeamInterval>(&problem)) return filter_.step(*interval);
+  if (const auto* interval = std::get_if<TeamInterval>(&problem)) {
+    const TeamSolution own = filter_.step(*interval);
+    const std::optional<TeamSolution> by_peer = peer_view_.step(*interval);
+    return by_peer ? better_of(own, *by_peer) : own;
+  }
   return solve_pose_graph(std::get<GraphProblem>(problem), config);
 }
 

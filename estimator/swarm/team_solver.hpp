@@ -5,6 +5,7 @@
 
 #include "estimator/core/event.hpp"
 #include "estimator/graph/graph_config.hpp"
+#include "estimator/team/peer_view.hpp"
 #include "estimator/team/team_filter.hpp"
 
 namespace crepes {
@@ -21,6 +22,7 @@ class TeamSolver {
 
  private:
   TeamFilter filter_;
+  PeerView peer_view_;
 };
 
 }  // namespace crepes

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "estimator/core/team_solution.hpp"
-#include "estimator/team/team_belief.hpp"
+#include "estimator/team/belief/team_belief.hpp"
 
 namespace crepes {
 

@@ -1,26 +1,24 @@
 #include "estimator/team/team_filter.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
+#include "estimator/team/belief/place_chains.hpp"
 #include "estimator/team/keyframe_pose.hpp"
-#include "estimator/team/reading_rows.hpp"
-#include "estimator/team/team_faults.hpp"
-#include "estimator/team/team_update.hpp"
+#include "estimator/team/readings/reading_rows.hpp"
+#include "estimator/team/readings/team_update.hpp"
+#include "estimator/team/trust/team_faults.hpp"
 
 namespace crepes {
 namespace {
 
-// An estimate that starts a robot shares its errors with what follows, so it counts little.
-constexpr double kStartPosition = 0.05;          // m
-constexpr double kStartAttitude = radians(1.0);  // rad
-constexpr double kUnknownDistance = 0.10;        // m; the least by which a step is judged
-constexpr double kLinear = 0.01;                 // rad, and relative to the distance
+constexpr double kUnknownDistance = 0.10;  // m; the least by which a step is judged
+constexpr double kLinear = 0.01;           // rad, and relative to the distance
 constexpr int kMaxIterations = 4;
 constexpr double kAgreementMemory = 0.5;  // s
 constexpr std::size_t kMaxCameras = 4;    // of a robot, whatever it reports
@@ -30,20 +28,6 @@ bool has_own_edge(const TeamInterval& interval, RobotId id) {
   return std::ranges::any_of(interval.edges, [&](const RelativePoseEdge& edge) {
     return ordered(edge.from, edge.to) == ordered(interval.self, id);
   });
-}
-
-Matrix6d start_floor() {
-  Vector6d variance;
-  variance << Eigen::Vector3d::Constant(kStartPosition * kStartPosition),
-      Eigen::Vector3d::Constant(kStartAttitude * kStartAttitude);
-  return variance.asDiagonal();
-}
-
-bool is_usable(const RelativePoseEdge& edge) {
-  const Matrix6d& covariance = edge.T_from_to.covariance;
-  return edge.T_from_to.pose.p.allFinite() && edge.T_from_to.pose.q.coeffs().allFinite() &&
-         edge.v_from_to.allFinite() && covariance.allFinite() &&
-         Eigen::LLT<Matrix6d>(covariance).info() == Eigen::Success;
 }
 
 /// Of a correction: turns [rad], and moves over the distance.
@@ -286,38 +270,16 @@ std::vector<bool> TeamFilter::corrected_states(Stage stage) const {
 /// placed here or removed.
 void TeamFilter::add_members(const TeamInterval& interval, RobotId first, bool are_placed,
                              TeamSolution& solution) {
-  std::map<RobotId, TeamPlace> places;
-  std::map<RobotId, TeamPlace> candidates = unseen_places(interval, are_placed);
-  const auto add_candidates_from = [&](RobotId known) {
-    const TeamPlace& via = places.at(known);
-    for (const RelativePoseEdge& edge : interval.edges) {
-      const bool forward = edge.from == known;
-      const RobotId id = forward ? edge.to : edge.from;
-      if ((!forward && edge.to != known) || places.contains(id) || interval.member(id) == nullptr ||
-          !is_usable(edge))
-        continue;
-      GaussianPose step = forward ? edge.T_from_to : inverse(edge.T_from_to);
-      // What a peer estimated is not believed to be better, whatever it claims.
-      if (edge.from != belief_.self) step.covariance += start_floor();
-      const Eigen::Vector3d v =
-          forward ? edge.v_from_to
-                  : Eigen::Vector3d(-(edge.T_from_to.pose.R().transpose() * edge.v_from_to));
-      const TeamPlace place = via.beyond(step, v, edge.estimated);
-      const auto [best, is_first] = candidates.try_emplace(id, place);
-      if (!is_first && place.doubt() < best->second.doubt()) best->second = place;
-    }
-  };
+  const std::map<RobotId, TeamPlace> candidates = unseen_places(interval, are_placed);
+  std::map<RobotId, TeamPlace> known;
   for (const auto& [id, robot] : belief_.robots)
-    if (are_placed || id == belief_.self) places[id] = TeamPlace::of(belief_, id);
-  const auto placed = places;
-  for (const auto& [id, place] : placed) add_candidates_from(id);
-  while (!candidates.empty()) {
-    const auto best = std::ranges::min_element(
-        candidates, {}, [](const auto& candidate) { return candidate.second.doubt(); });
-    const auto [id, place] = *best;
-    candidates.erase(best);
-    places[id] = place;
+    if (are_placed || id == belief_.self) known[id] = TeamPlace::of(belief_, id);
+  std::set<RobotId> unplaced;
+  for (const auto& [id, robot] : belief_.robots)
+    if (!known.contains(id)) unplaced.insert(id);
+  for (const auto& [id, place] : places_by_chains(known, candidates, interval)) {
     const std::size_t reserved = first != RobotId{} && first != id ? 1 : 0;
+    unplaced.erase(id);
     if (belief_.robots.contains(id)) {
       place_member(id, place);
     } else if (belief_.robots.size() + reserved < interval.settings.max_robots) {
@@ -327,11 +289,7 @@ void TeamFilter::add_members(const TeamInterval& interval, RobotId first, bool a
       // A pair's filter would know it better than a chain of estimates.
       solution.poses.push_back(place.pose(id, belief_, interval.settings.priors));
     }
-    add_candidates_from(id);
   }
-  std::vector<RobotId> unplaced;
-  for (const auto& [id, robot] : belief_.robots)
-    if (!places.contains(id)) unplaced.push_back(id);
   for (const RobotId id : unplaced) remove(id);
 }
 
@@ -348,7 +306,8 @@ std::map<RobotId, TeamPlace> TeamFilter::unseen_places(const TeamInterval& inter
     if (!robot->second.is_trusted ||
         place.doubt() < kClearlyBetter * TeamPlace::of(belief_, id).doubt()) {
       place_member(id, place);
-      robot->second.since = belief_.stamp;
+      // One that is on probation already need not wait for readings that agree, once more.
+      if (robot->second.is_trusted) robot->second.since = belief_.stamp;
       robot->second.is_trusted = false;
     }
     return true;

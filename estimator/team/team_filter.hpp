@@ -4,14 +4,14 @@
 #include <map>
 #include <vector>
 
-#include "estimator/team/estimate_check.hpp"
-#include "estimator/team/team_belief.hpp"
+#include "estimator/team/belief/team_belief.hpp"
+#include "estimator/team/belief/team_place.hpp"
+#include "estimator/team/readings/team_readings.hpp"
 #include "estimator/team/team_links.hpp"
-#include "estimator/team/team_memory.hpp"
-#include "estimator/team/team_place.hpp"
-#include "estimator/team/team_readings.hpp"
-#include "estimator/team/team_trust.hpp"
-#include "estimator/team/unseen_robots.hpp"
+#include "estimator/team/trust/estimate_check.hpp"
+#include "estimator/team/trust/team_memory.hpp"
+#include "estimator/team/trust/team_trust.hpp"
+#include "estimator/team/unseen/unseen_robots.hpp"
 
 namespace crepes {
 
@@ -39,6 +39,8 @@ class TeamFilter {
   /// Intervals must follow each other. After a gap the filter begins anew. Without this robot's IMU
   /// it forgets all, and the solution is empty.
   [[nodiscard]] TeamSolution step(const TeamInterval& interval);
+  /// At the end of the last interval.
+  [[nodiscard]] const TeamBelief& belief() const { return belief_; }
 
  private:
   using Stage = TeamReadings::Stage;

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "estimator/team/team_belief.hpp"
+#include "estimator/team/belief/team_belief.hpp"
 
 namespace crepes {
 

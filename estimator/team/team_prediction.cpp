@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "estimator/team/team_interval.hpp"
+#include "estimator/team/belief/team_interval.hpp"
 
 namespace crepes {
 namespace {

@@ -10,7 +10,7 @@
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/neighbor.hpp"
 #include "estimator/team/team_filter.hpp"
-#include "estimator/team/unseen_robots.hpp"
+#include "estimator/team/unseen/unseen_robots.hpp"
 #include "tests/support/simulated_belief.hpp"
 #include "tests/support/simulated_pair.hpp"
 #include "tests/support/simulated_team.hpp"

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "estimator/team/team_belief.hpp"
+#include "estimator/team/belief/team_belief.hpp"
 #include "tests/support/simulated_team.hpp"
 
 namespace crepes::test {

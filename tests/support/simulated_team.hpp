@@ -11,8 +11,8 @@
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
-#include "estimator/team/robot_trajectory.hpp"
-#include "estimator/team/team_interval.hpp"
+#include "estimator/team/belief/robot_trajectory.hpp"
+#include "estimator/team/belief/team_interval.hpp"
 #include "tests/support/random_geometry.hpp"
 
 namespace crepes::test {

@@ -1,4 +1,5 @@
 /// Robots that leave, restart, join or meet others cost nobody else a pose.
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -158,7 +159,8 @@ TEST(TwoGroups, ThatMeetBecomeOne) {
   }
 }
 
-// A robot whose board and camera are covered from the beginning.
+// A robot whose board and camera are covered from the beginning: the others' poses of it, and its
+// own poses of them.
 TEST(UnseenRobot, HasAPoseByRangesAlone) {
   constexpr double kDuration = 12.0;
   constexpr RobotId kCovered{6};
@@ -167,11 +169,14 @@ TEST(UnseenRobot, HasAPoseByRangesAlone) {
       kDuration);
   const Traces traces = flown(swarm, {}, {}, kDuration);
   for (std::uint16_t i = 1; i < kCovered.value; ++i) {
-    const auto trace = traces.find({RobotId{i}, kCovered});
-    ASSERT_NE(trace, traces.end()) << i;
-    EXPECT_LT(trace->second.longest_absence_s({10.0, kDuration}), 0.3) << i;
-    EXPECT_LT(trace->second.rmse_m({10.0, kDuration}), 0.5) << i;
-    EXPECT_EQ(trace->second.beyond({0.0, kDuration}).longest_s, 0.0) << i;
+    for (const auto& [from, to] : {std::pair{RobotId{i}, kCovered}, {kCovered, RobotId{i}}}) {
+      SCOPED_TRACE(fmt::format("r{} of r{}", to.value, from.value));
+      const auto trace = traces.find({from, to});
+      ASSERT_NE(trace, traces.end());
+      EXPECT_LT(trace->second.longest_absence_s({10.0, kDuration}), 0.3);
+      EXPECT_LT(trace->second.rmse_m({10.0, kDuration}), 0.5);
+      EXPECT_EQ(trace->second.beyond({0.0, kDuration}).longest_s, 0.0);
+    }
   }
 }
 

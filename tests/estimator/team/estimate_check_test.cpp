@@ -1,4 +1,4 @@
-#include "estimator/team/estimate_check.hpp"
+#include "estimator/team/trust/estimate_check.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "estimator/team/gyro_check.hpp"
+#include "estimator/team/trust/gyro_check.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // What the team concludes from gyroscopes that contradict what their cameras see.
 #include <gtest/gtest.h>
 
-#include "estimator/team/team_trust.hpp"
+#include "estimator/team/trust/team_trust.hpp"
 #include "tests/estimator/team/trust_of_four.hpp"
 
 namespace crepes::gyro_trust_test {

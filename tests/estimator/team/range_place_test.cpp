@@ -1,5 +1,5 @@
 /// A robot's place and attitude by its ranges and its IMU.
-#include "estimator/team/range_place.hpp"
+#include "estimator/team/unseen/range_place.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
-#include "estimator/team/range_track.hpp"
+#include "estimator/team/unseen/range_track.hpp"
 #include "tests/support/random_geometry.hpp"
 #include "tests/support/simulated_team.hpp"
 
@@ -29,7 +29,7 @@ struct Errors {
 /// Self hovers level, and five beacons with it. The robot moves about, for 4 s.
 struct Scene {
   std::deque<UnseenInterval> intervals;
-  RangePlaceSettings settings;
+  RangeProblemSettings settings;
   Pose T_S_N;
   Eigen::Vector3d v_S_N = Eigen::Vector3d::Zero();
 

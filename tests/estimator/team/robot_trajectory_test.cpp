@@ -1,8 +1,8 @@
-#include "estimator/team/robot_trajectory.hpp"
+#include "estimator/team/belief/robot_trajectory.hpp"
 
 #include <gtest/gtest.h>
 
-#include "estimator/team/team_interval.hpp"
+#include "estimator/team/belief/team_interval.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
 

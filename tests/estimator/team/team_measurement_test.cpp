@@ -1,4 +1,4 @@
-#include "estimator/team/team_measurement.hpp"
+#include "estimator/team/readings/team_measurement.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "estimator/team/team_memory.hpp"
+#include "estimator/team/trust/team_memory.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "estimator/team/team_place.hpp"
+#include "estimator/team/belief/team_place.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "estimator/team/team_readings.hpp"
+#include "estimator/team/readings/team_readings.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "estimator/team/team_trust.hpp"
+#include "estimator/team/trust/team_trust.hpp"
 
 #include <gtest/gtest.h>
 
-#include "estimator/team/team_faults.hpp"
+#include "estimator/team/trust/team_faults.hpp"
 #include "tests/estimator/team/trust_of_four.hpp"
 
 namespace crepes::team_trust_test {

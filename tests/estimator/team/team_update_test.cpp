@@ -1,4 +1,4 @@
-#include "estimator/team/team_update.hpp"
+#include "estimator/team/readings/team_update.hpp"
 
 #include <gtest/gtest.h>
 

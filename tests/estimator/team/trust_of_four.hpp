@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "estimator/team/team_trust.hpp"
+#include "estimator/team/trust/team_trust.hpp"
 #include "tests/support/simulated_belief.hpp"
 
 namespace crepes::test {

@@ -1,0 +1,27 @@
+/// Where robots are that estimates connect with known ones.
+#pragma once
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "estimator/core/constants.hpp"
+#include "estimator/team/belief/team_interval.hpp"
+#include "estimator/team/belief/team_place.hpp"
+
+namespace crepes {
+
+// An estimate that starts a robot shares its errors with what follows, so it counts little.
+inline constexpr double kStartPosition = 0.05;          // m
+inline constexpr double kStartAttitude = radians(1.0);  // rad
+
+/// What a peer estimates is not believed to be better, whatever it claims.
+[[nodiscard]] Matrix6d start_floor();
+
+/// Members of the interval that are not known, each by the most certain chain of estimates, the
+/// most certain first. Candidates are known without an estimate, but not better than by a chain.
+[[nodiscard]] std::vector<std::pair<RobotId, TeamPlace>> places_by_chains(
+    std::map<RobotId, TeamPlace> known, std::map<RobotId, TeamPlace> candidates,
+    const TeamInterval& interval);
+
+}  // namespace crepes

@@ -1,0 +1,31 @@
+/// Where a robot is relative to this one, by a chain of estimates.
+#pragma once
+
+#include "estimator/team/belief/team_belief.hpp"
+
+namespace crepes {
+
+/// A pose and a velocity with their errors.
+struct TeamPlace {
+  using Covariance = Eigen::Matrix<double, FreeMotionAt::kMotion, FreeMotionAt::kMotion>;
+  /// An estimate says nothing about the error of its velocity; nobody sends one that is worse.
+  static constexpr double kSpeedSigma = 0.3;  // m/s
+
+  Pose T_S_N;
+  Eigen::Vector3d v_S_N = Eigen::Vector3d::Zero();
+  Covariance covariance = Covariance::Zero();  ///< of [p, v, theta]
+  Timestamp last_sighting{};                   ///< the earliest along the chain
+  Timestamp last_fix{};                        ///< by ranges alone
+
+  /// Of a robot in the belief.
+  [[nodiscard]] static TeamPlace of(const TeamBelief& belief, RobotId id);
+  /// Of a robot that is estimated at `step` from here.
+  [[nodiscard]] TeamPlace beyond(const GaussianPose& step, const Eigen::Vector3d& v_step,
+                                 Timestamp estimated) const;
+  /// For comparison: the smaller, the better is the place known.
+  [[nodiscard]] double doubt() const;
+  /// The pose of a robot of whose IMU nothing is known.
+  [[nodiscard]] TeamPose pose(RobotId id, const TeamBelief& belief, const Priors& priors) const;
+};
+
+}  // namespace crepes

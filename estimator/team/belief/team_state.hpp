@@ -1,0 +1,89 @@
+/// What the team's filter knows of each robot, and where that is in its covariance.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "estimator/core/measurements.hpp"
+#include "estimator/core/time.hpp"
+#include "estimator/relative/error_state.hpp"
+#include "estimator/team/belief/robot_trajectory.hpp"
+
+namespace crepes {
+
+/// The lower id first.
+using RobotPair = std::pair<RobotId, RobotId>;
+
+/// The pair with the lower id first.
+[[nodiscard]] inline RobotPair ordered(RobotId a, RobotId b) {
+  return a < b ? RobotPair(a, b) : RobotPair(b, a);
+}
+
+/// How many readings agreed with the filter of late, and how many its gate refused.
+struct Agreement {
+  double fused = 0.0;
+  double gated = 0.0;
+
+  /// Scales both counts, so that the past is forgotten.
+  void fade(double kept) {
+    fused *= kept;
+    gated *= kept;
+  }
+  /// Counts a reading.
+  void add(bool fits) { (fits ? fused : gated) += 1.0; }
+  /// Most are refused, and not only a few outliers.
+  [[nodiscard]] bool is_contradiction() const { return gated > 4.0 && gated > fused; }
+};
+
+/// What is known of one camera of a robot.
+struct TeamCamera {
+  Eigen::Vector3d p_B_C = Eigen::Vector3d::Zero();
+  Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< u_measured = Exp(m) u
+  int index = 0;
+  std::map<RobotId, Agreement> agreement{};  ///< of its bearings, by the robot that it sees
+  bool is_free = false;     ///< it may be turned: its prior allowed for any misalignment
+  bool is_refused = false;  ///< it contradicted the others after that, too
+};
+
+/// What is known of one robot.
+struct TeamRobot {
+  /// [gyroscope and accelerometer bias, the gyroscope's scale errors, antenna delay, clock]
+  static constexpr int kCalibration = FreeMotionAt::kBias + 2;
+
+  FreeMotion motion{};
+  ImuBias bias{};
+  double antenna_delay_m = 0.0;  ///< of its module; lengthens all its ranges
+  /// How far its clock is ahead of this robot's. Its motion is kept on its own clock.
+  double clock_s = 0.0;
+  int motion_index = -1;  ///< none for this robot
+  int bias_index = 0;
+  std::vector<TeamCamera> cameras{};
+  Timestamp last_sighting{};
+  Timestamp last_fix{};  ///< in the dark, by the ranges of robots that are seen
+  Timestamp since{};
+  /// Measurements between a robot on probation and trusted robots correct the former only.
+  bool is_trusted = false;
+
+  [[nodiscard]] int delay_index() const { return bias_index + FreeMotionAt::kBias; }
+  [[nodiscard]] int clock_index() const { return delay_index() + 1; }
+};
+
+/// The error of all ranges between two robots that their modules' antenna delays do not explain.
+struct TeamRangeBias {
+  double bias_m = 0.0;
+  int index = 0;
+  std::map<RobotId, Agreement> agreement{};  ///< of the ranges that this robot measured
+  std::map<RobotId, double> refused_m{};     ///< mean of the latest residuals that were refused
+
+  /// Counts a range that `observer` measured.
+  void add(RobotId observer, bool fits, double residual_m) {
+    constexpr double kWeight = 0.1;
+    agreement[observer].add(fits);
+    const auto [mean_m, is_first] = refused_m.try_emplace(observer, residual_m);
+    if (!fits) mean_m->second += kWeight * (residual_m - mean_m->second);
+  }
+};
+
+}  // namespace crepes

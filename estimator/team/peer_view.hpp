@@ -1,0 +1,34 @@
+/// The team as a peer sees it, for a robot in the dark.
+#pragma once
+
+#include <optional>
+
+#include "estimator/team/team_filter.hpp"
+
+namespace crepes {
+
+/// A robot that sees nobody, and that nobody sees, knows of the others only their distances. Then a
+/// second filter estimates the team in the frame of a peer that sees others, as that peer itself
+/// does. There ranges place this robot like any other one that nobody sees (`unseen_robots`), and
+/// the belief is turned into this robot's frame (`root_change`). Deterministic.
+class PeerView {
+ public:
+  /// Intervals must follow each other. Empty unless this robot has been in the dark for a second,
+  /// and has a place in the peer's frame.
+  [[nodiscard]] std::optional<TeamSolution> step(const TeamInterval& interval);
+
+ private:
+  void choose_peer(const TeamInterval& interval);
+  void forget();
+
+  Timestamp lit_{};       ///< when this robot was last seen or saw anybody
+  Timestamp peer_lit_{};  ///< likewise the peer
+  RobotId peer_{};        ///< whose frame it is; RobotId{} if there is none
+  RobotId former_{};      ///< one that turned out to have a fault
+  TeamFilter filter_;
+};
+
+/// The one that knows the neighbors better: by the mean variance of their positions.
+[[nodiscard]] const TeamSolution& better_of(const TeamSolution& a, const TeamSolution& b);
+
+}  // namespace crepes

@@ -1,0 +1,85 @@
+#include "estimator/team/readings/reading_rows.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "estimator/relative/range_update.hpp"
+#include "estimator/team/readings/reading_scene.hpp"
+
+namespace crepes {
+namespace {
+
+std::optional<TeamRow> mean_of(const ReadingScene& scene, const Sight& sight) {
+  const TeamPair pair = scene.pair(sight.observer, sight.neighbor);
+  const TeamCamera& camera = pair.observer.cameras[sight.camera];
+  const auto model = SightModel::at(pair, camera, sight.time_s(scene.interval), sight.sigma_rad());
+  if (!model) return std::nullopt;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double count = 0.0;
+  for (const Bearing* z : sight.bearings) {
+    const auto residual = model->residual(pair, camera, z->u_B, scene.time_s(z->stamp));
+    if (!residual) continue;
+    sum += *residual;
+    count += 1.0;
+  }
+  if (count == 0.0) return std::nullopt;
+  TeamRow row = model->row();
+  row.residual = sum / count;
+  return row;
+}
+
+/// The mean range of a pair may be false although the gate accepts it. Mean and variance become
+/// those of the mixture of both cases (probabilistic data association, Bar-Shalom and Tse 1975).
+/// `S` is the innovation's variance. Returns false if the range is more likely false than true.
+bool associate(double S, TeamRow& row) {
+  const double residual = row.residual.x();
+  const double nis = residual * residual / S;
+  const double density = std::exp(-0.5 * nis) / std::sqrt(2.0 * std::numbers::pi * S);
+  const double is_true = density / (density + kFalseRangeDensity);
+  const double weight = is_true * (1.0 - (1.0 - is_true) * nis);
+  if (is_true < 0.5 || weight <= 0.0) return false;
+  row.variance += S / weight - S;
+  row.residual.x() *= is_true / weight;
+  return true;
+}
+
+std::optional<TeamRow> mean_of(const ReadingScene& scene, const Ranging& ranging) {
+  const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
+  const TeamRangeBias& bias = scene.belief.ranges.at(ordered(ranging.observer, ranging.neighbor));
+  const Eigen::Matrix3d covariance =
+      scene.belief.position_covariance(ranging.observer, ranging.neighbor);
+  std::optional<TeamRow> mean;
+  double sum_m = 0.0;
+  double count = 0.0;
+  for (const TeamRange* z : ranging.ranges) {
+    const RangeReading weighed{z->reading.range_m, ranging.sigma_m()};
+    const auto row = range_row(pair, bias, weighed, scene.time_s(z->stamp), covariance);
+    if (!row) continue;
+    mean = *row;
+    sum_m += row->residual.x();
+    count += 1.0;
+  }
+  if (!mean) return std::nullopt;
+  mean->residual.x() = sum_m / count;
+  if (!associate(mean->covariance(scene.instant.covariance())(0, 0), *mean)) return std::nullopt;
+  return mean;
+}
+
+}  // namespace
+
+std::vector<TeamRow> linearized(const TeamInterval& interval, const TeamTrajectories& paths,
+                                const TeamInstant& instant, const TeamBelief& belief,
+                                const TeamReadings& readings) {
+  const ReadingScene scene{interval, paths, instant, belief};
+  std::vector<TeamRow> rows;
+  rows.reserve(readings.sights.size() + readings.rangings.size());
+  const auto add = [&](const std::optional<TeamRow>& row) {
+    if (row) rows.push_back(*row);
+  };
+  for (const Sight& sight : readings.sights) add(mean_of(scene, sight));
+  for (const Ranging& ranging : readings.rangings) add(mean_of(scene, ranging));
+  return rows;
+}
+
+}  // namespace crepes

@@ -1,0 +1,20 @@
+/// The readings of an interval as rows of the filter's correction.
+#pragma once
+
+#include <vector>
+
+#include "estimator/team/belief/team_belief.hpp"
+#include "estimator/team/readings/team_instant.hpp"
+#include "estimator/team/readings/team_measurement.hpp"
+#include "estimator/team/readings/team_readings.hpp"
+
+namespace crepes {
+
+/// One row a sight and one a pair's ranges: the mean of what was not gated. Ranges that are more
+/// likely false than true have none.
+[[nodiscard]] std::vector<TeamRow> linearized(const TeamInterval& interval,
+                                              const TeamTrajectories& paths,
+                                              const TeamInstant& instant, const TeamBelief& belief,
+                                              const TeamReadings& readings);
+
+}  // namespace crepes

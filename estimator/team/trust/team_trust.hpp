@@ -1,0 +1,104 @@
+/// Finds robots whose measurements contradict the others'.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "estimator/team/belief/team_belief.hpp"
+#include "estimator/team/trust/gyro_check.hpp"
+
+namespace crepes {
+
+/// Remembers which robots were contradicted, and whose cameras are turned.
+class TeamTrust {
+ public:
+  /// Robots that must be removed from the belief: they have no IMU, are too uncertain, or are
+  /// contradicted by most cameras that see them. In a tie, the robot that came last is removed.
+  /// Also robots whose camera agrees with nobody and contradicts only whom other cameras confirm,
+  /// at most twice in ten seconds: their attitude is wrong. Also robots whose camera was refused
+  /// for so long that it is tried again.
+  [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
+
+  /// Robots whose gyroscope has contradicted for some intervals what their cameras see, and robots
+  /// whose gyroscope was found false of late and whose camera now contradicts most of what it sees:
+  /// their attitude is wrong.
+  [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval,
+                                                 const TeamBelief& belief,
+                                                 const std::map<RobotId, GyroCheck>& checks);
+
+  /// Robots of which a camera was newly found turned. Their attitude is wrong too. They must be
+  /// restarted with an uncertain misalignment, so that the others' measurements determine it. If
+  /// the camera contradicts the others again, it is refused.
+  [[nodiscard]] std::vector<RobotId> turned(const TeamInterval& interval, const TeamBelief& belief);
+
+  /// Whether a robot that was trusted too early was newly found to have set a wrong scale: the
+  /// ranges of at least half of the pairs are refused, and the robot is part of every other pair,
+  /// but no robot of every refused one.
+  /// All robots must be restarted, and this one is trusted last.
+  [[nodiscard]] bool is_misled(const TeamBelief& belief);
+  /// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.
+  void end_probations(TeamBelief& belief) const;
+
+  /// Robots whose gyroscope was found false within the last second.
+  [[nodiscard]] std::vector<TeamFault> gyro_faults(Timestamp now) const;
+
+  /// Whether the gyroscope of a trusted robot was false of late, so that all states may be
+  /// disturbed.
+  [[nodiscard]] bool is_everybody_strained(Timestamp now) const;
+
+  /// Covariance of the misalignment of its cameras, which is also that of its attitude, in body
+  /// axes [rad^2]. Empty if its cameras are as calibrated.
+  [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot) const;
+  /// Whether a robot's cameras contradicted the others again after they were realigned.
+  [[nodiscard]] bool is_refused(RobotId robot) const { return verdicts_.at(robot).is_refused; }
+  /// The factor on the start's sigmas of a robot that was recently contradicted.
+  [[nodiscard]] double doubt(RobotId robot, Timestamp now) const;
+
+ private:
+  struct Losses {
+    Timestamp last{};
+    int count = 0;
+  };
+  struct GyroDoubt {
+    double chi2 = 0.0;               ///< of the latest intervals
+    std::optional<Timestamp> found;  ///< when it was last too large
+    /// The same, of a robot that was trusted; it was not while what followed may be its effect.
+    std::optional<Timestamp> unconfirmed;
+    std::optional<Timestamp> confirmed;  ///< when its cameras first agreed with it after that
+    double rate_radps = 0.0;             ///< how wrong the gyroscope was then
+    Timestamp single{};                  ///< when it was last contradicted by a single robot
+    Losses as_trusted;                   ///< when it was found although the robot was trusted
+  };
+  struct Verdict {
+    Timestamp shown{};  ///< when its camera was last found turned; after a while it may be repaired
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    int count = 0;  ///< how often its cameras were found turned
+    bool is_refused = false;
+    bool is_withdrawn = false;
+  };
+  void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
+  void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
+  [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool may_be_disoriented(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool is_disoriented(const TeamBelief& belief, RobotId id) const;
+  [[nodiscard]] bool is_realigned(RobotId robot) const;
+  [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
+  [[nodiscard]] Duration probation(RobotId robot, Timestamp now) const;
+  [[nodiscard]] static int recent(const std::map<RobotId, Losses>& all, RobotId robot,
+                                  Timestamp now);
+  static void count(std::map<RobotId, Losses>& all, RobotId robot, Timestamp now);
+
+  std::map<RobotId, Losses> losses_;    ///< in the wrong place
+  std::map<RobotId, Losses> restarts_;  ///< with a wrong attitude
+  std::map<RobotId, Verdict> verdicts_;
+  std::map<RobotId, GyroDoubt> gyro_doubts_;
+  std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
+};
+
+/// Whether the bearings of a robot and to it agree with its place, four in five of them, and its
+/// ranges do not contradict it. False in the interval in which it started: they are yet to come.
+[[nodiscard]] bool is_plausible(const TeamBelief& belief, RobotId id);
+
+}  // namespace crepes

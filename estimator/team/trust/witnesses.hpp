@@ -1,0 +1,39 @@
+/// What the cameras and ranges of the team say of its robots' places and attitudes.
+#pragma once
+
+#include <functional>
+#include <map>
+
+#include "estimator/team/belief/team_belief.hpp"
+
+namespace crepes {
+
+/// How many cameras or bearings agree with each robot's place, and how many contradict it.
+using Witnesses = std::map<RobotId, Agreement>;
+
+/// Whether a camera of this robot is no witness.
+using IsExcluded = std::function<bool(RobotId, const TeamCamera&)>;
+
+/// The cameras that see each robot. A camera that is refused or excluded is no witness.
+[[nodiscard]] Witnesses witnesses_of(const TeamBelief& belief, const IsExcluded& is_excluded);
+/// The bearings of each robot and to it.
+[[nodiscard]] Witnesses bearings_of(const TeamBelief& belief);
+/// The ranges of a robot and to it.
+[[nodiscard]] Agreement ranges_of(const TeamBelief& belief, RobotId id);
+
+/// Whether a camera contradicts most of what it sees, and nobody contradicts the place of the robot
+/// that carries it. If it was found turned before, it need only contradict robots that no other
+/// camera contradicts, more often than it agrees with all others.
+[[nodiscard]] bool looks_turned(const TeamBelief& belief, RobotId observer,
+                                const TeamCamera& camera, bool was_turned);
+/// Whether a camera agrees with nobody, and other cameras confirm the place of each robot that it
+/// contradicts. So its own attitude is wrong, which no other camera can show.
+[[nodiscard]] bool is_alone(const TeamBelief& belief, RobotId observer, const TeamCamera& camera);
+/// Whether most of these witnesses contradict the robot's place. In a tie, it is the robot that
+/// came last of all that are contradicted.
+[[nodiscard]] bool is_contradicted(const TeamBelief& belief, const Witnesses& all, RobotId id);
+/// Whether the robot's place agrees with the ranges that it measured, but not with those that
+/// trusted robots measured to it.
+[[nodiscard]] bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id);
+
+}  // namespace crepes

@@ -1,0 +1,98 @@
+/// What a robot in the dark knows of its team.
+#include "estimator/team/peer_view.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <functional>
+
+#include "tests/support/simulated_team.hpp"
+#include "tests/support/team_solution.hpp"
+
+namespace crepes::peer_view_test {
+namespace {
+
+using test::find;
+using test::kIntervalSeconds;
+using test::kSelf;
+using test::SimulatedTeam;
+
+constexpr RobotId kPeer{2};  // whose frame it is: the first of those that see most
+constexpr int kTeams = 8;
+constexpr double kSixDof5Sigma = 46.0;  // of six degrees of freedom as likely as 5 sigma of three
+
+/// What is known of the others in so many teams.
+struct Known {
+  int teams = 0;
+  int poses = 0;
+  int beyond = 0;
+  double square_m2 = 0.0;
+
+  [[nodiscard]] double rmse_m() const { return std::sqrt(square_m2 / std::max(1, poses)); }
+};
+
+Known known(int robots, double seconds, const std::function<void(SimulatedTeam&)>& alter) {
+  Known all;
+  for (std::uint64_t seed = 1; seed <= kTeams; ++seed) {
+    SimulatedTeam team(seed, robots);
+    PeerView view;
+    team.hovers = true;
+    team.sees = [](RobotId i, RobotId j) { return i != kSelf && j != kSelf; };
+    alter(team);
+    bool is_known = false;
+    for (double t = 0.0; t < seconds; t += kIntervalSeconds) {
+      const auto solution = view.step(team.next());
+      if (!solution) continue;
+      for (const TeamPose& pose : solution->poses) {
+        if (pose.needs_witness) continue;
+        is_known = true;
+        ++all.poses;
+        const Pose truth = team.truth(pose.neighbor);
+        all.square_m2 += test::error_of(pose, truth).head<3>().squaredNorm();
+        if (test::nees_of(pose, truth) > kSixDof5Sigma) ++all.beyond;
+      }
+    }
+    all.teams += is_known ? 1 : 0;
+  }
+  return all;
+}
+
+TEST(PeerView, ShowsARobotInTheDarkItsTeam) {
+  const Known all = known(7, 12.0, [](SimulatedTeam&) {});
+  EXPECT_GE(all.teams, kTeams - 1);
+  EXPECT_LT(all.rmse_m(), 0.5);
+  EXPECT_EQ(all.beyond, 0) << "of " << all.poses;
+}
+
+TEST(PeerView, ShowsNothingWithFewerThanFour) {
+  EXPECT_EQ(known(4, 8.0, [](SimulatedTeam&) {}).poses, 0);
+}
+
+TEST(PeerView, EndsWhenTheRobotIsSeen) {
+  SimulatedTeam team(3, 7);
+  PeerView view;
+  team.hovers = true;
+  team.sees = [](RobotId i, RobotId j) { return i != kSelf && j != kSelf; };
+  bool was_known = false;
+  for (double t = 0.0; t < 12.0; t += kIntervalSeconds)
+    was_known = view.step(team.next()).has_value() || was_known;
+  EXPECT_TRUE(was_known);
+  team.sees = [](RobotId, RobotId) { return true; };
+  EXPECT_FALSE(view.step(team.next()).has_value());
+}
+
+// The camera of that peer is turned.
+TEST(PeerView, IsNotMisledByThePeerWhoseFrameItIs) {
+  const Known all = known(7, 15.0, [](SimulatedTeam& team) {
+    team.damage = [](TeamInterval& interval) {
+      const Eigen::Quaterniond turn = so3_exp(Eigen::Vector3d(0.0, 0.0, radians(20.0)));
+      for (TeamBearing& reading : interval.bearings)
+        if (reading.observer == kPeer) reading.bearing.u_B = turn * reading.bearing.u_B;
+    };
+  });
+  EXPECT_GE(all.teams, 1);
+  EXPECT_EQ(all.beyond, 0) << "of " << all.poses;
+}
+
+}  // namespace
+}  // namespace crepes::peer_view_test
