@@ -1,4 +1,4 @@
-/// memory_growth: what a swarm of four keeps in memory over hours under attack. See README.md.
+/// memory_growth: what a swarm keeps in memory over hours under attack. See README.md.
 #include <fmt/core.h>
 #include <malloc.h>
 
@@ -13,7 +13,7 @@
 
 #include "daemon/ctl/replay/virtual_swarm.hpp"
 #include "tests/faults/network_faults.hpp"
-#include "tests/study/simulated_swarm.hpp"
+#include "tests/study/crowd.hpp"
 
 namespace crepes::faults {
 namespace {
@@ -26,8 +26,8 @@ double heap_mb() {
   return 1e-6 * static_cast<double>(heap.uordblks + heap.hblkhd);
 }
 
-/// Floods, copies, replays, a second r2 and a lying r3, ten seconds each in turn.
-std::vector<Fault> attacks(double from_s) {
+/// Floods, copies, replays, doubled ids and liars, ten seconds each in turn, each robot in turn.
+std::vector<Fault> attacks(std::size_t robots, double from_s) {
   constexpr double kEach_s = 10.0;
   constexpr std::array kAttacks{Kind::kGarbageFlood, Kind::kForgedFlood,     Kind::kReplay,
                                 Kind::kDoubledId,    Kind::kLiarExtremes,    Kind::kJitter,
@@ -37,7 +37,7 @@ std::vector<Fault> attacks(double from_s) {
     const auto turn = i + static_cast<std::size_t>(std::lround(from_s / kEach_s));
     const double begin_s = from_s + kEach_s * static_cast<double>(i);
     faults.push_back({.kind = kAttacks.at(turn % kAttacks.size()),
-                      .robot = RobotId{static_cast<std::uint16_t>(1 + turn % 4)},
+                      .robot = RobotId{static_cast<std::uint16_t>(1 + turn % robots)},
                       .from_s = begin_s,
                       .to_s = begin_s + kEach_s,
                       .rate = 0.5,
@@ -82,9 +82,9 @@ Slope slope_of(const std::vector<std::pair<double, double>>& points) {
 
 /// Flies the same minute again and again, and prints what the robots keep after each: readings and
 /// datagrams that are on their way do not count.
-int fly(double hours) {
-  const auto& four = *std::ranges::find(study::kScenarios, "four", &study::Scenario::name);
-  const study::Swarm swarm = study::simulate_swarm(four, 1, kPiece_s);
+int fly(std::size_t robots, double hours) {
+  const study::Swarm swarm =
+      study::simulate_crowd({.robots = robots, .radius_m = 3.0}, 1, kPiece_s);
   FaultyNetwork network(true);
   std::optional<Liars> liars;
   double now_s = 0.0;
@@ -102,7 +102,7 @@ int fly(double hours) {
   VirtualSwarm flight(without_readings(swarm.dataset), no_truth, options, sinks);
   std::vector<std::pair<double, double>> kept;
   for (double from_s = 0.0; from_s < 3600.0 * hours; from_s += kPiece_s + kPause_s) {
-    const std::vector<Fault> faults = attacks(from_s);
+    const std::vector<Fault> faults = attacks(robots, from_s);
     network.strike(faults);
     liars.emplace(faults);
     flight.append(swarm.dataset, from_s);
@@ -126,7 +126,9 @@ int fly(double hours) {
 int main(int argc, char** argv) {
   CLI::App app{"What a swarm under attack keeps in memory", "memory_growth"};
   double hours = 0.5;
+  std::size_t robots = 4;
   app.add_option("--hours", hours, "of simulated time")->capture_default_str();
+  app.add_option("--robots", robots)->capture_default_str()->check(CLI::Range(2, 20));
   CLI11_PARSE(app, argc, argv);
-  return crepes::faults::fly(hours);
+  return crepes::faults::fly(robots, hours);
 }

@@ -85,7 +85,7 @@ Swarm simulate_crowd(const Crowd& crowd, int seed, double duration_s) {
   std::map<RobotId, Motion> motions;
   for (std::size_t i = 0; i < crowd.robots; ++i)
     motions.emplace(id_of(i), motion_of(crowd, i, seed));
-  const Scenario scenario{.name = "crowd", .sight_m = crowd.sight_m, .covered = crowd.covered};
+  const Scenario scenario{.name = "crowd", .dark = crowd.dark, .sight_m = crowd.sight_m};
   return simulate_swarm(scenario, SimWorld(seed, std::move(motions)), robots_of(crowd, seed),
                         duration_s);
 }

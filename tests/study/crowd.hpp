@@ -17,7 +17,7 @@ struct Crowd {
   double meeting_s = 0.0;   ///< which is then; afterwards they part again. 0: never
   double sight_m = 40.0;    ///< of cameras and UWB modules
   double spread_m = 1.0;    ///< of the heights about which robots fly
-  RobotId covered{};        ///< nobody sees this robot, and it sees nobody; 0: no such robot
+  Darkness dark{};
 };
 
 /// Noise, errors and network as in `simulate_swarm`. In rings of more than five robots, UWB modules

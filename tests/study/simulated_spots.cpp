@@ -42,8 +42,7 @@ SimulatedSpots::SimulatedSpots(const SimWorld& world, const Config& config, Dist
 
 std::vector<Spot> SimulatedSpots::at(double t_s) {
   std::vector<Spot> spots;
-  const bool is_dark = t_s >= disturbance_.dark_from_s && t_s < disturbance_.dark_to_s;
-  if (is_dark || self_ == disturbance_.covered) return spots;
+  if (disturbance_.dark.covers(self_, t_s)) return spots;
   const auto views = renderer_.views(t_s);
   for (const RingRenderer::View& view : views) {
     if (is_hidden(view.robot, t_s)) continue;
@@ -60,7 +59,7 @@ std::vector<Spot> SimulatedSpots::at(double t_s) {
 }
 
 bool SimulatedSpots::is_hidden(RobotId neighbor, double t_s) const {
-  if (neighbor == disturbance_.covered) return true;
+  if (disturbance_.dark.covers(neighbor, t_s)) return true;
   const auto member = std::find_if(members_.begin(), members_.end(),
                                    [&](const MemberConfig& m) { return m.id == neighbor; });
   CREPES_EXPECT(member != members_.end(), "views are of members");

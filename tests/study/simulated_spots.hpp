@@ -11,15 +11,25 @@
 
 namespace crepes::study {
 
+/// A time without light.
+struct Darkness {
+  double from_s = 0.0;
+  double to_s = 0.0;
+  RobotId robot{};  ///< nobody sees this robot, and it sees nobody; 0: nobody sees anything
+
+  /// Whether nobody sees this robot then, and it sees nobody.
+  [[nodiscard]] bool covers(RobotId id, double t_s) const {
+    return t_s >= from_s && t_s < to_s && (robot == RobotId{} || robot == id);
+  }
+};
+
 /// What disturbs a camera beside its own noise.
 struct Disturbance {
   bool interference = false;  ///< glints, mains lamps, mirror images in the floor
   ObstacleField obstacles{Obstacles::kNone, 0};
   bool hides_images = true;  ///< what hides a robot hides its image, too
-  double dark_from_s = 0.0;  ///< no spot from here
-  double dark_to_s = 0.0;    ///< to here
-  double sight_m = 1e3;      ///< no spot of boards beyond
-  RobotId covered{};         ///< nobody sees this robot, and it sees nobody; 0: no such robot
+  Darkness dark;
+  double sight_m = 1e3;  ///< no spot of boards beyond
 };
 
 /// One robot's first camera: noise that grows with distance, drop-outs, spots that merge; with

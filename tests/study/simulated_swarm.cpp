@@ -104,10 +104,8 @@ Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vecto
   const Disturbance disturbance{.interference = scenario.interference,
                                 .obstacles = ObstacleField(scenario.obstacles, seed),
                                 .hides_images = scenario.hides_images,
-                                .dark_from_s = scenario.dark_from_s,
-                                .dark_to_s = scenario.dark_to_s,
-                                .sight_m = scenario.sight_m,
-                                .covered = scenario.covered};
+                                .dark = scenario.dark,
+                                .sight_m = scenario.sight_m};
   const auto spots_of = [&](const DemoRobot& robot) {
     if (scenario.pictured) {
       RenderedSpots pictures(world, robot.config, *scenario.pictured);

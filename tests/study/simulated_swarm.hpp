@@ -15,6 +15,7 @@
 #include "tests/study/pair_bound.hpp"
 #include "tests/study/pair_sightings.hpp"
 #include "tests/study/simulated_ranges.hpp"
+#include "tests/study/simulated_spots.hpp"
 
 namespace crepes::study {
 
@@ -26,11 +27,9 @@ struct Scenario {
   bool interference = false;  ///< glints, mains lamps, mirror images in the floor
   Obstacles obstacles = Obstacles::kNone;
   bool hides_images = true;  ///< what hides a robot hides its mirror image, too
-  double dark_from_s = 0.0;  ///< no camera sees anything from here
-  double dark_to_s = 0.0;    ///< to here
+  Darkness dark{};
   RangeModel ranges = RangeModel::kSimulated;
   double sight_m = 1e3;  ///< no camera sees further
-  RobotId covered{};     ///< nobody sees this robot, and it sees nobody; 0: no such robot
   /// Spots are what the detector finds in rendered pictures of such boards, without disturbances.
   std::optional<LedBoard> pictured{};
   bool are_boards_measured = false;  ///< robots know their size, within 2 %
@@ -51,7 +50,7 @@ inline constexpr std::array kScenarios{
         .name = "cluttered", .world = SimScenario::kFour, .obstacles = Obstacles::kThinPillars},
     Scenario{.name = "fence", .world = SimScenario::kFour, .obstacles = Obstacles::kFence},
     Scenario{
-        .name = "blackout", .world = SimScenario::kFour, .dark_from_s = 15.0, .dark_to_s = 30.0},
+        .name = "blackout", .world = SimScenario::kFour, .dark = {.from_s = 15.0, .to_s = 30.0}},
     Scenario{.name = "thin-ranges", .world = SimScenario::kFour, .ranges = RangeModel::kLinkTrack},
     Scenario{.name = "workshop",
              .world = SimScenario::kFour,

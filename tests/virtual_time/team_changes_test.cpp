@@ -164,9 +164,12 @@ TEST(TwoGroups, ThatMeetBecomeOne) {
 TEST(UnseenRobot, HasAPoseByRangesAlone) {
   constexpr double kDuration = 12.0;
   constexpr RobotId kCovered{6};
-  const Swarm swarm = simulate_crowd(
-      {.robots = 6, .rings = 1, .radius_m = 5.0, .spread_m = 4.0, .covered = kCovered}, 1,
-      kDuration);
+  const Swarm swarm = simulate_crowd({.robots = 6,
+                                      .rings = 1,
+                                      .radius_m = 5.0,
+                                      .spread_m = 4.0,
+                                      .dark = {.to_s = kDuration, .robot = kCovered}},
+                                     1, kDuration);
   const Traces traces = flown(swarm, {}, {}, kDuration);
   for (std::uint16_t i = 1; i < kCovered.value; ++i) {
     for (const auto& [from, to] : {std::pair{RobotId{i}, kCovered}, {kCovered, RobotId{i}}}) {

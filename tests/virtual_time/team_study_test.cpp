@@ -165,8 +165,7 @@ TEST(Clutter, HidesPairsAndMakesTheirRangesLate) {
 
 TEST(Blackout, LeavesFramesWithoutSpots) {
   Scenario dark = scenario("blackout");
-  dark.dark_from_s = 2.0;
-  dark.dark_to_s = 4.0;
+  dark.dark = {.from_s = 2.0, .to_s = 4.0};
   const Swarm swarm = simulate_swarm(dark, 1, 6.0);
 
   const RobotRecording& robot = recording_of(swarm.dataset, RobotId{1});

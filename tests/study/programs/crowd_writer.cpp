@@ -19,11 +19,14 @@ int main(int argc, char** argv) {
   app.add_option("--distance", crowd.distance_m, "of rings [m]")->capture_default_str();
   app.add_option("--sight", crowd.sight_m, "of cameras and UWB modules [m]")->capture_default_str();
   app.add_option("--spread", crowd.spread_m, "of the heights [m]")->capture_default_str();
-  app.add_option("--covered", crowd.covered.value,
+  app.add_option("--covered", crowd.dark.robot.value,
                  "a robot that nobody sees, and that sees nobody");
+  app.add_option("--covered-from", crowd.dark.from_s, "[s]")->capture_default_str();
+  app.add_option("--covered-to", crowd.dark.to_s, "[s]; the end, unless given");
   app.add_option("--seed", seed)->capture_default_str();
   app.add_option("--duration", duration_s, "[s]")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
+  if (crowd.dark.robot != crepes::RobotId{} && crowd.dark.to_s == 0.0) crowd.dark.to_s = duration_s;
   if (crepes::study::write_swarm(dir, crepes::study::simulate_crowd(crowd, seed, duration_s)))
     return 0;
   std::fprintf(stderr, "crowd_writer: %s: cannot be written\n", dir.c_str());
