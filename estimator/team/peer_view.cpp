@@ -1,7 +1,6 @@
 #include "estimator/team/peer_view.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <map>
 #include <utility>
 
@@ -29,17 +28,9 @@ TeamInterval as_of(RobotId peer, TeamInterval interval) {
   return interval;
 }
 
-/// Infinite without any pose [m^2].
-double mean_variance(const TeamSolution& solution) {
-  if (solution.poses.empty()) return std::numeric_limits<double>::infinity();
-  double sum = 0.0;
-  for (const TeamPose& pose : solution.poses) sum += pose.covariance.topLeftCorner<3, 3>().trace();
-  return sum / static_cast<double>(solution.poses.size());
-}
-
 }  // namespace
 
-std::optional<TeamSolution> PeerView::step(const TeamInterval& interval) {
+std::optional<TeamSolution> PeerView::step(const TeamInterval& interval, const TeamBelief& own) {
   const bool is_lit = std::ranges::any_of(interval.bearings, [&](const TeamBearing& reading) {
     return concerns(reading, interval.self);
   });
@@ -48,12 +39,13 @@ std::optional<TeamSolution> PeerView::step(const TeamInterval& interval) {
     forget();
     return std::nullopt;
   }
-  choose_peer(interval);
+  choose_peer(interval, own);
   if (peer_ == RobotId{}) return std::nullopt;
   TeamSolution solution = filter_.step(as_of(peer_, interval));
   if (std::ranges::find(solution.faults, peer_, &TeamFault::robot) != solution.faults.end()) {
-    former_ = peer_;
-    peer_ = {};
+    const RobotId faulty = peer_;
+    forget();
+    former_ = faulty;
     return std::nullopt;
   }
   const TeamBelief& belief = filter_.belief();
@@ -75,10 +67,11 @@ std::optional<TeamSolution> PeerView::step(const TeamInterval& interval) {
 void PeerView::forget() {
   peer_ = {};
   former_ = {};
+  filter_ = {};
 }
 
 /// The one with most bearings, as long as it has any.
-void PeerView::choose_peer(const TeamInterval& interval) {
+void PeerView::choose_peer(const TeamInterval& interval, const TeamBelief& own) {
   std::map<RobotId, int> bearings;
   for (const TeamBearing& reading : interval.bearings) {
     ++bearings[reading.observer];
@@ -91,13 +84,17 @@ void PeerView::choose_peer(const TeamInterval& interval) {
   const bool stays =
       peer_ != RobotId{} && interval.member(peer_) != nullptr && interval.to - peer_lit_ < kDark;
   if (stays || bearings.empty()) return;
-  peer_ = std::ranges::max_element(bearings, {}, &std::pair<const RobotId, int>::second)->first;
+  const RobotId next =
+      std::ranges::max_element(bearings, {}, &std::pair<const RobotId, int>::second)->first;
   peer_lit_ = interval.to;
-  filter_ = {};
-}
-
-const TeamSolution& better_of(const TeamSolution& a, const TeamSolution& b) {
-  return mean_variance(b) < mean_variance(a) ? b : a;
+  if (next == peer_) return;
+  peer_ = next;
+  const bool goes_on = filter_.belief().robots.contains(interval.self);
+  const TeamBelief& known = goes_on ? filter_.belief() : own;
+  const auto peer = known.robots.find(peer_);
+  const bool is_known =
+      known.stamp == interval.from && peer != known.robots.end() && peer->second.is_trusted;
+  filter_ = is_known ? TeamFilter(seen_from(peer_, known)) : TeamFilter();
 }
 
 }  // namespace crepes

@@ -9,16 +9,19 @@ namespace crepes {
 
 /// A robot that sees nobody, and that nobody sees, knows of the others only their distances. Then a
 /// second filter estimates the team in the frame of a peer that sees others, as that peer itself
-/// does. There ranges place this robot like any other one that nobody sees (`unseen_robots`), and
-/// the belief is turned into this robot's frame (`root_change`). Deterministic.
+/// does. It begins with what this robot believed until then, if that is known. There ranges hold or
+/// place this robot like any other one that nobody sees, and the belief is turned into this robot's
+/// frame (`root_change`). Deterministic.
 class PeerView {
  public:
-  /// Intervals must follow each other. Empty unless this robot has been in the dark for a second,
-  /// and has a place in the peer's frame.
-  [[nodiscard]] std::optional<TeamSolution> step(const TeamInterval& interval);
+  /// Intervals must follow each other. `own` is what this robot's own filter believed before it.
+  /// Empty unless this robot has been in the dark for a second, and has a place in the peer's
+  /// frame.
+  [[nodiscard]] std::optional<TeamSolution> step(const TeamInterval& interval,
+                                                 const TeamBelief& own);
 
  private:
-  void choose_peer(const TeamInterval& interval);
+  void choose_peer(const TeamInterval& interval, const TeamBelief& own);
   void forget();
 
   Timestamp lit_{};       ///< when this robot was last seen or saw anybody
@@ -27,8 +30,5 @@ class PeerView {
   RobotId former_{};      ///< one that turned out to have a fault
   TeamFilter filter_;
 };
-
-/// The one that knows the neighbors better: by the mean variance of their positions.
-[[nodiscard]] const TeamSolution& better_of(const TeamSolution& a, const TeamSolution& b);
 
 }  // namespace crepes

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "estimator/team/belief/team_belief.hpp"
@@ -36,6 +37,10 @@ namespace crepes {
 /// Deterministic.
 class TeamFilter {
  public:
+  TeamFilter() = default;
+  /// Goes on from this belief.
+  explicit TeamFilter(TeamBelief belief) : belief_(std::move(belief)) {}
+
   /// Intervals must follow each other. After a gap the filter begins anew. Without this robot's IMU
   /// it forgets all, and the solution is empty.
   [[nodiscard]] TeamSolution step(const TeamInterval& interval);

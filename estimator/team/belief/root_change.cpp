@@ -17,9 +17,10 @@ class ErrorMap {
 
   template <class Block>
   void add(int to, int from, const Eigen::MatrixBase<Block>& block) {
-    for (int row = 0; row < block.rows(); ++row)
+    for (int row = 0; row < block.rows(); ++row) {
       for (int col = 0; col < block.cols(); ++col)
         entries_.emplace_back(to + row, from + col, block(row, col));
+    }
   }
   [[nodiscard]] Eigen::MatrixXd image_of(const Eigen::MatrixXd& P) const {
     Eigen::SparseMatrix<double> map(size_, size_);

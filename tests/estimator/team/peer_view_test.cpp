@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 
@@ -41,7 +43,7 @@ Known known(int robots, double seconds, const std::function<void(SimulatedTeam&)
     alter(team);
     bool is_known = false;
     for (double t = 0.0; t < seconds; t += kIntervalSeconds) {
-      const auto solution = view.step(team.next());
+      const auto solution = view.step(team.next(), {});
       if (!solution) continue;
       for (const TeamPose& pose : solution->poses) {
         if (pose.needs_witness) continue;
@@ -75,10 +77,38 @@ TEST(PeerView, EndsWhenTheRobotIsSeen) {
   team.sees = [](RobotId i, RobotId j) { return i != kSelf && j != kSelf; };
   bool was_known = false;
   for (double t = 0.0; t < 12.0; t += kIntervalSeconds)
-    was_known = view.step(team.next()).has_value() || was_known;
+    was_known = view.step(team.next(), {}).has_value() || was_known;
   EXPECT_TRUE(was_known);
   team.sees = [](RobotId, RobotId) { return true; };
-  EXPECT_FALSE(view.step(team.next()).has_value());
+  EXPECT_FALSE(view.step(team.next(), {}).has_value());
+}
+
+// A robot that was seen for some seconds goes on from what it knew then.
+TEST(PeerView, GoesOnFromWhatWasKnown) {
+  double sum_m2 = 0.0;
+  double count = 0.0;
+  for (std::uint64_t seed = 1; seed <= kTeams; ++seed) {
+    SimulatedTeam team(seed, 7);
+    team.hovers = true;
+    PeerView view;
+    TeamFilter filter;
+    for (double t = 0.0; t < 25.0; t += kIntervalSeconds) {
+      if (t > 5.0) team.sees = [](RobotId i, RobotId j) { return i != kSelf && j != kSelf; };
+      const TeamInterval interval = team.next();
+      const auto solution = view.step(interval, filter.belief());
+      (void)filter.step(interval);
+      if (t < 7.0) continue;
+      ASSERT_TRUE(solution) << seed << " at " << t;
+      ASSERT_EQ(solution->poses.size(), 6U) << seed << " at " << t;
+      for (const TeamPose& pose : solution->poses) {
+        const Pose truth = team.truth(pose.neighbor);
+        EXPECT_LT(test::nees_of(pose, truth), kSixDof5Sigma) << seed << " at " << t;
+        sum_m2 += test::error_of(pose, truth).head<3>().squaredNorm();
+        count += 1.0;
+      }
+    }
+  }
+  EXPECT_LT(std::sqrt(sum_m2 / count), 0.3);
 }
 
 // The camera of that peer is turned.
