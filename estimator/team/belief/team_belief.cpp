@@ -149,22 +149,12 @@ void TeamBelief::remove(RobotId id) {
 }
 
 void TeamBelief::append_range_biases(const TeamInterval& interval) {
-  const double share = range_bias_factor - kShareOfModules;
-  const double sigma = std::sqrt(share) * interval.settings.priors.range_bias_m;
+  const double sigma = std::sqrt(1.0 - kShareOfModules) * interval.settings.priors.range_bias_m;
   for (const TeamRange& reading : interval.ranges) {
     if (!robots.contains(reading.observer) || !robots.contains(reading.neighbor)) continue;
     const RobotPair pair = ordered(reading.observer, reading.neighbor);
     if (!ranges.contains(pair)) ranges[pair] = {.index = append(1, sigma)};
   }
-}
-
-void TeamBelief::add_range_innovation(double nis, const Priors& priors) {
-  range_scatter.add(nis);
-  const double more = range_scatter.factor() - range_bias_factor;
-  if (more <= 0.0) return;
-  range_bias_factor += more;
-  for (const auto& [pair, range] : ranges)
-    P(range.index, range.index) += more * priors.range_bias_m * priors.range_bias_m;
 }
 
 TeamTrajectories TeamBelief::trajectories(const TeamInterval& interval) const {
@@ -281,8 +271,7 @@ void TeamBelief::add_drift(const TeamInterval& interval, double dt) {
     range.bias_m *= kept_bias;
     P.row(range.index) *= kept_bias;
     P.col(range.index) *= kept_bias;
-    P(range.index, range.index) +=
-        range_bias_factor * noise.range_bias_walk * noise.range_bias_walk * dt;
+    P(range.index, range.index) += noise.range_bias_walk * noise.range_bias_walk * dt;
   }
 }
 

@@ -6,7 +6,6 @@
 
 #include "estimator/core/pose.hpp"
 #include "estimator/core/team_solution.hpp"
-#include "estimator/team/belief/range_scatter.hpp"
 #include "estimator/team/belief/team_interval.hpp"
 #include "estimator/team/belief/team_state.hpp"
 
@@ -24,8 +23,6 @@ struct TeamBelief {
   Timestamp stamp{};
   std::map<RobotId, TeamRobot> robots;  ///< with this robot
   std::map<RobotPair, TeamRangeBias> ranges;
-  RangeScatter range_scatter;
-  double range_bias_factor = 1.0;  ///< the most that it was: of the variance of the pairs' biases
   Eigen::MatrixXd P;
 
   /// This robot alone, calibrated as well as the priors say.
@@ -60,8 +57,6 @@ struct TeamBelief {
   /// Of the position of `to` relative to `from`.
   [[nodiscard]] Eigen::Matrix3d position_covariance(RobotId from, RobotId to) const;
 
-  /// An innovation of a range: if ranges err more than they seemed to, so do the pairs' biases.
-  void add_range_innovation(double nis, const Priors& priors);
   /// Adds an error to the states.
   void inject(const Eigen::VectorXd& dx);
   /// After the attitude's error at this index was injected, what is left of it is about the new

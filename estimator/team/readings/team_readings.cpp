@@ -66,8 +66,7 @@ std::vector<Ranging> rangings_of(const TeamInterval& interval, const TeamBelief&
         !darkness.allows(reading))
       continue;
     rangings
-        .try_emplace({observer, neighbor}, Ranging{observer, neighbor, darkness.dark_of(reading),
-                                                   std::sqrt(belief.range_scatter.factor())})
+        .try_emplace({observer, neighbor}, Ranging{observer, neighbor, darkness.dark_of(reading)})
         .first->second.ranges.push_back(&reading);
   }
   std::vector<Ranging> all;
@@ -167,12 +166,11 @@ TeamResidual gate(const ReadingScene& scene, TeamRangeBias& bias, Ranging& rangi
   double noise = 0.0;
   double variance = 0.0;
   std::erase_if(ranging.ranges, [&](const TeamRange* z) {
-    const RangeReading reading = ranging.reading(*z);
-    const auto row = range_row(pair, bias, reading, scene.time_s(z->stamp), covariance);
+    const auto row = range_row(pair, bias, z->reading, scene.time_s(z->stamp), covariance);
     if (!row) return true;
     const double residual = row->residual.x();
     variance = row->covariance(scene.instant.covariance())(0, 0);
-    noise = reading.sigma_m * reading.sigma_m;
+    noise = z->reading.sigma_m * z->reading.sigma_m;
     const bool fits = residual * residual <= scene.interval.settings.range_gate * variance;
     if (!ranging.dark) bias.add(ranging.observer, fits, residual);
     mean.add({residual, 0.0}, fits);
@@ -184,20 +182,6 @@ TeamResidual gate(const ReadingScene& scene, TeamRangeBias& bias, Ranging& rangi
                   .neighbor = ranging.neighbor,
                   .kind = TeamResidual::Kind::kRange},
                  of_mean * Eigen::Matrix2d::Identity(), 1);
-}
-
-/// Between trusted robots, and unless all else is that uncertain that the range itself hardly
-/// counts, or the pair's ranges are refused again and again: that is a fault.
-bool tells_scatter(const TeamBelief& belief, const TeamRangeBias& bias, const Ranging& ranging,
-                   double noise_m2, const TeamResidual& found) {
-  constexpr double kLeastShare = 0.25;
-  const bool is_between_trusted = belief.robots.at(ranging.observer).is_trusted &&
-                                  belief.robots.at(ranging.neighbor).is_trusted;
-  const auto agreement = bias.agreement.find(ranging.observer);
-  const bool is_fault = agreement != bias.agreement.end() && agreement->second.is_contradiction();
-  const double sigma_m = found.sigma.front();
-  return is_between_trusted && !is_fault && !ranging.dark && found.dimension > 0 &&
-         noise_m2 >= kLeastShare * sigma_m * sigma_m;
 }
 
 }  // namespace
@@ -232,7 +216,7 @@ double Ranging::sigma_m() const {
   if (dark) return kDarkSigma;
   double variance = 0.0;
   for (const TeamRange* z : ranges) variance += z->reading.sigma_m * z->reading.sigma_m;
-  return scatter * std::sqrt(variance) / static_cast<double>(ranges.size());
+  return std::sqrt(variance) / static_cast<double>(ranges.size());
 }
 
 TeamReadings TeamReadings::of(const TeamInterval& interval, const TeamBelief& belief, Stage stage) {
@@ -259,11 +243,8 @@ void gate(const TeamInterval& interval, const TeamTrajectories& paths, const Tea
     }
   }
   for (Ranging& ranging : readings.rangings) {
-    TeamRangeBias& bias = belief.ranges.at(ordered(ranging.observer, ranging.neighbor));
-    const double noise_m2 = std::pow(ranging.sigma_m(), 2);
-    const TeamResidual& found = residuals.emplace_back(gate(scene, bias, ranging));
-    if (tells_scatter(belief, bias, ranging, noise_m2, found))
-      belief.add_range_innovation(found.nis, interval.settings.priors);
+    residuals.push_back(
+        gate(scene, belief.ranges.at(ordered(ranging.observer, ranging.neighbor)), ranging));
     if (ranging.dark && !ranging.ranges.empty())
       belief.robots.at(*ranging.dark).last_fix = interval.to;
   }

@@ -27,13 +27,8 @@ struct Ranging {
   RobotId observer{};
   RobotId neighbor{};
   std::optional<RobotId> dark{};  ///< the one of them that nobody sees
-  double scatter = 1.0;           ///< of the readings, over what they say
   std::vector<const TeamRange*> ranges{};
 
-  /// As it counts by itself.
-  [[nodiscard]] RangeReading reading(const TeamRange& z) const {
-    return {z.reading.range_m, scatter * z.reading.sigma_m};
-  }
   /// Of their mean.
   [[nodiscard]] double sigma_m() const;
 };

@@ -43,8 +43,8 @@ class MeanRange {
     count_ += 1.0;
   }
   [[nodiscard]] double t_s() const { return t_sum_s_ / count_; }
-  [[nodiscard]] RangeReading reading(double delay_m, double scatter) const {
-    return {range_sum_m_ / count_ - delay_m, scatter * std::sqrt(variance_sum_m2_ / count_)};
+  [[nodiscard]] RangeReading reading(double delay_m) const {
+    return {range_sum_m_ / count_ - delay_m, std::sqrt(variance_sum_m2_ / count_)};
   }
 
  private:
@@ -98,7 +98,7 @@ void UnseenRobots::add(const TeamInterval& interval, const TeamBelief& belief) {
     unseen_.at(id).intervals.back().ranges.push_back(
         {.beacon = beacon,
          .t_s = mean.t_s(),
-         .reading = mean.reading(robot.antenna_delay_m, std::sqrt(belief.range_scatter.factor())),
+         .reading = mean.reading(robot.antenna_delay_m),
          .p_F_beacon = motion.p_F + motion.q_F_B * member.p_body_uwb,
          .beacon_variance_m2 = belief.position_covariance(belief.self, beacon).trace()});
   }
