@@ -60,6 +60,7 @@ std::optional<TeamSolution> PeerView::step(const TeamInterval& interval, const T
     pose.last_sighting = std::max(self->second.last_sighting, self->second.last_fix);
     pose.needs_witness = needs_witness;
   }
+  if (solution.poses.empty()) return std::nullopt;
   solution.calibrations = calibrations_of(seen, interval.settings.priors);
   return solution;
 }

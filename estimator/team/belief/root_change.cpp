@@ -1,7 +1,6 @@
 #include "estimator/team/belief/root_change.hpp"
 
 #include <Eigen/SparseCore>
-#include <utility>
 #include <vector>
 
 #include "estimator/core/contract.hpp"

@@ -111,6 +111,31 @@ TEST(PeerView, GoesOnFromWhatWasKnown) {
   EXPECT_LT(std::sqrt(sum_m2 / count), 0.3);
 }
 
+// The peer whose frame it is leaves: what is known goes on in another one's.
+TEST(PeerView, GoesOnWithAnotherPeer) {
+  SimulatedTeam team(3, 7);
+  team.hovers = true;
+  PeerView view;
+  TeamFilter filter;
+  for (double t = 0.0; t < 14.0; t += kIntervalSeconds) {
+    if (t > 5.0) team.sees = [](RobotId i, RobotId j) { return i != kSelf && j != kSelf; };
+    TeamInterval interval = team.next();
+    if (t > 9.0) {
+      std::erase_if(interval.members, [](const TeamMember& m) { return m.robot == kPeer; });
+    }
+    const auto solution = view.step(interval, filter.belief());
+    (void)filter.step(interval);
+    if (t < 7.0) continue;
+    ASSERT_TRUE(solution) << t;
+    EXPECT_EQ(solution->poses.size(), t > 9.0 ? 5U : 6U) << t;
+    for (const TeamPose& pose : solution->poses) {
+      const Pose truth = team.truth(pose.neighbor);
+      EXPECT_LT(test::nees_of(pose, truth), kSixDof5Sigma) << t;
+      EXPECT_LT(test::error_of(pose, truth).head<3>().norm(), 0.5) << t;
+    }
+  }
+}
+
 // The camera of that peer is turned.
 TEST(PeerView, IsNotMisledByThePeerWhoseFrameItIs) {
   const Known all = known(7, 15.0, [](SimulatedTeam& team) {
@@ -120,7 +145,7 @@ TEST(PeerView, IsNotMisledByThePeerWhoseFrameItIs) {
         if (reading.observer == kPeer) reading.bearing.u_B = turn * reading.bearing.u_B;
     };
   });
-  EXPECT_GE(all.teams, 1);
+  EXPECT_GE(all.teams, kTeams - 2);
   EXPECT_EQ(all.beyond, 0) << "of " << all.poses;
 }
 
