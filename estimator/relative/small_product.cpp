@@ -31,29 +31,29 @@ template <bool kAdd, Index kLanes, Index kVectors, Index kColumns>
   const double* b = x.B + j;
   double* c = x.C + i + j * x.stride_C;
   Lanes sum[kColumns][kVectors];
-#pragma GCC unroll 4
+#pragma GCC unroll 6
   for (Index m = 0; m < kColumns; ++m) {
-#pragma GCC unroll 4
+#pragma GCC unroll 6
     for (Index v = 0; v < kVectors; ++v)
       std::memcpy(&sum[m][v], c + m * x.stride_C + v * kLanes, sizeof(Lanes));
   }
   for (Index k = 0; k < x.inner; ++k) {
     Lanes column[kVectors];
-#pragma GCC unroll 4
+#pragma GCC unroll 6
     for (Index v = 0; v < kVectors; ++v)
       std::memcpy(&column[v], a + k * x.stride_A + v * kLanes, sizeof(Lanes));
-#pragma GCC unroll 4
+#pragma GCC unroll 6
     for (Index m = 0; m < kColumns; ++m) {
-#pragma GCC unroll 4
+#pragma GCC unroll 6
       for (Index v = 0; v < kVectors; ++v) {
         const Lanes product = b[k * x.stride_B + m] * column[v];
         sum[m][v] = kAdd ? sum[m][v] + product : sum[m][v] - product;
       }
     }
   }
-#pragma GCC unroll 4
+#pragma GCC unroll 6
   for (Index m = 0; m < kColumns; ++m) {
-#pragma GCC unroll 4
+#pragma GCC unroll 6
     for (Index v = 0; v < kVectors; ++v)
       std::memcpy(c + m * x.stride_C + v * kLanes, &sum[m][v], sizeof(Lanes));
   }
@@ -66,6 +66,9 @@ template <bool kAdd, Index kLanes, Index kVectors, Index kColumns>
   constexpr Index kTall = kVectors * kLanes;
   const Index tall = x.rows / kTall * kTall;
   Index j = 0;
+  for (; j + 2 * kColumns <= x.columns; j += 2 * kColumns) {
+    for (Index i = 0; i < tall; i += kTall) do_tile<kAdd, kLanes, kVectors, 2 * kColumns>(x, i, j);
+  }
   for (; j + kColumns <= x.columns; j += kColumns) {
     for (Index i = 0; i < tall; i += kTall) do_tile<kAdd, kLanes, kVectors, kColumns>(x, i, j);
   }

@@ -3,15 +3,12 @@
 #include <iterator>
 #include <vector>
 
-#include "estimator/core/so3.hpp"
 #include "estimator/team/belief/motion_image.hpp"
 
 namespace crepes {
 namespace {
 
 constexpr int kMotionStates = FreeMotionAt::kMotion;  // [p, v, theta]
-using MotionMatrix = Eigen::Matrix<double, kMotionStates, kMotionStates>;
-using MotionVector = Eigen::Matrix<double, kMotionStates, 1>;
 
 /// How a robot's errors at the next keyframe follow from those at the last one.
 struct Moved {
@@ -21,38 +18,18 @@ struct Moved {
   MotionMatrix noise{};
 };
 
-/// With S this robot at the end of the interval, the new frame's motions are
-///   p' = R_S^T (p - p_S + tau v_S),  v' = R_S^T (v - v_S),  R' = R_S^T R,
-/// because the robot is there tau before the new frame begins, and their errors
-///   dp' = R_S^T (dp - dp_S + tau dv_S + v_S dtau) + [p']x dtheta_S,
-///   dv' = R_S^T (dv - dv_S) + [v']x dtheta_S,  dtheta' = dtheta - R'^T dtheta_S.
-/// `robot` receives the new motion.
+/// The new root is this robot at the end of the interval. `robot` receives the new motion.
 Moved moved(const FreeMotionAt& end, const FreeMotionAt& self, int self_bias, TeamRobot& robot) {
-  const Eigen::Matrix3d R_S_F = self.motion.R().transpose();
-  FreeMotion& next = robot.motion;
-  next.p_F = R_S_F * (end.motion.p_F - self.motion.p_F + robot.clock_s * self.motion.v_F);
-  next.v_F = R_S_F * (end.motion.v_F - self.motion.v_F);
-  next.q_F_B = (self.motion.q_F_B.conjugate() * end.motion.q_F_B).normalized();
-  Moved moved{.index = robot.motion_index};
-  moved.by_self.setZero();
-  moved.by_self.block<3, 3>(0, 0) = -R_S_F;
-  moved.by_self.block<3, 3>(0, 3) = robot.clock_s * R_S_F;
-  moved.by_self.block<3, 3>(3, 3) = -R_S_F;
-  moved.by_self.block<3, 3>(0, 6) = hat(next.p_F);
-  moved.by_self.block<3, 3>(3, 6) = hat(next.v_F);
-  moved.by_self.block<3, 3>(6, 6) = -next.R().transpose();
-  MotionMatrix turn = MotionMatrix::Identity();
-  turn.block<3, 3>(0, 0) = R_S_F;
-  turn.block<3, 3>(3, 3) = R_S_F;
-  MotionVector by_clock = MotionVector::Zero();
-  by_clock.head<3>() = R_S_F * self.motion.v_F;
-  moved.image.parts = {
-      {robot.motion_index, turn.lazyProduct(end.by_start.leftCols<kMotionStates>())},
-      {robot.bias_index, turn.lazyProduct(end.by_start.rightCols<FreeMotionAt::kBias>())},
-      {self_bias, moved.by_self.lazyProduct(self.by_start.rightCols<FreeMotionAt::kBias>())},
-      {robot.clock_index(), by_clock}};
-  const MotionMatrix turned = turn.lazyProduct(end.noise);
-  moved.noise = turned.lazyProduct(turn.transpose());
+  const RootedMotion next = rooted(end.motion, self.motion, robot.clock_s);
+  const MotionMatrix by_start = by_earlier(robot.motion, end.motion, end.t_s);
+  robot.motion = next.motion;
+  Moved moved{.index = robot.motion_index, .by_self = next.by_root};
+  moved.image.parts = {{robot.motion_index, next.by_motion.lazyProduct(by_start)},
+                       {robot.bias_index, next.by_motion.lazyProduct(end.by_bias)},
+                       {self_bias, next.by_root.lazyProduct(self.by_bias)},
+                       {robot.clock_index(), next.by_ahead}};
+  const MotionMatrix turned = next.by_motion.lazyProduct(end.noise);
+  moved.noise = turned.lazyProduct(next.by_motion.transpose());
   return moved;
 }
 

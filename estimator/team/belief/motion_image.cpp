@@ -18,13 +18,16 @@ void set_covariance_with(const std::vector<MotionImage>& images, const Eigen::Ma
 void set_covariance_of(const std::vector<MotionImage>& images, const ConstMatrixRef& with,
                        MatrixRef own) {
   constexpr int kMotion = FreeMotionAt::kMotion;
+  Eigen::MatrixXd of_states;  // with a column for each state of a part, for `add_product`
   for (Eigen::Index first = 0; const MotionImage& image : images) {
     const Eigen::Index end = first + kMotion;
-    auto rows = own.block(first, 0, kMotion, end);
-    rows.setZero();
-    for (const MotionImage::Part& part : image.parts)
-      rows += part.by.lazyProduct(with.block(part.from, 0, part.by.cols(), end));
-    own.block(0, first, first, kMotion) = rows.leftCols(first).transpose();
+    auto columns = own.block(0, first, end, kMotion);
+    columns.setZero();
+    for (const MotionImage::Part& part : image.parts) {
+      of_states = with.block(part.from, 0, part.by.cols(), end).transpose();
+      add_product(of_states, part.by, columns);
+    }
+    own.block(first, 0, kMotion, first) = columns.topRows(first).transpose();
     auto square = own.block<kMotion, kMotion>(first, first);
     square = (0.5 * (square + square.transpose())).eval();
     first = end;

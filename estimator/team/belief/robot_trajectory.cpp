@@ -37,7 +37,7 @@ RobotTrajectory::RobotTrajectory(const FreeMotion& start, ImuBias bias,
     : imu_(&imu), bias_(std::move(bias)), noise_(noise) {
   FreeMotionAt first;
   first.motion = start;
-  first.by_start.setIdentity();
+  first.by_bias.setZero();
   first.noise.setZero();
   grid_.reserve(imu.size() + 1);
   grid_.push_back(first);
@@ -114,12 +114,12 @@ FreeMotionAt RobotTrajectory::advanced(const FreeMotionAt& from, const Step& ste
       dt * a_by_w, dt * R * H,                                //
       dt * so3_right_jacobian(dt * w), Eigen::Matrix3d::Zero();
 
-  to.by_start = carried(from.by_start);
-  to.by_start.middleCols<6>(9) -= by_rates;
+  to.by_bias = carried(from.by_bias);
+  to.by_bias.leftCols<6>() -= by_rates;
   for (int axis = 0; axis < 3; ++axis)
-    to.by_start.middleCols<3>(15 + 3 * axis) -= w(axis) * by_rates.leftCols<3>();
+    to.by_bias.middleCols<3>(6 + 3 * axis) -= w(axis) * by_rates.leftCols<3>();
   const Eigen::Matrix<double, 6, 1> variance = rate_variance(mean, mean, noise_, dt).head<6>();
-  const Eigen::Matrix<double, 9, 9> half_carried = carried(from.noise).transpose();
+  const MotionMatrix half_carried = carried(from.noise).transpose();
   const Eigen::Matrix<double, 9, 6> scaled = by_rates * variance.asDiagonal();
   to.noise = carried(half_carried);
   to.noise += scaled.lazyProduct(by_rates.transpose());

@@ -6,31 +6,21 @@
 #include "estimator/core/imu_history.hpp"
 #include "estimator/relative/error_state.hpp"
 #include "estimator/relative/propagation.hpp"
+#include "estimator/team/belief/free_motion.hpp"
 
 namespace crepes {
 
-/// Position, velocity and attitude of a body in an inertial frame F that falls freely: there the
-/// acceleration is the specific force, and gravity has no part in it.
-struct FreeMotion {
-  Eigen::Vector3d p_F = Eigen::Vector3d::Zero();
-  Eigen::Vector3d v_F = Eigen::Vector3d::Zero();
-  Eigen::Quaterniond q_F_B = Eigen::Quaterniond::Identity();
-
-  [[nodiscard]] Eigen::Matrix3d R() const { return q_F_B.toRotationMatrix(); }
-};
-
-/// A motion with its derivative by where it began. Errors are [p, v, theta] in F, theta a right
-/// perturbation.
+/// A motion with its derivative by the errors of the IMU that brought the body there. How it
+/// depends on where the body began, `by_earlier` says.
 struct FreeMotionAt {
-  static constexpr int kMotion = 9;
+  static constexpr int kMotion = FreeMotion::kErrors;
   /// Gyro bias, accel bias, and by columns the gyroscope's scale and axis errors.
   static constexpr int kBias = 15;
-  static constexpr int kStart = kMotion + kBias;  ///< [p, v, theta] at the beginning, bias
 
   double t_s = 0.0;  ///< after the beginning
   FreeMotion motion;
-  Eigen::Matrix<double, kMotion, kStart> by_start;
-  Eigen::Matrix<double, kMotion, kMotion> noise;  ///< covariance that the IMU's noise has added
+  Eigen::Matrix<double, kMotion, kBias> by_bias;
+  MotionMatrix noise;  ///< covariance that the IMU's noise has added
 };
 
 /// Steps of `TeamInterval::kStep`, the last one shorter.

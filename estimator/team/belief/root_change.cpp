@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "estimator/core/contract.hpp"
-#include "estimator/core/so3.hpp"
 
 namespace crepes {
 namespace {
@@ -36,14 +35,9 @@ class ErrorMap {
 
 }  // namespace
 
-/// With R the new root, which moves with v_R and whose clock is ahead by c_R, and c that of another
-/// robot, both ahead of the old root,
-///   p' = R_R^T (p - p_R + (c - c_R) v_R),  v' = R_R^T (v - v_R),  R' = R_R^T R,  c' = c - c_R,
-/// because a robot's motion is that at the keyframe of its own clock. As in `change_frame`,
-///   dp' = R_R^T (dp - dp_R + (c - c_R) dv_R + v_R (dc - dc_R)) + [p']x dtheta_R,
-///   dv' = R_R^T (dv - dv_R) + [v']x dtheta_R,  dtheta' = dtheta - R'^T dtheta_R.
-/// The old root has p = v = 0, R = I and c = 0, all without an error. It receives the states that
-/// the new root's motion had.
+/// A robot's motion is that at the keyframe of its own clock, and c' = c - c_R are the clocks ahead
+/// of the new root's. The old root has p = v = 0, R = I and c = 0, all without an error. It
+/// receives the states that the new root's motion had.
 TeamBelief seen_from(RobotId id, const TeamBelief& belief) {
   const TeamRobot root = belief.robots.at(id);
   const int from = root.motion_index;
@@ -55,38 +49,25 @@ TeamBelief seen_from(RobotId id, const TeamBelief& belief) {
   const auto mark = [&](int index, int count) {
     for (int i = index; i < index + count; ++i) changes[static_cast<std::size_t>(i)] = true;
   };
-  const Eigen::Matrix3d R_R_F = root.motion.R().transpose();
-  const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
   const Eigen::Matrix<double, 1, 1> one(1.0);
   for (auto& [other, robot] : seen.robots) {
     mark(robot.clock_index(), 1);
     if (other == id) continue;  // its clock is what others err from
     const bool is_old_root = other == belief.self;
-    const TeamRobot before = robot;
-    const double ahead_s = before.clock_s - root.clock_s;
-    if (is_old_root) robot.motion_index = from;
-    robot.clock_s = ahead_s;
-    robot.motion.p_F = R_R_F * (before.motion.p_F - root.motion.p_F + ahead_s * root.motion.v_F);
-    robot.motion.v_F = R_R_F * (before.motion.v_F - root.motion.v_F);
-    robot.motion.q_F_B = (root.motion.q_F_B.conjugate() * before.motion.q_F_B).normalized();
-
-    const int to = robot.motion_index;
-    const Eigen::Vector3d by_clock = R_R_F * root.motion.v_F;
+    const int before = robot.motion_index;
+    const int to = is_old_root ? from : before;
+    robot.motion_index = to;
+    robot.clock_s -= root.clock_s;
+    const RootedMotion next = rooted(robot.motion, root.motion, robot.clock_s);
+    robot.motion = next.motion;
     mark(to, FreeMotionAt::kMotion);
-    map.add(to, from, -R_R_F);
-    map.add(to, from + 3, ahead_s * R_R_F);
-    map.add(to, from + 6, hat(robot.motion.p_F));
-    map.add(to, root.clock_index(), -by_clock);
-    map.add(to + 3, from + 3, -R_R_F);
-    map.add(to + 3, from + 6, hat(robot.motion.v_F));
-    map.add(to + 6, from + 6, -robot.motion.R().transpose());
+    map.add(to, from, next.by_root);
+    map.add(to, root.clock_index(), -next.by_ahead);
     map.add(robot.clock_index(), root.clock_index(), -one);
     if (is_old_root) continue;
-    map.add(to, before.motion_index, R_R_F);
-    map.add(to, before.clock_index(), by_clock);
-    map.add(to + 3, before.motion_index + 3, R_R_F);
-    map.add(to + 6, before.motion_index + 6, identity);
-    map.add(robot.clock_index(), before.clock_index(), one);
+    map.add(to, before, next.by_motion);
+    map.add(to, robot.clock_index(), next.by_ahead);
+    map.add(robot.clock_index(), robot.clock_index(), one);
   }
   for (int i = 0; i < belief.P.rows(); ++i)
     if (!changes[static_cast<std::size_t>(i)]) map.add(i, i, one);

@@ -150,11 +150,14 @@ void TeamBelief::remove(RobotId id) {
 
 void TeamBelief::append_range_biases(const TeamInterval& interval) {
   const double sigma = std::sqrt(1.0 - kShareOfModules) * interval.settings.priors.range_bias_m;
+  const auto states = static_cast<int>(P.rows());
+  int count = 0;
   for (const TeamRange& reading : interval.ranges) {
     if (!robots.contains(reading.observer) || !robots.contains(reading.neighbor)) continue;
     const RobotPair pair = ordered(reading.observer, reading.neighbor);
-    if (!ranges.contains(pair)) ranges[pair] = {.index = append(1, sigma)};
+    if (ranges.try_emplace(pair, TeamRangeBias{.index = states + count}).second) ++count;
   }
+  if (count > 0) append(count, sigma);
 }
 
 TeamTrajectories TeamBelief::trajectories(const TeamInterval& interval) const {

@@ -8,8 +8,8 @@ namespace {
 MotionImage image_at(const TeamRobot& robot, const FreeMotionAt& at) {
   MotionImage image;
   if (robot.motion_index >= 0)
-    image.parts.push_back({robot.motion_index, at.by_start.leftCols<FreeMotionAt::kMotion>()});
-  image.parts.push_back({robot.bias_index, at.by_start.rightCols<FreeMotionAt::kBias>()});
+    image.parts.push_back({robot.motion_index, by_earlier(robot.motion, at.motion, at.t_s)});
+  image.parts.push_back({robot.bias_index, at.by_bias});
   return image;
 }
 

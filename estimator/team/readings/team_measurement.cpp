@@ -20,10 +20,9 @@ void add_columns(int index, const Eigen::MatrixBase<Derived>& by_state, TeamRow&
   }
 }
 
-/// Adds the derivatives by a robot's motion at the instant, from which its IMU carries it on:
-///   p = p0 + t v0 - [p - p0 - t v0]x R0 theta0,  theta = R^T R0 theta0,
-/// and what its IMU's noise has added since the beginning, in the mean of the axes. What its biases
-/// add from the instant on is of second order in the time.
+/// Adds the derivatives by a robot's motion at the instant, from which its IMU carries it on as
+/// `by_earlier` says, and what its IMU's noise has added since the beginning, in the mean of the
+/// axes. What its biases add from the instant on is of second order in the time.
 void add_motion(const Eigen::Matrix<double, 2, 3>& by_p,
                 const Eigen::Matrix<double, 2, 3>& by_theta, const RobotTrajectory& path,
                 const FreeMotionAt& at, const TeamRobot& robot, const InstantStates& states,

@@ -10,18 +10,17 @@ namespace crepes {
 /// Of an IMU: its biases, and its gyroscope's scale errors.
 using ImuErrors = Eigen::Matrix<double, FreeMotionAt::kBias, 1>;
 
-/// A motion with its derivative by the motion at the first beginning and by the IMU's errors.
+/// A motion with its derivative by the IMU's errors.
 struct CarriedMotion {
   static constexpr int kMotion = FreeMotionAt::kMotion;
-  static constexpr int kStart = FreeMotionAt::kStart;
   static constexpr int kErrors = FreeMotionAt::kBias;
-  using Covariance = Eigen::Matrix<double, kMotion, kMotion>;
+  static constexpr int kStart = kMotion + kErrors;  ///< the first motion, and the IMU's errors
 
   double t_s = 0.0;
   FreeMotion motion{};
-  Eigen::Matrix<double, kMotion, kStart> by_start =
-      Eigen::Matrix<double, kMotion, kStart>::Identity();
-  Covariance noise = Covariance::Zero();  ///< that the IMU has added
+  Eigen::Matrix<double, kMotion, kErrors> by_errors =
+      Eigen::Matrix<double, kMotion, kErrors>::Zero();
+  MotionMatrix noise = MotionMatrix::Zero();  ///< that the IMU has added
 
   /// At a point of a trajectory that begins here.
   [[nodiscard]] CarriedMotion followed_by(const FreeMotionAt& piece) const;

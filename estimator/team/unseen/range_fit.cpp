@@ -77,8 +77,9 @@ TeamPlace RangeFit::place() const {
   TeamPlace::Covariance turn = TeamPlace::Covariance::Identity();
   turn.block<3, 3>(0, 0) = q_B_F.toRotationMatrix();
   turn.block<3, 3>(3, 3) = q_B_F.toRotationMatrix();
-  const Eigen::Matrix<double, CarriedMotion::kMotion, CarriedMotion::kStart> by_start =
-      turn.lazyProduct(end_.by_start);
+  Eigen::Matrix<double, CarriedMotion::kMotion, CarriedMotion::kStart> by_start;
+  by_start << turn.lazyProduct(by_earlier(start_, there, end_.t_s)),
+      turn.lazyProduct(end_.by_errors);
   const Eigen::Matrix<double, CarriedMotion::kMotion, CarriedMotion::kStart> carried =
       by_start * all.topLeftCorner<CarriedMotion::kStart, CarriedMotion::kStart>();
   const TeamPlace::Covariance noise = turn.lazyProduct(end_.noise + problem_->self_end.noise);

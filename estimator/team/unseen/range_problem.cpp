@@ -44,8 +44,8 @@ FittedRange::FittedRange(const RangeReading& range, Eigen::Vector3d beacon, int 
       t_s(path.t_s),
       p(path.motion.p_F),
       q(path.motion.q_F_B),
-      p_by_errors(path.by_start.topRightCorner<3, CarriedMotion::kErrors>()),
-      theta_by_errors(path.by_start.bottomRightCorner<3, CarriedMotion::kErrors>()),
+      p_by_errors(path.by_errors.topRows<3>()),
+      theta_by_errors(path.by_errors.bottomRows<3>()),
       p_noise(path.noise.topLeftCorner<3, 3>()) {}
 
 RangeProblem::RangeProblem(const std::deque<UnseenInterval>& intervals,
