@@ -33,6 +33,11 @@ struct Measurement {
       reading;
 };
 
+/// Whether a module measured it, either robot's.
+[[nodiscard]] constexpr bool is_range(MeasurementKind kind) {
+  return kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange;
+}
+
 /// What the sensor read; empty for poses.
 [[nodiscard]] SensorReading reading_of(const Measurement& measurement);
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <type_traits>
 #include <utility>
 
@@ -17,11 +18,16 @@ constexpr double kMaxAttitudeSigma = radians(20.0);  // rad
 // Another camera of the same robot is used after the current one was silent for so long.
 constexpr Duration kHandover = std::chrono::milliseconds{100};
 
-constexpr int kMinGated = 10;         // in a row; fewer may be chance
-constexpr int kMinContradicting = 3;  // in a row, after the last one that fit
+constexpr int kMinGated = 10;                   // in a row; fewer may be chance
+constexpr int kMinGatedRanges = 2 * kMinGated;  // by two modules
+constexpr int kMinContradicting = 3;            // in a row, after the last one that fit
 // Without so long a gap, false bearings among true ones are gated in a row, too.
 constexpr Duration kGlimpseGap = std::chrono::milliseconds{100};
-constexpr double kDistanceSigma = 1.0;  // m; after a reset
+constexpr double kDistanceSigma = 1.0;  // m; after a reset, at least
+// Where ranges are rare, a few decide. What makes one false, as a reflection, lasts less long.
+constexpr int kMinRareRanges = 3;
+constexpr Duration kRareRangesTime = std::chrono::milliseconds{3500};
+constexpr Duration kDoubtfulTime = std::chrono::seconds{1};  // without a range that fits
 
 double largest_sigma(const Eigen::Matrix3d& covariance) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
@@ -106,25 +112,35 @@ void NeighborTrack::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuH
 Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& mounting,
                            const Gates& gates) {
   auto* tight = std::get_if<NeighborFilter>(&filter_);
-  // While the robots could not see each other, reflected ranges may have corrupted the distance.
-  // Bearings cannot correct it: they do not depend on the distance.
-  if (tight != nullptr && is_range_diverged(measurement.kind))
-    tight->reset_distance(kDistanceSigma, priors_);
+  // While the robots could not see each other, reflected ranges may have corrupted the distance; or
+  // ranges are rare, and the IMUs misled it. Bearings do not depend on the distance.
+  if (tight != nullptr && is_range(measurement.kind) && is_range_diverged()) {
+    // Where ranges are many, they reset it again until one is accepted.
+    const GatedRun& gated = gated_run(measurement.kind);
+    const double off_m = gated.count < kMinGatedRanges ? std::abs(gated.residual) : 0.0;
+    tight->reset_distance(std::max(kDistanceSigma, off_m), priors_);
+  }
   const bool is_bearing = std::holds_alternative<DirectionReading>(measurement.reading);
   const Fusion fusion = tight == nullptr
                             ? fuse_paper(std::get<PaperFilter>(filter_), measurement, gates)
                         : is_bearing ? fuse_bearing(*tight, measurement, mounting, gates)
                                      : fuse_tight(*tight, measurement, mounting, gates);
-  const auto kind = static_cast<std::size_t>(measurement.kind);
-  if (fusion.verdict == Verdict::kFused) {
-    last_[kind] = measurement.stamp;
-    gated_[kind] = {};
-  } else if (fusion.verdict == Verdict::kGated) {
-    GatedRun& gated = gated_[kind];
-    if (gated.count++ == 0) gated.since = measurement.stamp;
-    gated.latest = measurement.stamp;
-  }
+  if (fusion.verdict == Verdict::kFused)
+    last_[static_cast<std::size_t>(measurement.kind)] = measurement.stamp;
+  gated_run(measurement.kind).add(measurement.stamp, fusion);
   return fusion;
+}
+
+NeighborTrack::GatedRun& NeighborTrack::gated_run(MeasurementKind kind) {
+  return gated_[static_cast<std::size_t>(is_range(kind) ? MeasurementKind::kRange : kind)];
+}
+
+void NeighborTrack::GatedRun::add(Timestamp stamp, const Fusion& fusion) {
+  if (fusion.verdict == Verdict::kFused) *this = {};
+  if (fusion.verdict != Verdict::kGated) return;
+  if (count++ == 0) since = stamp;
+  latest = stamp;
+  residual = fusion.residual[0];
 }
 
 Fusion NeighborTrack::fuse_bearing(NeighborFilter& filter, const Measurement& bearing,
@@ -219,27 +235,25 @@ Timestamp NeighborTrack::last_sighting() const {
                    last(MeasurementKind::kRawPose)});
 }
 
-bool NeighborTrack::is_range_diverged(MeasurementKind kind) const {
-  if (kind != MeasurementKind::kRange && kind != MeasurementKind::kPeerRange) return false;
-  const GatedRun& gated = gated_[static_cast<std::size_t>(kind)];
+bool NeighborTrack::is_range_diverged() const {
+  const GatedRun& gated = gated_[static_cast<std::size_t>(MeasurementKind::kRange)];
   const auto fits = [this](MeasurementKind other) {
     return last(other) > stamp() - kDivergenceTime;
   };
-  return gated.count >= kMinGated && gated.latest - gated.since >= 2 * kDivergenceTime &&
-         fits(MeasurementKind::kBearing) && fits(MeasurementKind::kPeerBearing) &&
-         !fits(MeasurementKind::kRange) && !fits(MeasurementKind::kPeerRange);
+  return ((gated.count >= kMinGatedRanges && gated.length() >= 2 * kDivergenceTime) ||
+          (gated.count >= kMinRareRanges && gated.length() >= kRareRangesTime)) &&
+         fits(MeasurementKind::kBearing) && fits(MeasurementKind::kPeerBearing);
 }
 
 bool NeighborTrack::is_contradicted() const {
-  const auto is_gated_since = [this](MeasurementKind kind, Timestamp used) {
-    const GatedRun& gated = gated_[static_cast<std::size_t>(kind)];
-    return gated.count >= kMinContradicting && gated.since > used;
-  };
-  using Kind = MeasurementKind;
   const Timestamp sighted = last_sighting() + kGlimpseGap;
-  const Timestamp ranged = std::max(last(Kind::kRange), last(Kind::kPeerRange));
-  return is_gated_since(Kind::kBearing, sighted) || is_gated_since(Kind::kPeerBearing, sighted) ||
-         is_gated_since(Kind::kRange, ranged) || is_gated_since(Kind::kPeerRange, ranged);
+  const auto is_contrary = [&](MeasurementKind kind) {
+    const GatedRun& gated = gated_[static_cast<std::size_t>(kind)];
+    return gated.count >= kMinContradicting && gated.since > sighted;
+  };
+  const GatedRun& ranges = gated_[static_cast<std::size_t>(MeasurementKind::kRange)];
+  return is_contrary(MeasurementKind::kBearing) || is_contrary(MeasurementKind::kPeerBearing) ||
+         ranges.count >= kMinContradicting || ranges.length() >= kDoubtfulTime;
 }
 
 bool NeighborTrack::is_diverged() const {

@@ -76,15 +76,21 @@ class NeighborTrack {
   /// other cameras are skipped until that camera has been silent for a while.
   Fusion fuse_bearing(NeighborFilter& filter, const Measurement& bearing,
                       const PairMounting& mounting, const Gates& gates);
-  /// Bearings of both directions fit, but all ranges of the last half second were gated.
-  [[nodiscard]] bool is_range_diverged(MeasurementKind kind) const;
+  /// Bearings of both directions fit, but all ranges of the last half second were gated, or of the
+  /// last seconds where ranges are rare.
+  [[nodiscard]] bool is_range_diverged() const;
 
-  /// Successive gated readings of one kind.
+  /// Successive gated readings of one kind. Ranges that either robot measured are of one kind.
   struct GatedRun {
     Timestamp since = kNever;
     Timestamp latest = kNever;
     int count = 0;
+    double residual = 0.0;  ///< first component of the latest
+
+    [[nodiscard]] Duration length() const { return count > 0 ? latest - since : Duration{0}; }
+    void add(Timestamp stamp, const Fusion& fusion);
   };
+  [[nodiscard]] GatedRun& gated_run(MeasurementKind kind);
 
   std::variant<NeighborFilter, PaperFilter> filter_;
   Priors priors_;
@@ -93,7 +99,7 @@ class NeighborTrack {
     never.fill(kNever);
     return never;
   }();
-  std::array<GatedRun, kMeasurementKindCount> gated_{};
+  std::array<GatedRun, kMeasurementKindCount> gated_{};  ///< ranges are under kRange
   /// Positions of the cameras in use.
   std::optional<Eigen::Vector3d> p_B_C_;
   std::optional<Eigen::Vector3d> p_N_C_;

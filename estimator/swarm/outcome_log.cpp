@@ -1,15 +1,13 @@
 #include "estimator/swarm/outcome_log.hpp"
 
+#include "estimator/swarm/measurement.hpp"
+
 namespace crepes {
 namespace {
 
 /// Moves a mean over about the last `memory` values.
 void follow(std::optional<double>& mean, double value, double memory) {
   mean = mean.value_or(value) + (value - mean.value_or(value)) / memory;
-}
-
-bool is_range(MeasurementKind kind) {
-  return kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange;
 }
 
 }  // namespace

@@ -10,7 +10,9 @@ namespace {
 
 constexpr Duration kMaxAge = std::chrono::milliseconds{20};  // of a published state
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
-constexpr Duration kTeamLife = std::chrono::milliseconds{800};  // the longest lag, and a solution
+constexpr Duration kUnranged = std::chrono::seconds{1};  // so long a distance stays certain
+constexpr Duration kRareRanges = std::chrono::milliseconds{200};  // more are refused, not rare
+constexpr Duration kTeamLife = std::chrono::milliseconds{800};    // the longest lag, and a solution
 
 }  // namespace
 
@@ -67,6 +69,7 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
                   .graph = is_recent(graph)};
   pose_ = pose;
   speed_sigma_ = track.speed_sigma();
+  is_by_imus_ = stamp - range > kUnranged && stamp - intake.newest_range() > kRareRanges;
 }
 
 void PosePublisher::add_graph_correction(Timestamp stamp, const GraphPose& pose) {
@@ -135,7 +138,8 @@ std::optional<NeighborPose> PosePublisher::published() const {
   const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
   if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return team_pose_;
   if (needs_witness) return graph_corrected_pose();
-  // One of the two is wrong, and nothing shows which.
+  // One of the two is wrong, and what shows which is how the pair knows its distance.
+  if (is_by_imus_) return team_pose_;
   NeighborPose doubtful = *pose_;
   doubtful.T_B_N.covariance += d * d.transpose();
   return is_certain(doubtful.T_B_N.covariance) ? std::optional(doubtful) : std::nullopt;

@@ -75,6 +75,7 @@ class PosePublisher {
   Timestamp started_ = kNever;  ///< the latest of these
   std::optional<NeighborPose> pose_;
   double speed_sigma_ = 0.0;  ///< of `pose_` [m/s]
+  bool is_by_imus_ = false;   ///< the distance in `pose_`
   std::optional<Correction> correction_;
   ProcessNoise noise_;
   double pose_gate_ = 0.0;

@@ -15,6 +15,8 @@ class RangeScreen {
  public:
   /// Ranges come in the order of their stamps, more or less.
   [[nodiscard]] bool accepts(const UwbRange& range, const FilterSettings& settings);
+  /// Of all that came, refused ones, too.
+  [[nodiscard]] std::optional<Timestamp> latest() const { return latest_; }
 
  private:
   double late_share_ = 0.0;  ///< of the latest ranges, those with a weak first path

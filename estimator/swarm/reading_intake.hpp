@@ -42,6 +42,8 @@ class ReadingIntake {
   void enqueue(Measurement measurement);
 
   [[nodiscard]] const LastContact& last_contact() const { return last_; }
+  /// When the latest range came, if it was refused, too.
+  [[nodiscard]] Timestamp newest_range() const { return screen_.latest().value_or(kNever); }
   [[nodiscard]] ReorderBuffer& buffer() { return buffer_; }
   [[nodiscard]] const ReorderBuffer& buffer() const { return buffer_; }
   [[nodiscard]] OutcomeLog& outcomes() { return outcomes_; }

@@ -52,6 +52,7 @@ inline constexpr std::array kScenarios{
     Scenario{
         .name = "blackout", .world = SimScenario::kFour, .dark = {.from_s = 15.0, .to_s = 30.0}},
     Scenario{.name = "thin-ranges", .world = SimScenario::kFour, .ranges = RangeModel::kLinkTrack},
+    Scenario{.name = "thin-pair", .world = SimScenario::kTwo, .ranges = RangeModel::kLinkTrack},
     Scenario{.name = "workshop",
              .world = SimScenario::kFour,
              .network = {.latency_ms = 5.0, .jitter_ms = 60.0, .loss = 0.33, .seed = 0},

@@ -50,6 +50,10 @@ inline Measurement range(Timestamp t, double range_m = kDistance) {
   return {t, MeasurementKind::kRange, RangeReading{range_m, 0.05}};
 }
 
+inline Measurement peer_range(Timestamp t, double range_m = kDistance) {
+  return {t, MeasurementKind::kPeerRange, RangeReading{range_m, 0.05}};
+}
+
 /// A mutual sighting of a robot at `azimuth_rad` that sees the observer behind itself: the robot,
 /// or its image in a mirror.
 inline MutualInitialization sighting(double azimuth_rad = 0.0) {

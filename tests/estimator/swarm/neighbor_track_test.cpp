@@ -84,6 +84,53 @@ TEST_F(RestingTrack, IsContradictedByRangesInARowUntilOneFits) {
   EXPECT_FALSE(track_.is_contradicted());
 }
 
+/// A track that six seconds of ranges have made certain of its speed, too.
+class RangedTrack : public RestingTrack {
+ protected:
+  static constexpr int kRangedMs = 6000;
+
+  RangedTrack() {
+    imu_ = {};
+    for (int ms = 0; ms < kRangedMs; ms += 10) {
+      add_sightings(ms);
+      EXPECT_EQ(fuse_at(ms, range({})).verdict, Verdict::kFused);
+    }
+  }
+  /// Both robots see each other, and rest.
+  void add_sightings(int ms) {
+    imu_.push({at_ms(ms), Eigen::Vector3d::Zero(), {0.0, 0.0, kGravityMps2}});
+    fuse_at(ms, bearing({}));
+    fuse_at(ms, peer_bearing({}));
+  }
+};
+
+// Two modules take turns, two seconds apart.
+TEST_F(RangedTrack, AcceptsAnotherDistanceAfterAFewRareRanges) {
+  for (int ms = kRangedMs; ms <= kRangedMs + 6000; ms += 10) {
+    add_sightings(ms);
+    const int number = (ms - kRangedMs) / 2000;
+    if (ms != kRangedMs + 2000 * number) continue;
+    const Measurement z = number % 2 == 0 ? range({}, 7.0) : peer_range({}, 7.0);
+    ASSERT_EQ(fuse_at(ms, z).verdict, number < 3 ? Verdict::kGated : Verdict::kFused) << number;
+    EXPECT_EQ(track_.is_contradicted(), number == 1 || number == 2) << number;
+  }
+
+  const double off = 7.0 - track_.pose().pose.p.x();  // after one range, which may yet be false
+  EXPECT_LT(off, 1.5);
+  EXPECT_LT(off, 2.0 * std::sqrt(track_.pose().covariance(0, 0)));
+}
+
+TEST_F(RangedTrack, IsContradictedByAllRangesOfASecondUntilOneFits) {
+  for (int ms = kRangedMs; ms <= kRangedMs + 1010; ms += 10) {
+    add_sightings(ms);
+    if (ms == kRangedMs || ms == kRangedMs + 1000)
+      ASSERT_EQ(fuse_at(ms, range({}, 7.0)).verdict, Verdict::kGated);
+    EXPECT_EQ(track_.is_contradicted(), ms >= kRangedMs + 1000) << ms;
+  }
+  ASSERT_EQ(fuse_at(kRangedMs + 1010, peer_range({})).verdict, Verdict::kFused);
+  EXPECT_FALSE(track_.is_contradicted());
+}
+
 TEST_F(RestingTrack, SkipsAnotherCameraUntilTheFirstIsSilent) {
   const Eigen::Vector3d other(0.0, 0.0, 0.05);
   const Measurement by_other = bearing({}, 0.0, other);

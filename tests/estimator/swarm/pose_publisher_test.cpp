@@ -95,10 +95,16 @@ TEST_F(TeamPublisher, PublishesNothingWithoutASolution) { EXPECT_FALSE(at(1000))
 /// With a filter of its own that knows the same place, or another one.
 class TeamAndFilter : public TeamPublisher {
  protected:
-  [[nodiscard]] std::optional<NeighborPose> with_filter_at(const Pose& place) {
+  /// The latest range came at `ranged_ms`, if ever; the filter has used none.
+  [[nodiscard]] std::optional<NeighborPose> with_filter_at(const Pose& place,
+                                                           std::optional<int> ranged_ms = {}) {
     HypothesisSet hypotheses(settings(), kMounting);
     EXPECT_TRUE(hypotheses.initialize(at_ms(980), GraphPose{kNeighbor, {place, covariance()}}));
     ReadingIntake intake(kNeighbor, settings());
+    if (ranged_ms) {
+      UwbRange refused{.stamp = at_ms(*ranged_ms), .neighbor = kNeighbor, .range_m = -1.0};
+      EXPECT_FALSE(intake.add_range(refused, MeasurementKind::kRange));
+    }
     publisher_.clear();
     publisher_.update(at_ms(1000), self_, neighbor_, hypotheses, intake);
     if (!publisher_.pose()) return std::nullopt;
@@ -120,6 +126,22 @@ TEST_F(TeamAndFilter, AFilterThatAgreesIsAWitness) {
   const auto pose = with_filter_at({{kDistance + 0.1, 0.0, 0.0}, Eigen::Quaterniond::Identity()});
   ASSERT_TRUE(pose);
   EXPECT_LT((pose->T_B_N.pose.p - kTruth.p).norm(), 1e-6);
+}
+
+// Without ranges a filter's distance is by the IMUs alone. While many are refused, either of the
+// two may be wrong.
+TEST_F(TeamAndFilter, OneThatContradictsTheTeamLosesIfRangesAreRare) {
+  add(900, 900);
+  const Pose elsewhere{{kDistance + 0.8, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
+  for (const std::optional<int> ranged_ms : {std::optional<int>{}, std::optional(700)}) {
+    const auto pose = with_filter_at(elsewhere, ranged_ms);
+    ASSERT_TRUE(pose);
+    EXPECT_LT((pose->T_B_N.pose.p - kTruth.p).norm(), 1e-6);
+  }
+  const auto doubtful = with_filter_at(elsewhere, 900);
+  ASSERT_TRUE(doubtful);
+  EXPECT_LT((doubtful->T_B_N.pose.p - elsewhere.p).norm(), 1e-6);
+  EXPECT_GT(std::sqrt(doubtful->T_B_N.covariance(0, 0)), 0.8);
 }
 
 // A team pose without a witness does not make a filter doubtful either.

@@ -35,6 +35,8 @@ struct Options {
   int leds = 0;
   double ring_radius_m = LedBoard{}.radius_m;
   bool measured = false;
+  std::optional<double> uwb_noise_m;
+  std::optional<double> uwb_bias_m;
 };
 
 bool complain(const std::string& message) {
@@ -53,8 +55,13 @@ class Study {
     if (options.paper) trial_.replay.profile = Profile::kPaper;
   }
 
-  bool add(const Swarm& swarm, const SensorPriors& priors, const std::string& name) {
+  bool add(Swarm swarm, const SensorPriors& priors, const std::string& name) {
     std::fprintf(stderr, "%s ...\n", name.c_str());
+    for (auto& robot : swarm.dataset.robots) {
+      RangeNoise& noise = robot.config.uwb.noise;
+      noise.noise_m = options_.uwb_noise_m.value_or(noise.noise_m);
+      noise.bias_sigma_m = options_.uwb_bias_m.value_or(noise.bias_sigma_m);
+    }
     trial_.priors = priors;
     if (options_.bound_only) return add_bound(swarm, name);
     if (options_.liar.empty()) return keep(run_team_trial(swarm, trial_), name, trials_);
@@ -107,12 +114,12 @@ bool add_seeds(const Options& options, Scenario scenario, Study& study) {
   }
   for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
     const std::string name = std::string(scenario.name) + " " + std::to_string(seed);
-    const Swarm swarm = simulate_swarm(scenario, seed, options.duration_s);
+    Swarm swarm = simulate_swarm(scenario, seed, options.duration_s);
     const std::string dir =
         options.write_dir + "/" + std::string(scenario.name) + "-" + std::to_string(seed);
     if (!options.write_dir.empty() && !write_swarm(dir, swarm))
       return complain(dir + ": cannot be written");
-    if (!study.add(swarm, priors_of(scenario), name)) return false;
+    if (!study.add(std::move(swarm), priors_of(scenario), name)) return false;
   }
   return true;
 }
@@ -120,8 +127,9 @@ bool add_seeds(const Options& options, Scenario scenario, Study& study) {
 int run(const Options& options) {
   Study study(options);
   for (const std::string& dir : options.sets) {
-    const Result<Swarm> swarm = load_swarm_with_truth(dir);
-    if (!(swarm ? study.add(*swarm, {}, dir) : complain(swarm.error().message))) return 1;
+    Result<Swarm> swarm = load_swarm_with_truth(dir);
+    if (!(swarm ? study.add(std::move(*swarm), {}, dir) : complain(swarm.error().message)))
+      return 1;
   }
   study.print();
   for (const std::string& name : options.scenarios) {
@@ -171,6 +179,10 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.005, 1.0));
   app.add_flag("--measured", options.measured,
                "with --leds: the robots know the radius within 2 %, and so measure distances");
+  app.add_option("--uwb-noise", options.uwb_noise_m,
+                 "uwb.noise_m of all robots, instead of as configured");
+  app.add_option("--uwb-bias", options.uwb_bias_m,
+                 "uwb.bias_sigma_m of all robots, instead of as configured");
   app.add_option("--liar", options.liar,
                  "make the last robot faulty; errors of the others with it over without it")
       ->check(CLI::IsMember(liars));
