@@ -18,13 +18,15 @@ void OutcomeLog::add(Timestamp stamp, MeasurementKind kind, const Fusion& fusion
   // Of alternatives, which have the same stamp, the one that was fused.
   std::optional<NewestReading>& newest = newest_[static_cast<std::size_t>(kind)];
   if (!newest || stamp > newest->stamp ||
-      (stamp == newest->stamp && newest->verdict != Verdict::kFused))
+      (stamp == newest->stamp && newest->verdict != Verdict::kFused)) {
     newest = NewestReading{stamp, fusion.verdict, reading};
+  }
   if (fusion.dimension > 0) {
     if (is_range(kind)) follow(range_residual_m_, fusion.residual[0], 16.0);
-    if (fusion.verdict == Verdict::kFused)
+    if (fusion.verdict == Verdict::kFused) {
       follow(nis_.at(static_cast<std::size_t>(kind)),
              fusion.nis / static_cast<double>(fusion.dimension), 50.0);
+    }
   }
   if (keeps_records_) records_.measurements.push_back({neighbor_, stamp, kind, fusion, reading});
 }
