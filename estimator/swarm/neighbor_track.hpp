@@ -67,8 +67,8 @@ class NeighborTrack {
   /// True if one kind of sighting was gated without exception for kDivergenceTime, for example
   /// because the filter follows a mirror image. Bearings of the other direction may still fit.
   [[nodiscard]] bool is_diverged() const;
-  /// True if the latest readings contradict the pose: some ranges in a row were gated, or after a
-  /// gap some bearings, and none of either side was used since the first of them.
+  /// True if the latest readings contradict the pose: some ranges in a row or all of a second were
+  /// gated, or after a gap some bearings, and none of either side was used since the first of them.
   [[nodiscard]] bool is_contradicted() const;
 
  private:
