@@ -26,6 +26,7 @@ constexpr Duration kGlimpseGap = std::chrono::milliseconds{100};
 constexpr double kDistanceSigma = 1.0;  // m; after a reset, at least
 // Where ranges are rare, a few decide. What makes one false, as a reflection, lasts less long.
 constexpr int kMinRareRanges = 3;
+constexpr double kMostOff = 4.8;  // m; beyond that, a range is more likely false after a reset, too
 constexpr Duration kRareRangesTime = std::chrono::milliseconds{3500};
 constexpr Duration kDoubtfulTime = std::chrono::seconds{1};  // without a range that fits
 
@@ -241,7 +242,8 @@ bool NeighborTrack::is_range_diverged() const {
     return last(other) > stamp() - kDivergenceTime;
   };
   return ((gated.count >= kMinGatedRanges && gated.length() >= 2 * kDivergenceTime) ||
-          (gated.count >= kMinRareRanges && gated.length() >= kRareRangesTime)) &&
+          (gated.count >= kMinRareRanges && gated.length() >= kRareRangesTime &&
+           std::abs(gated.residual) <= kMostOff)) &&
          fits(MeasurementKind::kBearing) && fits(MeasurementKind::kPeerBearing);
 }
 

@@ -120,6 +120,20 @@ TEST_F(RangedTrack, AcceptsAnotherDistanceAfterAFewRareRanges) {
   EXPECT_LT(off, 2.0 * std::sqrt(track_.pose().covariance(0, 0)));
 }
 
+// They would not fit after a reset either: what is known is kept.
+TEST_F(RangedTrack, IsNotResetByRareRangesThatAreFarOff) {
+  for (int ms = kRangedMs; ms <= kRangedMs + 8000; ms += 2000) {
+    for (int step = 0; step < 2000 && ms + step <= kRangedMs + 8000; step += 10)
+      add_sightings(ms + step);
+    if (ms < kRangedMs + 8000) {
+      ASSERT_EQ(fuse_at(ms + 1990, range({}, 60.0)).verdict, Verdict::kGated);
+    }
+  }
+
+  EXPECT_TRUE(track_.is_contradicted());
+  EXPECT_LT(std::sqrt(track_.pose().covariance(0, 0)), 1.0);
+}
+
 TEST_F(RangedTrack, IsContradictedByAllRangesOfASecondUntilOneFits) {
   for (int ms = kRangedMs; ms <= kRangedMs + 1010; ms += 10) {
     add_sightings(ms);
