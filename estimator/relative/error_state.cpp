@@ -1,13 +1,12 @@
 #include "estimator/relative/error_state.hpp"
 
+#include "estimator/relative/polar_error.hpp"
+
 namespace crepes {
 
 void inject(const ErrorState::Vector& dx, NominalState& state) {
   using E = ErrorState;
-  Pose& T_B_N = state.motion.T_B_N;
-  T_B_N.p += dx.segment<3>(E::kP);
-  T_B_N.q = (T_B_N.q * so3_exp(dx.segment<3>(E::kTheta))).normalized();
-  state.motion.v_B_N += dx.segment<3>(E::kV);
+  state.motion = corrected(state.motion, dx.head<E::kMotion>());
   state.bias_B.gyro_radps += dx.segment<3>(E::kGyroB);
   state.bias_B.accel_mps2 += dx.segment<3>(E::kAccelB);
   state.bias_N.gyro_radps += dx.segment<3>(E::kGyroN);

@@ -63,7 +63,7 @@ struct ErrorState {
   using Covariance = PartitionedCovariance<kSeen, kSize>;
 };
 
-/// x <- x (+) dx
+/// x <- x (+) dx, with the motion corrected in polar coordinates (polar_error.hpp).
 void inject(const ErrorState::Vector& dx, NominalState& state);
 
 }  // namespace crepes

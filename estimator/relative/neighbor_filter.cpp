@@ -3,14 +3,12 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
-#include <type_traits>
 
 #include "estimator/core/contract.hpp"
 #include "estimator/core/so3.hpp"
 #include "estimator/relative/bearing_measurement.hpp"
-#include "estimator/relative/pose_measurement.hpp"
+#include "estimator/relative/polar_error.hpp"
 #include "estimator/relative/range_update.hpp"
 
 namespace crepes {
@@ -19,6 +17,8 @@ namespace {
 using E = ErrorState;
 
 constexpr double kGraphSpeedSigma = 0.3;  // m/s
+// So long after three ranges they hold the distance.
+constexpr Duration kRangesLast = std::chrono::milliseconds{500};
 
 ErrorState::Covariance first_covariance(const Matrix6d& pose, double speed_sigma,
                                         const Priors& priors) {
@@ -81,45 +81,13 @@ Matrix6d covariance_with_tilt_errors(const RawPose& raw, const Priors& priors) {
   return covariance;
 }
 
-// Covariance intersection of two estimates with unknown correlation: the weight of the first for
-// which the determinant of the result is smallest.
-double intersection_weight(const Matrix6d& first, const Matrix6d& second) {
-  constexpr int kSteps = 20;
-  const Matrix6d A = first.inverse();
-  const Matrix6d B = second.inverse();
-  double best = 1.0;
-  double most = A.determinant();
-  for (int i = 1; i < kSteps; ++i) {
-    const double weight = static_cast<double>(i) / kSteps;
-    const double information = (weight * A + (1.0 - weight) * B).determinant();
-    if (information > most) {
-      most = information;
-      best = weight;
-    }
-  }
-  return best;
-}
-
-// Transforms three errors of P by J.
-template <int kIndex>
-void transform_errors(const Eigen::Matrix3d& J, E::Covariance& P) {
-  auto rows = P.seen_rows<kIndex, 3>();
-  rows = (J * rows).eval();
-  auto columns = P.columns<kIndex, 3>();
-  columns = (columns * J.transpose()).eval();
-}
-
-// Transforms P to the error at the corrected state: theta_new = J_r(theta) (theta - theta_hat).
-void reset_attitude_error(const Eigen::Matrix3d& J_r, E::Covariance& P) {
-  transform_errors<E::kTheta>(J_r, P);
-}
-
-// Bearings must not observe the range bias. Distance and range bias are strongly correlated, so the
-// covariance of the position is long along the line of sight. Each bearing rotates that line by
-// microradians. If P keeps its orientation, the next bearing couples into the distance, and the
-// estimates of robots at rest drift apart. So the position errors of P are rotated until this
-// bearing is uncorrelated with the range bias, as far as the jitter of the line of sight explains
-// the correlation. A parallax from motion is much larger and stays. Compare Huang, Mourikis and
+// While ranges hold the distance, bearings must not observe the range bias. Distance and range bias
+// are strongly correlated, so the covariance of the position is long along the line of sight. Each
+// bearing rotates that line by microradians, and the IMUs' noise moves the estimate, which the next
+// bearings undo. If P keeps its orientation, this couples into the distance, and the estimates of
+// robots at rest drift apart. So the position errors of P are rotated until this bearing is
+// uncorrelated with the range bias, as far as the jitter of the line of sight explains the
+// correlation. A parallax from motion is much larger and stays. Compare Huang, Mourikis and
 // Roumeliotis 2010: an unobservable direction must be unobservable at every linearization.
 Eigen::Matrix3d unobservable_bias_rotation(const BearingInnovation& z, const E::Covariance& P) {
   constexpr double kLineOfSightJitter = 3e-4;  // rad
@@ -135,7 +103,12 @@ Eigen::Matrix3d unobservable_bias_rotation(const BearingInnovation& z, const E::
   return so3_exp(share / length2 * along.cross(aside)).toRotationMatrix();
 }
 
-// Transforms the position rows of an outcome as `transform_errors` transforms P.
+void rotate_position(const Eigen::Matrix3d& turn, E::Covariance& P) {
+  auto rows = P.seen_rows<E::kP, 3>();
+  rows = (turn * rows).eval();
+  auto columns = P.columns<E::kP, 3>();
+  columns = (columns * turn.transpose()).eval();
+}
 template <int M>
 void rotate_position(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& outcome) {
   const auto apply = [&turn](auto&& rows) { rows = (turn * rows).eval(); };
@@ -145,17 +118,28 @@ void rotate_position(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& ou
 
 // A rotation of all that our camera sees cannot be distinguished from its misalignment m:
 //   dp = p x dm,  dv = v x dm,  dtheta = -R^T dm.
-// Each correction moves p, v and R by some noise. If P is not transported, the next update reads
-// that motion as information about m. So P is transported, as if in coordinates in which bearings
-// do not depend on m (compare Barrau and Bonnabel 2015, and Huang, Mourikis and Roumeliotis 2010).
-// The neighbor's camera does not need this: there dtheta = dm, wherever the neighbor is.
-void transport_misalignment(const RelativeMotion& before, const RelativeMotion& after,
-                            E::Covariance& P) {
+Eigen::Matrix<double, E::kMotion, 3> motion_by_misalignment(const RelativeMotion& motion) {
   Eigen::Matrix<double, E::kMotion, 3> by_m;
-  by_m << hat(after.T_B_N.p - before.T_B_N.p), hat(after.v_B_N - before.v_B_N),
-      (before.T_B_N.R() - after.T_B_N.R()).transpose();
-  add_product(P.columns<E::kMisalignB, 3>(), by_m, P.columns<0, E::kMotion>());
-  P.seen_rows<0, E::kMotion>() += by_m.lazyProduct(P.seen_rows<E::kMisalignB, 3>());
+  by_m << hat(motion.T_B_N.p), hat(motion.v_B_N), -motion.T_B_N.R().transpose();
+  return by_m;
+}
+
+// Each correction moves the estimate by some noise. If P is not transported, the next update reads
+// that motion as information about what bearings cannot observe: our camera's misalignment here,
+// and the distance by `of_motion`. The neighbor's camera does not need this: there dtheta = dm,
+// wherever the neighbor is.
+void transport(const RelativeMotion& before, const RelativeMotion& after,
+               const MotionTransport& of_motion, E::Covariance& P) {
+  static_assert(E::kMisalignB == E::kMotion + 1 && E::kRangeBias == E::kMotion);
+  constexpr int kSources = E::kMisalignB + 3;
+  // The motion's errors after by all errors up to the misalignment before.
+  Eigen::Matrix<double, E::kMotion, kSources> T;
+  T << of_motion, MotionError::Zero(),
+      motion_by_misalignment(after) - of_motion * motion_by_misalignment(before);
+  P.seen_rows<0, E::kMotion>() = (T * P.seen_rows<0, kSources>()).eval();
+  const Eigen::Matrix<double, E::kSize, kSources> columns = P.columns<0, kSources>();
+  P.columns<0, E::kMotion>().setZero();
+  add_product(columns, T, P.columns<0, E::kMotion>());
   auto motion = P.seen().topLeftCorner<E::kMotion, E::kMotion>();
   motion = (0.5 * (motion + motion.transpose())).eval();
 }
@@ -193,62 +177,37 @@ void NeighborFilter::advance_to(Timestamp to, const ImuHistory& imu_B, const Imu
   stamp_ = to;
 }
 
-// An update that moves the state far is repeated, linearized at its result (iterated Kalman filter,
-// Bell and Cathey 1993). A first pose has an error of degrees, a bearing does not. With the first
-// linearization alone, the next bearing would make the roll about the line of sight appear known,
-// though bearings do not depend on it.
-template <class Linearize>
-Fusion NeighborFilter::correct(const Linearize& linearize, double gate_nis) {
-  // In rad, and relative to the distance. Half its square is well below the noise of a bearing.
-  constexpr double kLinear = 0.01;
-  constexpr int kMaxIterations = 5;
-
-  auto z = linearize(state_);
+template <class Innovation>
+Fusion NeighborFilter::correct(std::optional<Innovation> z, double gate_nis) {
   if (!z) return {};
-  constexpr bool kIsBearing = std::is_same_v<std::decay_t<decltype(*z)>, BearingInnovation>;
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  if constexpr (kIsBearing) {
-    turn = unobservable_bias_rotation(*z, P_);
-    z->H.template middleCols<3>(E::kP) *= turn;  // like a rotation of P, which may yet be gated
-  }
+  const Eigen::Matrix3d turn =
+      has_ranges() ? unobservable_bias_rotation(*z, P_) : Eigen::Matrix3d::Identity();
+  z->H.template middleCols<3>(E::kP) *= turn;  // like a rotation of P, which may yet be gated
   auto outcome = kalman_gain(*z, gate_nis, P_);
   const Fusion fusion = fusion_of(*z, outcome);
   if (outcome.verdict != Verdict::kFused) return fusion;
-  if constexpr (kIsBearing) rotate_position(turn, outcome);
-
-  Eigen::Vector3d theta = outcome.correction.template segment<3>(E::kTheta);
-  const double shift = outcome.correction.template segment<3>(E::kP).norm();
-  const bool is_far = theta.norm() > kLinear || shift > kLinear * state_.motion.T_B_N.p.norm();
-  std::optional<E::Covariance> before_rotation;
-  if (kIsBearing && is_far) before_rotation = P_;
-  if constexpr (kIsBearing) transform_errors<E::kP>(turn, P_);
-  for (int i = 0; is_far && i < kMaxIterations; ++i) {
-    NominalState there = state_;
-    inject(outcome.correction, there);
-    z = linearize(there);
-    if (!z) break;
-    z->H.template middleCols<3>(E::kTheta) =
-        (z->H.template middleCols<3>(E::kTheta) * so3_right_jacobian(theta)).eval();
-    z->residual += z->H * outcome.correction.template head<E::kSeen>();
-    outcome = kalman_gain(*z, std::numeric_limits<double>::infinity(), P_);
-    if (outcome.verdict != Verdict::kFused) break;
-    theta = outcome.correction.template segment<3>(E::kTheta);
-  }
-  if (!z || outcome.verdict != Verdict::kFused) {
-    if (before_rotation) P_ = *before_rotation;
-    return {};
-  }
+  rotate_position(turn, outcome);
+  rotate_position(turn, P_);
   correct_covariance(outcome, P_);
-  if (is_far) reset_attitude_error(so3_right_jacobian(theta), P_);
   apply(outcome.correction);
   return fusion;
 }
 
 void NeighborFilter::apply(const E::Vector& correction) {
+  constexpr double kFar = 0.01;  // rad, and of the distance
   const RelativeMotion before = state_.motion;
   inject(correction, state_);
-  transport_misalignment(before, state_.motion, P_);
+  const bool is_far = correction.segment<3>(E::kTheta).norm() > kFar ||
+                      correction.segment<3>(E::kP).norm() > kFar * before.T_B_N.p.norm();
+  // Below that, while ranges hold the distance, the rotation by the range bias is enough, and it
+  // also takes care of the IMUs' noise.
+  const MotionTransport of_motion = is_far || !has_ranges()
+                                        ? error_transport(before, state_.motion)
+                                        : MotionTransport(MotionTransport::Identity());
+  transport(before, state_.motion, of_motion, P_);
 }
+
+bool NeighborFilter::has_ranges() const { return stamp_ < ranges_used_.front() + kRangesLast; }
 
 // The error along one attitude axis a correlates with all others: x = g a + rest, g = P a / s^2.
 // The parts are spaced along g, with a smaller variance along it.
@@ -275,8 +234,7 @@ std::vector<NeighborFilter::Part> NeighborFilter::split() const {
     const double angle = i * kSpacing * narrow;
     Part part{*this, -0.5 * angle * angle / cut};
     part.filter.P_.subtract_outer(cut * g, g);
-    reset_attitude_error(so3_right_jacobian(angle * axis), part.filter.P_);
-    inject(angle * g, part.filter.state_);
+    part.filter.apply(angle * g);
     parts.push_back(part);
   }
   return parts;
@@ -284,20 +242,12 @@ std::vector<NeighborFilter::Part> NeighborFilter::split() const {
 
 Fusion NeighborFilter::fuse_bearing(const DirectionReading& z, const Eigen::Vector3d& p_N_M,
                                     double gate_nis) {
-  return correct(
-      [&](const NominalState& state) {
-        return linearize_bearing(state, z.u, z.camera, p_N_M, z.sigma_rad);
-      },
-      gate_nis);
+  return correct(linearize_bearing(state_, z.u, z.camera, p_N_M, z.sigma_rad), gate_nis);
 }
 
 Fusion NeighborFilter::fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,
                                          double gate_nis) {
-  return correct(
-      [&](const NominalState& state) {
-        return linearize_peer_bearing(state, z.u, z.camera, p_B_M, z.sigma_rad);
-      },
-      gate_nis);
+  return correct(linearize_peer_bearing(state_, z.u, z.camera, p_B_M, z.sigma_rad), gate_nis);
 }
 
 Fusion NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
@@ -306,7 +256,10 @@ Fusion NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& 
   if (!innovation) return {};
   const double distance_m = z.range_m - state_.range_bias_m - innovation->residual(0);
   const RangeUpdate update = update_by_range(*innovation, distance_m, gate_nis, P_);
-  if (update.fusion.verdict == Verdict::kFused) apply(update.correction);
+  if (update.fusion.verdict != Verdict::kFused) return update.fusion;
+  apply(update.correction);
+  std::rotate(ranges_used_.begin(), ranges_used_.begin() + 1, ranges_used_.end());
+  ranges_used_.back() = stamp_;
   return update.fusion;
 }
 
@@ -320,20 +273,6 @@ Fusion NeighborFilter::fuse_ring_distance(const RingReading& z, const Eigen::Vec
       update_by_range(*innovation, distance_m, gate_nis, P_, shared_m * shared_m);
   if (update.fusion.verdict == Verdict::kFused) apply(update.correction);
   return update.fusion;
-}
-
-Fusion NeighborFilter::fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis) {
-  const double own = intersection_weight(pose_covariance(), T_B_N.covariance);
-  if (own == 1.0) return {.verdict = Verdict::kFused};
-  const E::Covariance before = P_;
-  P_.seen_rows<0, E::kMotion>() /= std::sqrt(own);
-  P_.columns<0, E::kMotion>() /= std::sqrt(own);
-  const GaussianPose discounted{T_B_N.pose, T_B_N.covariance / (1.0 - own)};
-  const Fusion fusion = correct(
-      [&](const NominalState& state) { return std::optional(linearize_pose(state, discounted)); },
-      gate_nis);
-  if (fusion.verdict != Verdict::kFused) P_ = before;
-  return fusion;
 }
 
 void NeighborFilter::reset_distance(double sigma_m, const Priors& priors) {

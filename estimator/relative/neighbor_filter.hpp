@@ -1,6 +1,8 @@
 /// The tight filter of one neighbor: an error-state Kalman filter of single measurements.
 #pragma once
 
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "estimator/core/imu_history.hpp"
@@ -76,9 +78,6 @@ class NeighborFilter {
   /// Corrects the state by the distance of our camera to the neighbor's ring. Antenna delays are
   /// not in it.
   Fusion fuse_ring_distance(const RingReading& z, const Eigen::Vector3d& p_N_M, double gate_nis);
-  /// A pose whose errors may be correlated with this filter and with earlier such poses: covariance
-  /// intersection (Julier and Uhlmann 1997).
-  Fusion fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis);
 
   /// After wrong ranges: adds `sigma_m` to the uncertainty of the distance and resets the
   /// covariance of speed and calibration to the priors.
@@ -100,9 +99,11 @@ class NeighborFilter {
   [[nodiscard]] Matrix6d pose_covariance() const;
 
  private:
-  /// `linearize` returns the innovation at a state, or nothing where the model is singular.
-  template <class Linearize>
-  Fusion correct(const Linearize& linearize, double gate_nis);
+  /// By a bearing; by nothing where the model is singular.
+  template <class Innovation>
+  Fusion correct(std::optional<Innovation> z, double gate_nis);
+  /// Whether ranges that were used hold the distance.
+  [[nodiscard]] bool has_ranges() const;
   /// Corrects the state, after P.
   void apply(const ErrorState::Vector& correction);
 
@@ -110,6 +111,8 @@ class NeighborFilter {
   NominalState state_;
   ErrorState::Covariance P_;
   ProcessNoise noise_;
+  /// The newest, oldest first.
+  std::array<Timestamp, 3> ranges_used_{Timestamp::min(), Timestamp::min(), Timestamp::min()};
 };
 
 /// One Gaussian of a split, and its weight.

@@ -15,6 +15,8 @@ cmake --build build/fuzz --target fuzz_corpus fuzz_target
 programs=build/fuzz/tests/fuzz/libfuzzer
 [ ${#targets[@]} -gt 0 ] || mapfile -t targets < <("$programs"/fuzz_corpus list)
 
+# More than an input allocates; 256 MB, the default, are always cold.
+export ASAN_OPTIONS=quarantine_size_mb=1:thread_local_quarantine_size_kb=64
 limits=(-use_value_profile=1 -max_len=4096)
 [ -z "${RUNS:-}" ] || limits=(-max_len=300)
 work=$(mktemp -d)

@@ -89,7 +89,7 @@ class Conversations {
 
  private:
   static constexpr const char* kHistory = "CREPES_FUZZ_HISTORY";
-  static constexpr std::uint64_t kRenewal = 1000;
+  static constexpr std::uint64_t kRenewal = 3000;
   // NOLINTNEXTLINE(concurrency-mt-unsafe): there is one thread
   [[nodiscard]] static bool is_written() { return std::getenv(kHistory) != nullptr; }
 

@@ -64,6 +64,48 @@ TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysAfterFiveSeconds) {
   EXPECT_LT(nees, kHigh);
 }
 
+/// Without ranges after the first pose, three seconds with sharp bearings at the rates of a robot:
+/// the mean normalized squared error of the pose over its dimension, and the share of distances
+/// that are off by more than three sigma.
+struct WithoutRanges {
+  double nees = 0.0;
+  double beyond = 0.0;
+};
+WithoutRanges without_ranges() {
+  constexpr int kRuns = 200;
+  test::PairNoise noise;
+  noise.bearing = 6e-4;
+  noise.priors.range_bias_m = 0.2;
+  WithoutRanges found;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    SimulatedPair pair(seed, noise);
+    NeighborFilter filter = tight_filter(pair, 0s);
+    for (int frame = 1; frame <= 600; ++frame) {
+      const Timestamp t = filter.stamp() + 5ms;
+      pair.sample_imus(t + 10ms);
+      filter.advance_to(t, pair.imu_B, pair.imu_N);
+      static_cast<void>(filter.fuse_bearing(pair.bearing(t), pair.mounting_N.led, kNoGate));
+      if (frame % 4 == 0)
+        static_cast<void>(
+            filter.fuse_peer_bearing(pair.peer_bearing(t), pair.mounting_B.led, kNoGate));
+    }
+    const Vector6d e = pose_error(pair, filter);
+    const Matrix6d P = filter.pose_covariance();
+    const Eigen::Vector3d u = filter.motion().T_B_N.p.normalized();
+    found.nees += e.dot(P.inverse() * e) / (6 * kRuns);
+    const double sigma = std::sqrt(u.dot(P.topLeftCorner<3, 3>() * u));
+    found.beyond += std::abs(u.dot(e.head<3>())) > 3.0 * sigma ? 1.0 / kRuns : 0.0;
+  }
+  return found;
+}
+
+TEST(NeighborFilter, WithoutRangesItsDistanceIsAsUncertainAsItSays) {
+  const auto [nees, beyond] = without_ranges();
+  EXPECT_GT(nees, 0.8);
+  EXPECT_LT(nees, 1.25);
+  EXPECT_LE(beyond, 0.04);  // 0.003 of a Gaussian; 0.27 of a filter in Cartesian coordinates
+}
+
 TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysOnceOtherCamerasLook) {
   const double nees = mean_pose_nees([](SimulatedPair& pair, std::uint64_t) {
     NeighborFilter filter = tight_filter(pair, 3s);
