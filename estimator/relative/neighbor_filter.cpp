@@ -125,21 +125,19 @@ Eigen::Matrix<double, E::kMotion, 3> motion_by_misalignment(const RelativeMotion
 }
 
 // Each correction moves the estimate by some noise. If P is not transported, the next update reads
-// that motion as information about what bearings cannot observe: our camera's misalignment here,
-// and the distance by `of_motion`. The neighbor's camera does not need this: there dtheta = dm,
-// wherever the neighbor is.
-void transport(const RelativeMotion& before, const RelativeMotion& after,
-               const MotionTransport& of_motion, E::Covariance& P) {
-  static_assert(E::kMisalignB == E::kMotion + 1 && E::kRangeBias == E::kMotion);
-  constexpr int kSources = E::kMisalignB + 3;
-  // The motion's errors after by all errors up to the misalignment before.
-  Eigen::Matrix<double, E::kMotion, kSources> T;
-  T << of_motion, MotionError::Zero(),
-      motion_by_misalignment(after) - of_motion * motion_by_misalignment(before);
-  P.seen_rows<0, E::kMotion>() = (T * P.seen_rows<0, kSources>()).eval();
-  const Eigen::Matrix<double, E::kSize, kSources> columns = P.columns<0, kSources>();
+// that motion as information about what bearings cannot observe: the distance, and our camera's
+// misalignment. The neighbor's camera does not need this: there dtheta = dm, wherever the neighbor
+// is.
+void transport_motion(const MotionTransport& T, E::Covariance& P) {
+  P.seen_rows<0, E::kMotion>() = (T * P.seen_rows<0, E::kMotion>()).eval();
+  const Eigen::Matrix<double, E::kSize, E::kMotion> columns = P.columns<0, E::kMotion>();
   P.columns<0, E::kMotion>().setZero();
   add_product(columns, T, P.columns<0, E::kMotion>());
+}
+
+void transport_misalignment(const Eigen::Matrix<double, E::kMotion, 3>& by_m, E::Covariance& P) {
+  add_product(P.columns<E::kMisalignB, 3>(), by_m, P.columns<0, E::kMotion>());
+  P.seen_rows<0, E::kMotion>() += by_m.lazyProduct(P.seen_rows<E::kMisalignB, 3>());
   auto motion = P.seen().topLeftCorner<E::kMotion, E::kMotion>();
   motion = (0.5 * (motion + motion.transpose())).eval();
 }
@@ -201,10 +199,13 @@ void NeighborFilter::apply(const E::Vector& correction) {
                       correction.segment<3>(E::kP).norm() > kFar * before.T_B_N.p.norm();
   // Below that, while ranges hold the distance, the rotation by the range bias is enough, and it
   // also takes care of the IMUs' noise.
-  const MotionTransport of_motion = is_far || !has_ranges()
-                                        ? error_transport(before, state_.motion)
-                                        : MotionTransport(MotionTransport::Identity());
-  transport(before, state_.motion, of_motion, P_);
+  Eigen::Matrix<double, E::kMotion, 3> by_m = motion_by_misalignment(before);
+  if (is_far || !has_ranges()) {
+    const MotionTransport T = error_transport(before, state_.motion);
+    transport_motion(T, P_);
+    by_m = (T * by_m).eval();
+  }
+  transport_misalignment(motion_by_misalignment(state_.motion) - by_m, P_);
 }
 
 bool NeighborFilter::has_ranges() const { return stamp_ < ranges_used_.front() + kRangesLast; }
