@@ -9,6 +9,7 @@
 #include "estimator/core/so3.hpp"
 #include "estimator/relative/bearing_measurement.hpp"
 #include "estimator/relative/polar_error.hpp"
+#include "estimator/relative/pose_measurement.hpp"
 #include "estimator/relative/range_update.hpp"
 
 namespace crepes {
@@ -79,6 +80,25 @@ Matrix6d covariance_with_tilt_errors(const RawPose& raw, const Priors& priors) {
   add(J.by_accel_scale_B, priors.accel_scale);
   add(J.by_accel_scale_N, priors.accel_scale);
   return covariance;
+}
+
+// Covariance intersection of two estimates with unknown correlation: the weight of the first for
+// which the determinant of the result is smallest.
+double intersection_weight(const Matrix6d& first, const Matrix6d& second) {
+  constexpr int kSteps = 20;
+  const Matrix6d A = first.inverse();
+  const Matrix6d B = second.inverse();
+  double best = 1.0;
+  double most = A.determinant();
+  for (int i = 1; i < kSteps; ++i) {
+    const double weight = static_cast<double>(i) / kSteps;
+    const double information = (weight * A + (1.0 - weight) * B).determinant();
+    if (information > most) {
+      most = information;
+      best = weight;
+    }
+  }
+  return best;
 }
 
 // While ranges hold the distance, bearings must not observe the range bias. Distance and range bias
@@ -274,6 +294,23 @@ Fusion NeighborFilter::fuse_ring_distance(const RingReading& z, const Eigen::Vec
       update_by_range(*innovation, distance_m, gate_nis, P_, shared_m * shared_m);
   if (update.fusion.verdict == Verdict::kFused) apply(update.correction);
   return update.fusion;
+}
+
+Fusion NeighborFilter::fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis) {
+  const double own = intersection_weight(pose_covariance(), T_B_N.covariance);
+  if (own == 1.0) return {.verdict = Verdict::kFused};
+  const E::Covariance before = P_;
+  P_.seen_rows<0, E::kMotion>() /= std::sqrt(own);
+  P_.columns<0, E::kMotion>() /= std::sqrt(own);
+  const GaussianPose discounted{T_B_N.pose, T_B_N.covariance / (1.0 - own)};
+  const auto z = linearize_pose(state_, discounted);
+  const auto outcome = kalman_update(z, gate_nis, P_);
+  if (outcome.verdict == Verdict::kFused) {
+    apply(outcome.correction);
+  } else {
+    P_ = before;
+  }
+  return fusion_of(z, outcome);
 }
 
 void NeighborFilter::reset_distance(double sigma_m, const Priors& priors) {

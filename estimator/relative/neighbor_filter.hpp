@@ -79,6 +79,10 @@ class NeighborFilter {
   /// not in it.
   Fusion fuse_ring_distance(const RingReading& z, const Eigen::Vector3d& p_N_M, double gate_nis);
 
+  /// A pose whose errors may be correlated with this filter and with earlier such poses: covariance
+  /// intersection (Julier and Uhlmann 1997).
+  Fusion fuse_correlated_pose(const GaussianPose& T_B_N, double gate_nis);
+
   /// After wrong ranges: adds `sigma_m` to the uncertainty of the distance and resets the
   /// covariance of speed and calibration to the priors.
   void reset_distance(double sigma_m, const Priors& priors);

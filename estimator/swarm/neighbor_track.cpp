@@ -60,10 +60,11 @@ Fusion fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounti
       return filter.fuse_ring_distance(std::get<RingReading>(m.reading), mounting.p_N_M,
                                        gates.range);
     case MeasurementKind::kGraphPose:
+      return filter.fuse_correlated_pose(std::get<GraphPose>(m.reading).T_B_N, gates.pose);
     case MeasurementKind::kRawPose:
       break;
   }
-  return {.verdict = Verdict::kNoState};  // poses only initialize this filter
+  return {.verdict = Verdict::kNoState};  // a raw pose only initializes this filter
 }
 
 Fusion fuse_paper(PaperFilter& filter, const Measurement& m, const Gates& gates) {

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "estimator/relative/bearing_measurement.hpp"
+#include "estimator/relative/pose_measurement.hpp"
 #include "estimator/relative/range_measurement.hpp"
 #include "tests/support/numeric_jacobian.hpp"
 #include "tests/support/random_geometry.hpp"
@@ -166,6 +167,25 @@ TEST(RangeMeasurement, RefusesAntennasThatCoincide) {
 
   EXPECT_FALSE(linearize_range(state, {0.2, 0.0, 0.04}, Eigen::Vector3d::Zero(), 0.04, 0.05));
   EXPECT_TRUE(linearize_range(state, {0.2, 0.0, 0.06}, Eigen::Vector3d::Zero(), 0.06, 0.05));
+}
+
+TEST(PoseMeasurement, JacobianIsMinusTheDerivativeOfTheResidualAtAnyResidual) {
+  RandomGeometry random(5);
+  for (int i = 0; i < kStates; ++i) {
+    const NominalState state = random_state(random);
+    Vector6d offset;
+    offset << random.vector(), random.uniform(0.0, 2.5) * random.direction();
+    const GaussianPose measured{perturbed(state.motion.T_B_N, offset), random.covariance<6>(0.1)};
+
+    const auto z = linearize_pose(state, measured);
+
+    EXPECT_LT((z.residual - offset).norm(), 1e-12);
+    EXPECT_EQ(z.cov_z, measured.covariance);
+    const auto minus_H = numeric_jacobian<6, E::kSize>([&](const E::Vector& dx) -> Vector6d {
+      return linearize_pose(injected(state, dx), measured).residual;
+    });
+    expect_equal<6>(z.H, -minus_H);
+  }
 }
 
 }  // namespace

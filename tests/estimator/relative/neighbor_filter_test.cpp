@@ -92,6 +92,30 @@ TEST(NeighborFilter, AGatedOrDegenerateReadingChangesNothing) {
   EXPECT_EQ(filter.motion().T_B_N.q.coeffs(), T_B_N.q.coeffs());
 }
 
+TEST(NeighborFilter, AGraphPoseDrawsItInByTheirCovariances) {
+  SimulatedPair pair(3);
+  NeighborFilter filter = tight_filter(pair, 500ms);
+  const Vector6d before = pose_error(pair, filter);
+  const GaussianPose sharp{pair.truth(filter.stamp()).motion.T_B_N, 1e-8 * Matrix6d::Identity()};
+
+  EXPECT_EQ(filter.fuse_correlated_pose(sharp, kNoGate).verdict, Verdict::kFused);
+
+  EXPECT_LT(pose_error(pair, filter).norm(), 0.01 * before.norm());
+}
+
+TEST(NeighborFilter, TheSameGraphPoseAHundredTimesSaysNoMoreThanOnce) {
+  SimulatedPair pair(3);
+  NeighborFilter filter = tight_filter(pair, 500ms);
+  const GaussianPose pose{pair.truth(filter.stamp()).motion.T_B_N, 1e-4 * Matrix6d::Identity()};
+
+  EXPECT_EQ(filter.fuse_correlated_pose(pose, kNoGate).verdict, Verdict::kFused);
+  const double once = filter.pose_covariance().determinant();
+  for (int i = 1; i < 100; ++i)
+    EXPECT_EQ(filter.fuse_correlated_pose(pose, kNoGate).verdict, Verdict::kFused);
+
+  EXPECT_GT(filter.pose_covariance().determinant(), 0.9 * once);  // weights come in steps
+}
+
 /// Root mean square position and attitude errors [m, rad] of 20 runs.
 template <class Run>
 Eigen::Vector2d rms_error(const Run& run) {
