@@ -37,7 +37,7 @@ OpenCamera real_camera(const Config& config, std::size_t index, const Clock& clo
     CameraConfig camera = configured;
     camera.device.light = light;
     if (camera.device.driver == CameraDriver::kFolder)
-      return FolderCamera::open(camera.device.folder, number, clock);
+      return FolderCamera::open(camera.device.folder, camera.calibration, number, clock);
     Result<std::unique_ptr<Camera>> opened = open_device(camera, number, clock);
     if (!opened) return opened;
     return std::make_unique<WatchedCamera>(std::move(*opened), camera, clock);

@@ -53,6 +53,15 @@ Result<Frame> read_gray_image(const std::filesystem::path& file) {
   }
 }
 
+Result<Frame> read_gray_image(const std::filesystem::path& file, const CameraCalibration& camera) {
+  auto frame = read_gray_image(file);
+  const auto [width, height] = camera.resolution;
+  if (!frame || (frame->width == width && frame->height == height)) return frame;
+  return fail(ErrorCode::kFormat,
+              fmt::format("{}: is {}x{}, but {} takes pictures of {}x{} (resolution)",
+                          file.string(), frame->width, frame->height, camera.name, width, height));
+}
+
 Result<std::vector<RecordedPicture>> read_picture_list(const std::filesystem::path& csv,
                                                        const std::filesystem::path& pictures) {
   std::ifstream in(csv);
@@ -79,33 +88,46 @@ Result<std::vector<RecordedPicture>> read_picture_list(const std::filesystem::pa
 }
 
 Result<std::unique_ptr<Camera>> FolderCamera::open(const std::filesystem::path& folder,
-                                                   std::uint8_t camera, const Clock& clock) {
+                                                   const CameraCalibration& camera,
+                                                   std::uint8_t index, const Clock& clock) {
   // "cam0/data/" and "cam0/data" are the same folder, beside "cam0/data.csv".
   const std::filesystem::path pictures = (folder / "").lexically_normal().parent_path();
   auto list = read_picture_list(pictures.parent_path() / "data.csv", pictures);
   if (!list) return tl::unexpected(std::move(list.error()));
-  return std::unique_ptr<Camera>(new FolderCamera(std::move(*list), camera, clock));
+  return std::unique_ptr<Camera>(new FolderCamera(std::move(*list), camera, index, clock));
 }
 
 Result<std::optional<Frame>> FolderCamera::read_once(std::chrono::milliseconds timeout) {
   if (next_ == pictures_.size()) {
-    return fail(ErrorCode::kNotFound,
-                fmt::format("{}: no more pictures", pictures_.back().file.parent_path().string()));
+    sleep_for(timeout);
+    return std::optional<Frame>{};
   }
   const RecordedPicture& picture = pictures_[next_];
   const Timestamp due = begin_ + (picture.stamp - pictures_.front().stamp);
   sleep_for(std::min<Duration>(due - clock_.now(), timeout));
   if (clock_.now() < due) return std::optional<Frame>{};
   ++next_;
-  return read_gray_image(picture.file).map([&](Frame frame) {
-    frame.stamp = due;
-    frame.camera = camera_;
-    return std::optional(std::move(frame));
-  });
+  auto frame = read_gray_image(picture.file, camera_);
+  if (!frame) {
+    ++unreadable_;
+    last_error_ = frame.error().message;
+    return std::optional<Frame>{};
+  }
+  frame->stamp = due;
+  frame->camera = index_;
+  return std::optional(std::move(*frame));
 }
 
 SensorTotals FolderCamera::counters() const {
-  return {.faults = {}, .counts = {{"frames", next_}}};
+  return {.faults = {{"unreadable_pictures", unreadable_}},
+          .counts = {{"frames", next_ - unreadable_}}};
+}
+
+std::optional<std::string> FolderCamera::diagnosis() const {
+  if (next_ == pictures_.size()) {
+    return fmt::format("{}: no more pictures", pictures_.front().file.parent_path().string());
+  }
+  return last_error_.empty() ? std::nullopt : std::optional(last_error_);
 }
 
 }  // namespace crepes

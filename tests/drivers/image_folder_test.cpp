@@ -20,6 +20,8 @@ class ImageFolderTest : public testing::Test {
             testing::UnitTest::GetInstance()->current_test_info()->name();
     fs::remove_all(root_);
     fs::create_directories(root_ / "data");
+    camera_.name = "cam0";
+    camera_.resolution = {3, 2};
   }
   void TearDown() override { fs::remove_all(root_); }
 
@@ -37,6 +39,7 @@ class ImageFolderTest : public testing::Test {
 
   fs::path root_;
   ManualClock clock_;
+  CameraCalibration camera_;
 };
 
 TEST_F(ImageFolderTest, ReadsAPictureRowByRow) {
@@ -77,13 +80,14 @@ TEST_F(ImageFolderTest, PlaysPicturesAtTheirRecordedPaceOnItsOwnClock) {
   write_picture("a.pgm");
   write("data.csv", "#t,name\n7000000000,a.pgm\r\n7005000000,a.pgm\n");
   clock_.set(Timestamp{1s});
-  auto camera = FolderCamera::open(root_ / "data/", 2, clock_);
+  auto camera = FolderCamera::open(root_ / "data/", camera_, 2, clock_);
   ASSERT_TRUE(camera) << camera.error().message;
 
   const auto first = (*camera)->read_once(0ms);
   const auto too_early = (*camera)->read_once(0ms);
   clock_.advance(6ms);
   const auto second = (*camera)->read_once(0ms);
+  EXPECT_EQ((*camera)->diagnosis(), (root_ / "data").string() + ": no more pictures");
   const auto end = (*camera)->read_once(0ms);
 
   ASSERT_TRUE(first && *first);
@@ -92,8 +96,30 @@ TEST_F(ImageFolderTest, PlaysPicturesAtTheirRecordedPaceOnItsOwnClock) {
   EXPECT_TRUE(too_early && !*too_early);
   ASSERT_TRUE(second && *second);
   EXPECT_EQ((*second)->stamp, Timestamp{1s} + 5ms);
-  ASSERT_FALSE(end);
-  EXPECT_NE(end.error().message.find("no more pictures"), std::string::npos);
+  EXPECT_TRUE(end && !*end);
+}
+
+TEST_F(ImageFolderTest, PlaysOnAfterPicturesThatCannotBeUsed) {
+  write_picture("a.pgm");
+  write("data/broken.pgm", "P5 3");
+  write("data/larger.pgm", "P5 3 3 255\n123456789");
+  write("data.csv", "#t,name\n1,broken.pgm\n2,larger.pgm\n3,a.pgm\n4,a.pgm\n");
+  auto camera = FolderCamera::open(root_ / "data", camera_, 0, clock_);
+  ASSERT_TRUE(camera) << camera.error().message;
+  clock_.advance(1ms);
+
+  const auto broken = (*camera)->read_once(0ms);
+  EXPECT_NE((*camera)->diagnosis().value_or("").find("broken.pgm: "), std::string::npos);
+  const auto larger = (*camera)->read_once(0ms);
+  EXPECT_EQ((*camera)->diagnosis(), (root_ / "data/larger.pgm").string() +
+                                        ": is 3x3, but cam0 takes pictures of 3x2 (resolution)");
+  const auto good = (*camera)->read_once(0ms);
+
+  EXPECT_TRUE(broken && !*broken);
+  EXPECT_TRUE(larger && !*larger);
+  EXPECT_TRUE(good && *good);
+  EXPECT_EQ((*camera)->counters().faults, (Totals{{"unreadable_pictures", 2}}));
+  EXPECT_EQ((*camera)->counters().counts, (Totals{{"frames", 1}}));
 }
 
 }  // namespace

@@ -49,8 +49,9 @@ class SightingsByBoard {
 /// The frames of spots.csv, or those that the detector finds in the pictures.
 class FrameSource {
  public:
-  FrameSource(const CameraRecording& recording, const VisionConfig& vision)
-      : recording_(recording), detector_(vision) {}
+  FrameSource(const CameraRecording& recording, const CameraCalibration& camera,
+              const VisionConfig& vision)
+      : recording_(recording), camera_(camera), detector_(vision) {}
 
   [[nodiscard]] std::size_t size() const {
     return recording_.spots.empty() ? recording_.images.size() : recording_.spots.size();
@@ -61,7 +62,7 @@ class FrameSource {
   [[nodiscard]] Result<SpotFrame> frame(std::size_t i) {
     if (!recording_.spots.empty()) return recording_.spots[i];
     const RecordedImage& image = recording_.images[i];
-    const auto picture = read_gray_image(image.file);
+    const auto picture = read_gray_image(image.file, camera_);
     if (!picture) return tl::unexpected(picture.error());
     const Detection found = detector_.detect({.pixels = picture->pixels.data(),
                                               .width = picture->width,
@@ -74,6 +75,7 @@ class FrameSource {
 
  private:
   const CameraRecording& recording_;
+  const CameraCalibration& camera_;
   SpotDetector detector_;
 };
 
@@ -87,7 +89,7 @@ Result<BoardSightings> board_sightings(const RobotRecording& recording,
   if (!library) return tl::unexpected(library.error());
   BlinkTracker tracker(camera, *model, recording.config.vision, *library,
                        recording.config.robot.id);
-  FrameSource source(recording.cameras.front(), recording.config.vision);
+  FrameSource source(recording.cameras.front(), camera, recording.config.vision);
   SightingsByBoard by_board;
   auto sample = recording.imu.begin();
   for (std::size_t i = 0; i < source.size(); ++i) {

@@ -229,7 +229,8 @@ void VirtualSwarm::receive(const Arrival& arrival, const VirtualDatagram& datagr
 
 Result<void> VirtualSwarm::detect(const Arrival& arrival, const PendingImage& due) {
   VirtualRobot& robot = robots_[arrival.robot];
-  const auto image = read_gray_image(due.image.file);
+  const auto image =
+      read_gray_image(due.image.file, robot.recording.config.cameras[due.camera].calibration);
   if (!image) return tl::unexpected(image.error());
   SpotFrame frame{.stamp = due.image.stamp, .camera = due.camera, .spots = {}};
   {

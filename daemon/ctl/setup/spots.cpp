@@ -77,16 +77,7 @@ class Inspector {
         detector_(config.vision),
         tracker_(camera_, model_, config.vision, library, config.robot.id) {}
 
-  /// Reads the picture. It must have the size of this camera's pictures.
-  [[nodiscard]] Result<Frame> read(const fs::path& file) const {
-    auto frame = read_gray_image(file);
-    if (!frame || (frame->width == model_.width() && frame->height == model_.height()))
-      return frame;
-
-    return fail(ErrorCode::kFormat, fmt::format("{}: is {}x{}, but {} takes pictures of {}x{}",
-                                                file.string(), frame->width, frame->height,
-                                                camera_.name, model_.width(), model_.height()));
-  }
+  [[nodiscard]] const CameraCalibration& camera() const { return camera_; }
 
   [[nodiscard]] PictureFindings inspect(const RecordedPicture& picture, const Frame& frame) {
     PictureFindings findings;
@@ -204,7 +195,7 @@ class Inspection {
 
  private:
   [[nodiscard]] Result<void> look_at(const RecordedPicture& picture) {
-    const Result<Frame> frame = inspector_.read(picture.file);
+    const Result<Frame> frame = read_gray_image(picture.file, inspector_.camera());
     if (!frame) {
       ++summary_.refused;
       last_fault_ = frame.error().message;
