@@ -146,11 +146,7 @@ OpenDevice uwb_device(SerialProtocol protocol, const UwbSensorSettings& settings
 
 /// The mode in which a LinkTrack module sends nothing that could be recognized.
 std::optional<std::string> foreign_meaning(Bytes recent) {
-  constexpr std::size_t kEnough = 3;
-  std::size_t foreign = 0;
-  for (std::size_t at = 0; at < recent.size(); ++at)
-    foreign += NlinkParser::examine(recent.subspan(at)).kind == FrameKind::kForeign ? 1 : 0;
-  if (foreign < kEnough) return std::nullopt;
+  if (!is_in_another_mode<NlinkParser>(recent)) return std::nullopt;
   return std::string(NlinkParser::kForeignMeaning);
 }
 

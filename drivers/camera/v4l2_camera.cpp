@@ -125,9 +125,16 @@ class V4l2Session {
   }
 
   Result<void> set_region(const CameraConfig& config) {
-    if (config.device.offset == std::array{0, 0}) return {};
     v4l2_selection region{};
     region.type = kCapture;
+    if (config.device.offset == std::array{0, 0}) {
+      // A crop outlives the program that set it. Most devices have none.
+      region.target = V4L2_SEL_TGT_CROP_DEFAULT;
+      if (device_->ioctl(VIDIOC_G_SELECTION, &region) != 0) return {};
+      region.target = V4L2_SEL_TGT_CROP;
+      static_cast<void>(device_->ioctl(VIDIOC_S_SELECTION, &region));
+      return {};
+    }
     region.target = V4L2_SEL_TGT_CROP;
     region.r = {config.device.offset[0], config.device.offset[1],
                 static_cast<std::uint32_t>(config.calibration.resolution[0]),

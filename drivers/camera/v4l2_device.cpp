@@ -80,9 +80,10 @@ Result<std::unique_ptr<V4l2Device>> open_v4l2_device(const std::string& path) {
 std::vector<FoundCamera> find_v4l2_cameras(const std::filesystem::path& dev) {
   std::vector<FoundCamera> found;
   std::error_code failed;
-  for (const auto& entry : std::filesystem::directory_iterator(dev, failed)) {
-    const std::string path = entry.path();
-    if (!entry.path().filename().string().starts_with("video")) continue;
+  std::filesystem::directory_iterator entry(dev, failed);
+  for (; !failed && entry != std::filesystem::directory_iterator(); entry.increment(failed)) {
+    const std::string path = entry->path();
+    if (!entry->path().filename().string().starts_with("video")) continue;
     if (const auto name = name_of_camera(path))
       found.push_back({by_id_link_of(path, dev / "v4l" / "by-id").value_or(path), *name});
   }

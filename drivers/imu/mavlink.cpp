@@ -202,8 +202,10 @@ bool MavlinkParser::is_chosen(Bytes frame, Timestamp arrival) {
   if (!rank || is_unscaled) return true;  // no sample: only counted
   const bool is_same = source_ && *rank == source_->rank && header.sender == source_->sender;
   const bool is_better = !source_ || *rank < source_->rank || arrival - source_->heard > kGone;
-  if (is_same || is_better) source_ = Source{*rank, header.sender, arrival};
-  return is_same || is_better;
+  if (!is_same && !is_better) return false;
+  if (!is_same) clock_ = {};  // each sender's runs since it was switched on
+  source_ = Source{*rank, header.sender, arrival};
+  return true;
 }
 
 bool MavlinkParser::is_ardupilot(Bytes frame) const {

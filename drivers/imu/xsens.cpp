@@ -208,26 +208,21 @@ void XsensParser::parse(Bytes frame, Timestamp arrival,
   sends_old_format_ = frame[2] == kMtData;
   XsensMessage message = Xsens::read_message(frame);
   if (!is_chosen(frame[1], message.quantity, arrival)) return;
-  Duration age{};
-  if (message.quantity == XsensQuantity::kIncrement) age = divide_by_period(message);
-  forward_sample(message.reading, arrival, clock_, counts_, [&](const ImuSample& sample) {
-    sink({sample.stamp - age, sample.gyro_radps, sample.accel_mps2});
-  });
+  if (message.quantity == XsensQuantity::kIncrement) divide_by_period(message);
+  forward_sample(message.reading, arrival, clock_, counts_, sink);
 }
 
-/// A mean rate is that of the middle of its period.
-Duration XsensParser::divide_by_period(XsensMessage& message) {
+void XsensParser::divide_by_period(XsensMessage& message) {
   ImuReading& reading = message.reading;
   lacks_period_ = !reading.time || !message.counter;
   const auto period =
       lacks_period_ ? std::nullopt : period_.update(*reading.time, *message.counter);
   if (!period) {
     reading.verdict = ImuVerdict::kPartial;
-    return {};
+    return;
   }
   reading.gyro_radps /= *period;
   reading.accel_mps2 /= *period;
-  return from_seconds(0.5 * *period);
 }
 
 bool XsensParser::is_chosen(std::uint8_t bus, XsensQuantity quantity, Timestamp arrival) {

@@ -88,8 +88,8 @@ class XsensParser {
     Timestamp heard{};
   };
   [[nodiscard]] bool is_chosen(std::uint8_t bus, XsensQuantity quantity, Timestamp arrival);
-  /// Makes rates of increments; returns half of their period, by which they are older.
-  Duration divide_by_period(XsensMessage& message);
+  /// Makes rates of increments.
+  void divide_by_period(XsensMessage& message);
 
   std::optional<Source> source_;
   IncrementPeriod period_;

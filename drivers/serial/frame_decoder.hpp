@@ -43,7 +43,6 @@ struct DecoderCounts {
   std::uint64_t skipped_bytes = 0;
   std::uint64_t checksum_failures = 0;
   std::uint64_t skipped_in_a_row = 0;
-  std::uint64_t foreign_in_a_row = 0;
   std::uint64_t unchecked_in_a_row = 0;
 };
 
@@ -80,7 +79,6 @@ class FrameDecoder {
     if (kind == FrameKind::kComplete) {
       ++counts_.frames;
       counts_.skipped_in_a_row = 0;
-      counts_.foreign_in_a_row = 0;
       counts_.unchecked_in_a_row = 0;
       return;
     }
@@ -92,7 +90,6 @@ class FrameDecoder {
     ++counts_.skipped_bytes;
     ++counts_.skipped_in_a_row;
     if (kind == FrameKind::kBadChecksum) ++counts_.checksum_failures;
-    if (kind == FrameKind::kForeign) ++counts_.foreign_in_a_row;
   }
 
   std::vector<std::uint8_t> pending_;

@@ -29,11 +29,23 @@ class RecentBytes {
     if (bytes_.size() <= kMost) return;
     bytes_.erase(bytes_.begin(), bytes_.end() - static_cast<std::ptrdiff_t>(kMost));
   }
+  void clear() { bytes_.clear(); }
   [[nodiscard]] Bytes get() const { return bytes_; }
 
  private:
   std::vector<std::uint8_t> bytes_;
 };
+
+/// Whether the bytes are of this device in another mode of operation: some of its frames, and of no
+/// other kind of device.
+template <FrameProtocol Protocol>
+[[nodiscard]] bool is_in_another_mode(Bytes recent) {
+  constexpr int kEnoughFrames = 3;
+  int frames = 0;
+  for (std::size_t at = 0; at < recent.size(); ++at)
+    frames += Protocol::examine(recent.subspan(at)).kind == FrameKind::kForeign ? 1 : 0;
+  return frames >= kEnoughFrames && !detect_protocol(recent);
+}
 
 /// A protocol whose device must be asked: the requests in order, from number 0 on.
 template <class Parser>
@@ -73,6 +85,7 @@ class SerialReader {
     recent_.add(*chunk);
     decoder_.feed(*chunk, [&](Bytes frame) {
       last_frame_ = arrival;
+      recent_.clear();
       parser_.parse(frame, arrival, [&](const Measurement& measurement) {
         last_measurement_ = arrival;
         on_measurement_(measurement);
@@ -89,9 +102,8 @@ class SerialReader {
     constexpr Duration kPatience = std::chrono::seconds(1);
     const Timestamp now = clock_.now();
     const DecoderCounts& counts = decoder_.counts();
-    if (counts.foreign_in_a_row >= kEnoughFrames) {
+    if (is_in_another_mode<Parser>(recent_.get()))
       return fmt::format("{}: {}", port_.path(), Parser::kForeignMeaning);
-    }
     if (now - last_frame_ >= kPatience) {
       if (counts.unchecked_in_a_row >= kEnoughFrames)
         return fmt::format("{}: {}", port_.path(), parser_.no_measurement_reason());

@@ -1,6 +1,10 @@
 #include "drivers/imu/mavlink.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
 
 #include "estimator/core/constants.hpp"
 #include "tests/support/imu_readings.hpp"
@@ -54,16 +58,16 @@ TEST(Mavlink, RefusesRawImuWithAReason) {
   EXPECT_NE(parser.no_measurement_reason().find("RAW_IMU only"), std::string::npos);
 }
 
-/// A message of version 2 from system 1, with its checksum.
+/// A message of version 2, with its checksum.
 std::vector<std::uint8_t> mavlink_message(std::uint32_t id, std::uint8_t crc_extra,
-                                          const std::string& payload) {
+                                          const std::string& payload, std::uint8_t system = 1) {
   const auto content = bytes_of(payload);
   std::vector<std::uint8_t> message{0xfd,
                                     static_cast<std::uint8_t>(content.size()),
                                     0,
                                     0,
                                     7,
-                                    1,
+                                    system,
                                     1,
                                     static_cast<std::uint8_t>(id & 0xffU),
                                     static_cast<std::uint8_t>(id >> 8U & 0xffU),
@@ -144,6 +148,32 @@ TEST(Mavlink, TakesTheBestMessageOnlyAndAnotherWhenThatIsGone) {
   EXPECT_EQ(samples_in(parser, scaled + highres, Timestamp{2s}), 2U);
   EXPECT_EQ(samples_in(parser, scaled + scaled2, Timestamp{2500ms}), 0U);
   EXPECT_EQ(samples_in(parser, scaled + scaled2, Timestamp{4s}), 1U);
+}
+
+TEST(Mavlink, LearnsTheClockOfEachSenderAnew) {
+  const auto message = [](std::uint8_t system, Duration boot) {
+    const auto ms = static_cast<std::uint32_t>(boot / 1ms);
+    std::string payload;
+    for (unsigned shift = 0; shift < 32; shift += 8)
+      payload += fmt::format("{:02x} ", ms >> shift & 0xffU);
+    return mavlink_message(
+        26, 170, payload + "64 00 38 ff 18 fc 32 00 e7 ff 0a 00 00 00 00 00 00 00", system);
+  };
+  MavlinkParser parser;
+  Timestamp newest{};
+  const auto send = [&](std::uint8_t system, Duration behind, Duration from, Duration to) {
+    Duration most{};
+    for (Duration now = from; now < to; now += 10ms) {
+      for (const auto& frame : decode<MavlinkParser>(message(system, now - behind)))
+        parser.parse(frame, Timestamp{now},
+                     [&](const ImuSample& sample) { newest = sample.stamp; });
+      most = std::max(most, Timestamp{now} - newest);
+    }
+    return most;
+  };
+
+  EXPECT_LE(send(1, 10s, 20s, 30s), 1ms);
+  EXPECT_LE(send(2, 10s + 300ms, 32s, 34s), 1ms);
 }
 
 }  // namespace

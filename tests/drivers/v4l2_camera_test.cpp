@@ -27,6 +27,7 @@ struct FakeKernel {
   std::map<unsigned long, int> errors;
   std::map<std::uint32_t, int> controls{{V4L2_CID_EXPOSURE_ABSOLUTE, 50}};
   double rate_hz = 0.0;
+  std::optional<v4l2_rect> crop;  ///< empty: it has none
 
   std::vector<std::vector<std::uint8_t>> memory;
   std::deque<std::uint32_t> free;
@@ -103,6 +104,14 @@ class FakeDevice final : public V4l2Device {
         if (kernel_.filled.empty()) return EAGAIN;
         *static_cast<v4l2_buffer*>(argument) = kernel_.filled.front();
         kernel_.filled.pop_front();
+        return 0;
+      case VIDIOC_G_SELECTION:
+        if (!kernel_.crop) return ENOTTY;
+        static_cast<v4l2_selection*>(argument)->r = {0, 0, kernel_.width, kernel_.height};
+        return 0;
+      case VIDIOC_S_SELECTION:
+        if (!kernel_.crop) return ENOTTY;
+        kernel_.crop = static_cast<v4l2_selection*>(argument)->r;
         return 0;
       case VIDIOC_STREAMON:
         kernel_.is_running = true;
@@ -295,6 +304,15 @@ TEST_F(V4l2CameraTest, RefusesSettingsThatTheDeviceDoesNotHave) {
   config_.device.light.gain.reset();
   config_.device.offset = {8, 0};
   EXPECT_NE(open_error().find("offset"), std::string::npos);
+}
+
+TEST_F(V4l2CameraTest, UndoesTheCropOfAnEarlierRun) {
+  kernel_.crop = v4l2_rect{100, 50, 32, 20};
+
+  ASSERT_TRUE(open());
+
+  EXPECT_EQ(kernel_.crop->left, 0);
+  EXPECT_EQ(kernel_.crop->top, 0);
 }
 
 TEST_F(V4l2CameraTest, SetsTheExposureAndReportsOneLongerThanAFrame) {

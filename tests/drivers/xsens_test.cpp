@@ -186,8 +186,8 @@ TEST(Xsens, DividesIncrementsByTheirPeriod) {
     ASSERT_NEAR(sample.accel_mps2.x(), 16.0, 0.01);
     ASSERT_NEAR(sample.gyro_radps.z(), 16.0, 0.01);
   }
-  // A mean rate is half a period old.
-  EXPECT_NEAR(to_seconds(arrivals.back() - samples.back().stamp), 312.5e-6, 150e-6);
+  // A sample is the mean of the period that ends at its stamp.
+  EXPECT_NEAR(to_seconds(arrivals.back() - samples.back().stamp), 0.0, 150e-6);
 }
 
 TEST(Xsens, CannotDivideIncrementsWithoutClockAndCounter) {

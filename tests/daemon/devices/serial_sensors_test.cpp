@@ -148,6 +148,11 @@ TEST_F(SerialSensors, SayWhatIsWrongWithinTwoSeconds) {
   EXPECT_TRUE(says(fault_of(*open_uwb(), noise), "wrong baud rate"));
   EXPECT_TRUE(says(fault_of(*open_uwb(), imu), "speaks hipnuc"));
   EXPECT_TRUE(says(fault_of(*open_uwb(), bytes_of("ff 02 10")), "ff 02"));
+  const auto with_ff_02 =
+      bytes_of("55 51 fe ff 02 00 00 08 b6 09 6c") + bytes_of("55 52 fe ff 02 00 00 00 b6 09 65");
+  EXPECT_TRUE(says(fault_of(*open_uwb(), with_ff_02), "speaks witmotion"));
+  config_.uwb.device.protocol = UwbProtocol::kLinkTrack;
+  EXPECT_TRUE(says(fault_of(*open_uwb(), with_ff_02), "speaks witmotion"));
   EXPECT_TRUE(says(fault_of(*open_uwb(), recorded_file("nlink/nodeframe0_01").bytes),
                    "NodeFrame0, which has no ranges"));
   EXPECT_TRUE(
