@@ -254,25 +254,35 @@ void BlinkTracker::begin(const LightSighting& sighting, Timestamp stamp,
     return;
   }
   LightTrack track = LightTrack::at(sighting, stamp, config_.bearing_sigma_px);
-  resume(track, sighting, stamp);
-  if (track.evidence.score.empty() && !retired_.empty()) {
-    track.evidence = std::move(retired_.back());
-    retired_.pop_back();
-  }
+  if (!resume(track, sighting, stamp)) track.evidence = new_evidence();
   decoder_.observe_lit(track.evidence, sighting.exposed, phases_);
   name(track, stamp, bearings);
   tracks_.push_back(std::move(track));
 }
 
+/// Evidence of nothing, in the memory of a track that has ended, if there is one.
+BlinkEvidence BlinkTracker::new_evidence() {
+  if (retired_.empty()) return {};
+  BlinkEvidence evidence = std::move(retired_.back());
+  retired_.pop_back();
+  return evidence;
+}
+
 /// Continues what was hidden, unless that board is in sight elsewhere. Without a pose its direction
-/// is too uncertain for a name before it is read.
-void BlinkTracker::resume(LightTrack& track, const LightSighting& sighting, Timestamp stamp) {
+/// is too uncertain for a name before it is read. False if nothing was expected here.
+bool BlinkTracker::resume(LightTrack& track, const LightSighting& sighting, Timestamp stamp) {
   auto hidden = hidden_.extract_match(sighting.u_B, stamp, expected_);
-  if (!hidden) return;
+  if (!hidden) return false;
   const ExpectedLight* by_pose = hidden->by_pose;
   const bool is_predictable =
       by_pose != nullptr && is_alone(sighting, by_pose->u_B, by_pose->reach_rad());
-  track.evidence = std::move(hidden->evidence);
+  if (hidden->evidence) {
+    track.evidence = std::move(*hidden->evidence);
+  } else {
+    track.evidence = new_evidence();
+    track.evidence.assigned = by_pose->match;
+    track.evidence.last_lit = by_pose->phase_learned;
+  }
   decoder_.resume(track.evidence, sighting.exposed, hidden->stranger);
   const auto& code = track.evidence.expected;
   const bool is_elsewhere =
@@ -281,6 +291,7 @@ void BlinkTracker::resume(LightTrack& track, const LightSighting& sighting, Time
       });
   if (is_elsewhere) track.evidence.forget();
   if (!is_predictable) track.evidence.predictable_until.reset();
+  return true;
 }
 
 TrackerStatus BlinkTracker::status() const {

@@ -87,7 +87,8 @@ class BlinkTracker {
   void retire(Timestamp stamp);
   void keep_or_forget(LightTrack& track);
   void begin(const LightSighting& sighting, Timestamp stamp, std::vector<Bearing>& bearings);
-  void resume(LightTrack& track, const LightSighting& sighting, Timestamp stamp);
+  [[nodiscard]] BlinkEvidence new_evidence();
+  [[nodiscard]] bool resume(LightTrack& track, const LightSighting& sighting, Timestamp stamp);
 
   VisionConfig config_;
   CameraView view_;

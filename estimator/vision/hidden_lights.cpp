@@ -33,14 +33,6 @@ double density_of(const HiddenLight& light, const Eigen::Vector3d& u_B, Timestam
   return density_at(u_B, expected, sigma_of(light, now));
 }
 
-/// What is known of a board that was read before, but of no light: its code and phase.
-BlinkEvidence evidence_of(const ExpectedLight& light) {
-  BlinkEvidence evidence;
-  evidence.assigned = light.match;
-  evidence.last_lit = light.phase_learned;
-  return evidence;
-}
-
 bool is_of(const HiddenLight& hidden, const ExpectedLight& expected) {
   const BlinkEvidence& evidence = hidden.evidence;
   return (evidence.assigned ? evidence.assigned->code : evidence.expected) == expected.match.code;
@@ -100,9 +92,12 @@ std::optional<HiddenLights::Return> HiddenLights::extract_match(
   if (by_pose != nullptr)
     likeliest = std::ranges::find_if(
         lights_, [&](const HiddenLight& light) { return is_of(light, *by_pose); });
-  Return found{likeliest == lights_.end() ? evidence_of(*by_pose) : std::move(likeliest->evidence),
-               std::max(kLeastStranger, 1.0 - most / sum), by_pose};
-  if (likeliest != lights_.end()) lights_.erase(likeliest);
+  Return found{
+      .evidence = {}, .stranger = std::max(kLeastStranger, 1.0 - most / sum), .by_pose = by_pose};
+  if (likeliest != lights_.end()) {
+    found.evidence = std::move(likeliest->evidence);
+    lights_.erase(likeliest);
+  }
   return found;
 }
 

@@ -35,7 +35,8 @@ class HiddenLights {
 
   /// The evidence of a light that is visible again.
   struct Return {
-    BlinkEvidence evidence;
+    /// Empty: no hidden light, but a board that was read before, by whose pose it is here.
+    std::optional<BlinkEvidence> evidence;
     double stranger = 0.0;  ///< the probability that it is another light
     /// The one of `expected` that is here; null if its own past puts the light here.
     const ExpectedLight* by_pose = nullptr;

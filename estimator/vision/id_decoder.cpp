@@ -142,7 +142,6 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
   if (is_hardly_ours) return;
   evidence.assigned = {best, phase};
   if (evidence.expected != best) evidence.assigned_since = now;
-  evidence.confidence = posterior.probability();
   clear_doubt(evidence, now);
 }
 

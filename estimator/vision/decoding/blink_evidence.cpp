@@ -8,9 +8,10 @@ void BlinkEvidence::forget() {
   score.clear();
   last_lit.reset();
   assigned.reset();
-  confidence = 0.0;
+  assigned_since = {};
   doubt = 0.0;
   obstructed_doubt = 0.0;
+  undoubted_at = {};
   compared_at = {};
   is_foreign = false;
   dark_runs = 0.0;

@@ -27,7 +27,6 @@ struct BlinkEvidence {
   std::optional<Timestamp> last_lit;
   std::optional<CodeMatch> assigned;  ///< the decision; empty while undecided
   Timestamp assigned_since{};         ///< over the times that it was hidden, too
-  double confidence = 0.0;            ///< posterior probability of `assigned` when it was decided
   double doubt = 0.0;  ///< log odds that another board has blinked here since; at least zero
   /// The same if something hides the light in half of the frames, as a propeller does.
   double obstructed_doubt = 0.0;

@@ -10,6 +10,7 @@
 
 #include "estimator/vision/blink_tracker.hpp"
 #include "tests/estimator/vision/blink_tracker_fixture.hpp"
+#include "tests/support/heap.hpp"
 
 namespace crepes::blink_tracker_gaps_test {
 namespace {
@@ -104,6 +105,21 @@ TEST_F(BlinkTrackerTest, NamesABoardWhereAPoseExpectsIt) {
     EXPECT_LE(to_name, has_pose ? 0 : 60);
     EXPECT_GE(to_name, has_pose ? 0 : 10);
   }
+}
+
+TEST_F(BlinkTrackerTest, KeepsNoMoreOfABoardThatComesBackByItsPoseAgainAndAgain) {
+  boards_ = {{0, [](double t) {
+                return std::fmod(t, 5.0) < 1.0 ? Eigen::Vector3d(5.0, 0.0, 0.0)
+                                               : Eigen::Vector3d(-5.0, 0.0, 0.0);
+              }}};
+  std::int64_t before = 0;
+  for (const Timestamp end = now_ + 60s; now_ < end;) {
+    expected_ = {pose_of(0)};
+    (void)step();
+    if (now_ == end - 45s) before = test::heap_bytes();
+  }
+
+  EXPECT_LT(test::heap_bytes() - before, 50'000);
 }
 
 TEST_F(BlinkTrackerTest, DoesNotNameALightWhereThePoseExpectsNone) {

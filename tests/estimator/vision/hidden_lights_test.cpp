@@ -37,7 +37,7 @@ TEST(HiddenLights, AreExpectedWhereTheGyroAndTheirOwnMotionCarryThem) {
   const auto taken = lights.extract_match(carried.normalized(), kHidden + 1s);
 
   ASSERT_TRUE(taken);
-  EXPECT_EQ(taken->evidence.doubt, 7.0);
+  EXPECT_EQ(taken->evidence->doubt, 7.0);
   EXPECT_FALSE(lights.extract_match(carried.normalized(), kHidden + 1s)) << "it is hidden no more";
 }
 
@@ -67,7 +67,7 @@ TEST(HiddenLights, AreNotContinuedWhereTwoAreExpectedAlike) {
       lights.extract_match(Eigen::Vector3d(1.0, 0.15, 0.0).normalized(), kHidden + 1s);
 
   ASSERT_TRUE(nearer);
-  EXPECT_EQ(nearer->evidence.doubt, 1.0);
+  EXPECT_EQ(nearer->evidence->doubt, 1.0);
   EXPECT_GT(nearer->stranger, 0.05) << "for it may be the other";
 }
 

@@ -1,7 +1,6 @@
 #include "net/mesh/clock_offset.hpp"
 
 #include <gtest/gtest.h>
-#include <malloc.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,8 @@
 #include <random>
 #include <utility>
 #include <vector>
+
+#include "tests/support/heap.hpp"
 
 namespace crepes::clock_offset_test {
 namespace {
@@ -323,14 +324,13 @@ TEST(ClockOffset, RefusesPacketsFromTheFarEndsOfTime) {
 
 TEST(ClockOffset, KeepsABoundedNumberOfPackets) {
   ClockOffset clock;
-  const struct mallinfo2 before = ::mallinfo2();
+  const std::int64_t before = test::heap_bytes();
   for (std::int64_t i = 0; i < 100'000; ++i) {
     const Duration at = std::chrono::seconds{100} + std::chrono::microseconds{4 * i};
     (void)clock.add_packet({PeerTimestamp{at}, Timestamp{at + std::chrono::milliseconds{3}}});
   }
-  const struct mallinfo2 after = ::mallinfo2();
 
-  EXPECT_LT(after.uordblks + after.hblkhd, before.uordblks + before.hblkhd + 100'000);
+  EXPECT_LT(test::heap_bytes() - before, 100'000);
   EXPECT_TRUE(clock.fastest_recent_packet());
 }
 

@@ -1,16 +1,18 @@
 #include "net/mesh/mesh_relay.hpp"
 
 #include <gtest/gtest.h>
-#include <malloc.h>
 
 #include <chrono>
 #include <vector>
+
+#include "tests/support/heap.hpp"
 
 namespace crepes::mesh_relay_test {
 namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+using test::heap_bytes;
 
 constexpr RobotId kSelf{1};
 constexpr RobotId kSender{2};
@@ -114,12 +116,6 @@ TEST(MeshRelay, ForwardsAFewDatagramsASecondOfOneSender) {
   }
   EXPECT_GT(forwarded, 5U);
   EXPECT_LT(forwarded, 20U);
-}
-
-/// What is on the heap.
-std::int64_t heap_bytes() {
-  const struct mallinfo2 heap = ::mallinfo2();
-  return static_cast<std::int64_t>(heap.uordblks + heap.hblkhd);
 }
 
 TEST(MeshRelay, StoresNoMoreForAFloodOfCopies) {
