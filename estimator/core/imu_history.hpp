@@ -37,7 +37,8 @@ struct ImuMean {
 /// oldest, and in gaps longer than `kMaxGap`, the next sample is held. Both are extrapolation.
 class ImuHistory {
  public:
-  static constexpr std::size_t kCapacity = 256;
+  /// A second of the fastest IMU (`imu.update_rate`): a filter may be that far behind.
+  static constexpr std::size_t kCapacity = 1024;
   static constexpr Duration kMaxGap = std::chrono::milliseconds{50};
   static constexpr Duration kMaxHold = std::chrono::milliseconds{500};
 

@@ -72,14 +72,19 @@ RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double 
   const E::Vector G = PHt / std::sqrt(predicted + variance);
   const double white = residual / std::sqrt(predicted + variance);
 
-  // Mean and covariance of the mixture (probabilistic data association, Bar-Shalom and Tse 1975).
-  const double weight = is_true * (1.0 - (1.0 - is_true) * white * white);
-
-  const bool is_curved = curved > kMaxCurvature * z.cov_z(0, 0);
-  const E::Vector used = is_curved ? along_line(G, line) : G;
+  // Mean and covariance of the mixture (probabilistic data association, Bar-Shalom and Tse 1975):
+  // with the range P - G G^T, without it P, and both means apart.
+  const double apart = is_true * (1.0 - is_true) * white * white;
+  if (curved <= kMaxCurvature * z.cov_z(0, 0)) {
+    P.subtract_outer((is_true - apart) * G, G);
+    update.correction = is_true * white * G;
+    return update;
+  }
+  const E::Vector used = along_line(G, line);
   const E::Vector unused = G - used;
-  P.subtract_outer(weight * G, G);  // any gain: P - G G^T + (G - used) (G - used)^T
-  if (is_curved) P.subtract_outer(-weight * unused, unused);
+  P.subtract_outer(is_true * G, G);  // any gain: P - G G^T + (G - used) (G - used)^T
+  P.subtract_outer(-is_true * unused, unused);
+  P.subtract_outer(-apart * used, used);
   update.correction = is_true * white * used;
   return update;
 }

@@ -22,7 +22,8 @@ struct Outputs {
 };
 
 /// Receives events in order of their arrival. Its outputs are a function of the events so far: the
-/// same events give the same outputs, to the bit. Late data are reordered within `filters.lag_ms`.
+/// same events give the same outputs, to the bit. Late data are reordered within a lag that
+/// follows their delays.
 class Estimator {
  public:
   /// `settings` must come from a configuration without faults.

@@ -29,7 +29,7 @@ struct EstimatorConfig {
   void visit(Visitor& v) {
     v.choice("profile", profile, kProfiles,
              "tight: fuses every measurement by itself; paper: fuses raw poses");
-    v.field("lag_ms", lag_ms, Bounds{5, 1000},
+    v.field("lag_ms", lag_ms, Bounds{5, 500},
             "the least time to wait for late measurements; the longest is 500; poses do not wait");
     v.field("output_rate_hz", output_rate_hz, Bounds{1, 200}, "poses per second");
     v.field("camera_misalignment_deg", camera_misalignment_deg, Bounds{0, 10},

@@ -254,8 +254,11 @@ bool NeighborTrack::is_contradicted() const {
     return gated.count >= kMinContradicting && gated.since > sighted;
   };
   const GatedRun& ranges = gated_[static_cast<std::size_t>(MeasurementKind::kRange)];
+  const bool are_ranges_contrary =  // old ones say nothing, if no more come
+      (ranges.count >= kMinContradicting || ranges.length() >= kDoubtfulTime) &&
+      stamp() - ranges.latest < kRareRangesTime;
   return is_contrary(MeasurementKind::kBearing) || is_contrary(MeasurementKind::kPeerBearing) ||
-         ranges.count >= kMinContradicting || ranges.length() >= kDoubtfulTime;
+         are_ranges_contrary;
 }
 
 bool NeighborTrack::is_diverged() const {

@@ -35,6 +35,22 @@ std::vector<Reading> drained(std::vector<Reading>& waiting, Timestamp from, Time
   return result;
 }
 
+/// The readings that are newer than their source's before, which are these from then on.
+template <class Reading, class SourceOf, class Source>
+std::vector<Reading> newer(const std::vector<Reading>& readings, const SourceOf& source_of,
+                           std::map<Source, Timestamp>& newest) {
+  std::vector<Reading> news;
+  std::ranges::copy_if(readings, std::back_inserter(news), [&](const Reading& reading) {
+    const auto known = newest.find(source_of(reading));
+    return known == newest.end() || reading.stamp > known->second;
+  });
+  for (const Reading& reading : news) {
+    Timestamp& stamp = newest.try_emplace(source_of(reading), reading.stamp).first->second;
+    stamp = std::max(stamp, reading.stamp);
+  }
+  return news;
+}
+
 TeamMember member_over(const MemberConfig& config, const ImuHistory& imu,
                        const TeamInterval& interval) {
   TeamMember member{config.id, config.p_body_led, config.p_body_uwb, {}};
@@ -63,11 +79,13 @@ void TeamIntake::add_own_report(const Report& report, const SwarmConfig& swarm,
                                 const FilterSettings& settings) {
   Report news;
   news.sender = report.sender;
-  const auto is_new = [&](const auto& reading) { return reading.stamp > own_newest_; };
-  std::ranges::copy_if(report.bearings, std::back_inserter(news.bearings), is_new);
-  std::ranges::copy_if(report.ranges, std::back_inserter(news.ranges), is_new);
-  for (const Bearing& bearing : news.bearings) own_newest_ = std::max(own_newest_, bearing.stamp);
-  for (const UwbRange& range : news.ranges) own_newest_ = std::max(own_newest_, range.stamp);
+  const auto camera_of = [](const Bearing& bearing) {
+    const Eigen::Vector3d& p = bearing.p_B_C;
+    return std::pair(bearing.neighbor, CameraPlace{p.x(), p.y(), p.z()});
+  };
+  news.bearings = newer(report.bearings, camera_of, newest_own_bearing_);
+  news.ranges = newer(
+      report.ranges, [](const UwbRange& range) { return range.neighbor; }, newest_own_range_);
   add_report(news, 0.0, swarm, settings);
 }
 

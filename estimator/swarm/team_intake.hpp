@@ -1,6 +1,7 @@
 /// Collects what everybody measured for the team's filter.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <optional>
@@ -27,7 +28,8 @@ class TeamIntake {
   /// Measurements of robots that are no members are ignored.
   void add_report(const Report& report, double turn_sigma_rad, const SwarmConfig& swarm,
                   const FilterSettings& settings);
-  /// This robot's report, which repeats measurements.
+  /// This robot's report, which repeats measurements. A source's measurements come in order; those
+  /// of another may be later by a camera's delay.
   void add_own_report(const Report& report, const SwarmConfig& swarm,
                       const FilterSettings& settings);
 
@@ -39,13 +41,16 @@ class TeamIntake {
                                                   const ImuOf& imu_of);
 
  private:
+  using CameraPlace = std::array<double, 3>;  ///< in the body: by it, reports name a camera
+
   void record_delay(Timestamp stamp);
   void add_range(RobotId observer, const UwbRange& range, const FilterSettings& settings);
 
   std::vector<TeamBearing> bearings_;
   std::vector<TeamRange> ranges_;
   std::map<std::pair<RobotId, RobotId>, RangeScreen> screens_;
-  Timestamp own_newest_ = kNever;
+  std::map<RobotId, Timestamp> newest_own_range_;  ///< by neighbor
+  std::map<std::pair<RobotId, CameraPlace>, Timestamp> newest_own_bearing_;
   Timestamp last_ = kNever;
   AdaptiveLag lag_{Duration::zero()};
   Timestamp now_ = kNever;  ///< of the last interval

@@ -217,12 +217,12 @@ bool TeamFilter::correct(const TeamInterval& interval, Stage stage, TeamReadings
       robots = belief_.robots;
       ranges = belief_.ranges;
     }
-    const std::vector<TeamRow> rows = linearized(interval, paths, instant, belief_, readings);
+    const Eigen::VectorXd dy = instant.image_of(dx);
+    const std::vector<TeamRow> rows = linearized(interval, paths, instant, belief_, readings, dy);
     belief_.robots = robots;
     belief_.ranges = ranges;
     if (rows.empty()) return true;  // the last step may have made all ranges unlikely
-    const TeamUpdate update(rows, instant.image_of(dx), instant.covariance(),
-                            instant.with_belief());
+    const TeamUpdate update(rows, dy, instant.covariance(), instant.with_belief());
     if (!update.is_valid()) return false;
     Eigen::VectorXd next = update.correction();
     for (Eigen::Index i = 0; i < next.size(); ++i)

@@ -106,6 +106,7 @@ Fit solve(ceres::Problem& problem, std::array<double, N>& x) {
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   Fit fit{.chi2 = 2.0 * summary.final_cost, .residuals = problem.NumResiduals(), .sigmas = {}};
+  if (!summary.IsSolutionUsable()) return fit;
 
   ceres::Covariance::Options exact;
   exact.algorithm_type = ceres::DENSE_SVD;

@@ -31,20 +31,29 @@ std::optional<TeamRow> mean_of(const ReadingScene& scene, const Sight& sight) {
 
 /// The mean range of a pair may be false although the gate accepts it. Mean and variance become
 /// those of the mixture of both cases (probabilistic data association, Bar-Shalom and Tse 1975).
-/// `S` is the innovation's variance. Returns false if the range is more likely false than true.
-bool associate(double S, TeamRow& row) {
-  const double residual = row.residual.x();
-  const double nis = residual * residual / S;
+/// `S` is the innovation's variance, `moved` how far the range was moved since it was predicted.
+/// Returns false if the range is more likely false than true.
+bool associate(double S, double moved, TeamRow& row) {
+  const double innovation = row.residual.x() + moved;
+  const double nis = innovation * innovation / S;
   const double density = std::exp(-0.5 * nis) / std::sqrt(2.0 * std::numbers::pi * S);
   const double is_true = density / (density + kFalseRangeDensity);
   const double weight = is_true * (1.0 - (1.0 - is_true) * nis);
   if (is_true < 0.5 || weight <= 0.0) return false;
   row.variance += S / weight - S;
-  row.residual.x() *= is_true / weight;
+  row.residual.x() = innovation * is_true / weight - moved;
   return true;
 }
 
-std::optional<TeamRow> mean_of(const ReadingScene& scene, const Ranging& ranging) {
+double image_of(const Eigen::VectorXd& dy, const TeamRow& row) {
+  double image = 0.0;
+  for (int a = 0; a < row.size; ++a)
+    image += row.H(0, a) * dy(row.columns[static_cast<std::size_t>(a)]);
+  return image;
+}
+
+std::optional<TeamRow> mean_of(const ReadingScene& scene, const Ranging& ranging,
+                               const Eigen::VectorXd& dy) {
   const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
   const TeamRangeBias& bias = scene.belief.ranges.at(ordered(ranging.observer, ranging.neighbor));
   const Eigen::Matrix3d covariance =
@@ -62,7 +71,8 @@ std::optional<TeamRow> mean_of(const ReadingScene& scene, const Ranging& ranging
   }
   if (!mean) return std::nullopt;
   mean->residual.x() = sum_m / count;
-  if (!associate(mean->covariance(scene.instant.covariance())(0, 0), *mean)) return std::nullopt;
+  const double S = mean->covariance(scene.instant.covariance())(0, 0);
+  if (!associate(S, image_of(dy, *mean), *mean)) return std::nullopt;
   return mean;
 }
 
@@ -70,7 +80,7 @@ std::optional<TeamRow> mean_of(const ReadingScene& scene, const Ranging& ranging
 
 std::vector<TeamRow> linearized(const TeamInterval& interval, const TeamTrajectories& paths,
                                 const TeamInstant& instant, const TeamBelief& belief,
-                                const TeamReadings& readings) {
+                                const TeamReadings& readings, const Eigen::VectorXd& dy) {
   const ReadingScene scene{interval, paths, instant, belief};
   std::vector<TeamRow> rows;
   rows.reserve(readings.sights.size() + readings.rangings.size());
@@ -78,7 +88,7 @@ std::vector<TeamRow> linearized(const TeamInterval& interval, const TeamTrajecto
     if (row) rows.push_back(*row);
   };
   for (const Sight& sight : readings.sights) add(mean_of(scene, sight));
-  for (const Ranging& ranging : readings.rangings) add(mean_of(scene, ranging));
+  for (const Ranging& ranging : readings.rangings) add(mean_of(scene, ranging, dy));
   return rows;
 }
 

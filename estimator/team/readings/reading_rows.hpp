@@ -11,10 +11,12 @@
 namespace crepes {
 
 /// One row a sight and one a pair's ranges: the mean of what was not gated. Ranges that are more
-/// likely false than true have none.
+/// likely false than true have none. `dy` is what the belief was moved by since it was predicted,
+/// as the instant's states have it: whether a range is true is judged by its innovation.
 [[nodiscard]] std::vector<TeamRow> linearized(const TeamInterval& interval,
                                               const TeamTrajectories& paths,
                                               const TeamInstant& instant, const TeamBelief& belief,
-                                              const TeamReadings& readings);
+                                              const TeamReadings& readings,
+                                              const Eigen::VectorXd& dy);
 
 }  // namespace crepes

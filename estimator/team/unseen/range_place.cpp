@@ -28,7 +28,7 @@ bool is_certain(const TeamPlace& place) {
 
 /// False if the other place is not near this one.
 bool contain(const TeamPlace& other, TeamPlace& place) {
-  const Vector6d d = pose_difference(other.T_S_N, place.T_S_N);
+  const Vector6d d = pose_difference(place.T_S_N, other.T_S_N);
   if (d.head<3>().norm() > kNear || d.tail<3>().norm() > kNearAttitude) return false;
   Eigen::Matrix<double, FreeMotionAt::kMotion, 1> step;
   step << d.head<3>(), other.v_S_N - place.v_S_N, d.tail<3>();

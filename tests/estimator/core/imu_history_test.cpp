@@ -92,14 +92,15 @@ TEST(ImuHistory, KeepsTheNewestDistinctStampsInOrderHoweverTheyArrive) {
 }
 
 TEST(ImuHistory, ForgetsTheOldestBeyondItsCapacityAndRefusesWhatIsOlder) {
+  constexpr int kForgotten = 44;
+  constexpr int kSamples = static_cast<int>(ImuHistory::kCapacity) + kForgotten;
   ImuHistory imu;
-  for (int i = 0; i < 300; ++i) ASSERT_TRUE(imu.push(sample_at(i * 10ms)));
+  for (int i = 0; i < kSamples; ++i) ASSERT_TRUE(imu.push(sample_at(i * 10ms)));
 
   EXPECT_EQ(imu.size(), ImuHistory::kCapacity);
-  EXPECT_EQ(imu[0].stamp, Timestamp{440ms});
-  EXPECT_FALSE(imu.push(sample_at(435ms)));
-  EXPECT_TRUE(imu.push(sample_at(445ms)));
-  EXPECT_EQ(stamps_of(imu).front(), 445'000'000);
+  EXPECT_FALSE(imu.push(sample_at(kForgotten * 10ms - 5ms)));
+  EXPECT_TRUE(imu.push(sample_at(kForgotten * 10ms + 5ms)));
+  EXPECT_EQ(stamps_of(imu).front(), Duration{kForgotten * 10ms + 5ms}.count());
 }
 
 TEST(ImuHistory, RefusesDuplicatesAndWhatIsNotFinite) {
@@ -236,6 +237,14 @@ TEST(ImuHistory, ReadsTheWhiteNoiseOffTheSamples) {
   // sigma of a sample times the root of its period; 50 effective samples of three axes: 10 %.
   EXPECT_NEAR(mean.gyro_noise_density / (0.01 * 0.1), 1.0, 0.3);
   EXPECT_NEAR(mean.accel_noise_density / (0.3 * 0.1), 1.0, 0.3);
+}
+
+TEST(ImuHistory, KeepsASecondOfTheFastestImu) {
+  ImuHistory imu;
+  for (int ms = 0; ms <= 3000; ++ms) imu.push({.stamp = Timestamp{std::chrono::milliseconds{ms}}});
+
+  const Timestamp newest = imu.newest().stamp;
+  EXPECT_EQ(imu.extrapolated(newest - std::chrono::seconds{1}, newest), Duration{});
 }
 
 }  // namespace

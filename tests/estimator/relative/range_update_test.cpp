@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 
@@ -100,6 +101,23 @@ TEST(RangeUpdate, OneRangeThatMayBeFalseDoesNotSettleTheDistance) {
   EXPECT_GT(3.0 * scene.sigma(0), scene.state.motion.T_B_N.p.x() - 5.0);
   for (int i = 0; i < 10; ++i) scene.fuse(5.0);
   EXPECT_NEAR(scene.state.motion.T_B_N.p.x(), 5.0, 0.05);
+}
+
+TEST(RangeUpdate, LeavesACovarianceWhereDirectionAndDistanceAreOpenTogether) {
+  for (const double across : {0.5, 1.0, 2.0}) {
+    for (const double along : {0.3, 0.6, 1.0}) {
+      for (double off = 0.2; off < 3.0; off += 0.1) {
+        Scene scene(along, across);
+        scene.P.diagonal().tail(E::kSize - 3).setConstant(1e-4);
+        auto position = scene.P.seen().topLeftCorner<3, 3>();
+        position(0, 1) = position(1, 0) = 0.9 * along * across;
+        scene.fuse(5.0 + off);
+
+        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(scene.P.full());
+        ASSERT_GT(parts.eigenvalues()(0), 0.0) << across << ' ' << along << ' ' << off;
+      }
+    }
+  }
 }
 
 }  // namespace

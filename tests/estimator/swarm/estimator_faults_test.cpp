@@ -281,6 +281,23 @@ TEST(EstimatorFaults, RangesThroughWallsAreRefusedAndDoNoHarm) {
   EXPECT_LT(trials.during.worst_m, 0.25);
 }
 
+TEST(EstimatorFaults, SomeFalseRangesDoNotWithholdThePoseForEverIfNoMoreCome) {
+  EstimatorPair pair(3);
+  pair.run_for(kWarmUp);
+  Conditions late;
+  late.range = [](UwbRange& range) { range.range_m += 1.0; };
+  pair.run_for(120ms, late);
+  Conditions silent;
+  silent.has_ranges = false;
+
+  pair.run_for(1s, silent);
+  EXPECT_EQ(pair.latest(), nullptr) << "either may be wrong";
+  pair.run_for(3s, silent);
+
+  ASSERT_NE(pair.latest(), nullptr);
+  EXPECT_LT(pair.latest()->nees, 22.46);
+}
+
 TEST(EstimatorFaults, BehindAPillarMostRangesTellAndTheOthersDoNoHarm) {
   const Trials trials([](EstimatorPair& pair, std::uint64_t seed) {
     RandomGeometry random(seed);

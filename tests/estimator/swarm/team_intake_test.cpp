@@ -121,6 +121,24 @@ TEST_F(Intake, OwnReportsThatRepeatCountOnce) {
   EXPECT_EQ(drain(400 + lag)->bearings.size(), 2U);
 }
 
+TEST_F(Intake, OwnBearingsCountThoughTheCameraIsSlowerThanTheRanges) {
+  const int lag = lag_ms(settings_);
+  Report report;
+  report.sender = kOwn;
+  report.ranges.push_back({.stamp = at_ms(150), .neighbor = kPeer, .range_m = 4.0});
+  report.bearings.push_back({.stamp = at_ms(130), .neighbor = kPeer, .sigma_rad = 1e-3});
+  intake_.add_own_report(report, swarm_, settings_);
+  report.bearings.push_back({.stamp = at_ms(140), .neighbor = kPeer, .sigma_rad = 1e-3});
+  report.bearings.push_back(
+      {.stamp = at_ms(120), .neighbor = kPeer, .p_B_C = {0.0, 0.0, 0.1}, .sigma_rad = 1e-3});
+  intake_.add_own_report(report, swarm_, settings_);
+
+  const auto interval = drain(400 + lag);
+
+  EXPECT_EQ(interval->bearings.size(), 3U);
+  EXPECT_EQ(interval->ranges.size(), 1U);
+}
+
 TEST_F(Intake, ARobotWithoutImuIsNoMember) {
   const int lag = lag_ms(settings_);
   EXPECT_EQ(drain(400 + lag)->members.size(), 2U);

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
+#include "estimator/team/readings/reading_rows.hpp"
 #include "tests/support/simulated_belief.hpp"
 
 namespace crepes::team_readings_test {
@@ -95,6 +98,38 @@ TEST_F(TeamReadingsTest, AnImageAloneIsRefusedAndSpeaksAgainstTheCamera) {
   mirror(false);
   EXPECT_TRUE(gated(kKnown).empty());
   EXPECT_EQ(agreement().gated, 4.0);
+}
+
+TEST(TeamRows, ARangeIsAsLikelyToBeTrueInEveryIteration) {
+  SimulatedTeam team(7, 4);
+  const test::TrueMotions before = test::motions_of(team);
+  TeamInterval interval = team.next();
+  interval.bearings.clear();
+  std::erase_if(interval.ranges, [](const TeamRange& range) {
+    return range.observer != test::kSelf || range.neighbor != kNeighbor;
+  });
+  for (TeamRange& range : interval.ranges) range.reading.range_m += 0.35;
+  TeamBelief belief = test::true_belief(before, interval);
+  const int place = belief.robots.at(kNeighbor).motion_index;
+  const Eigen::Vector3d line = belief.robots.at(kNeighbor).motion.p_F.normalized();
+  belief.P.block<3, 3>(place, place) += 0.04 * line * line.transpose();
+  const TeamReadings readings = TeamReadings::of(interval, belief, TeamReadings::Stage::kTrusted);
+  const auto row_after = [&](double step_m) {
+    TeamBelief moved = belief;
+    Eigen::VectorXd dx = Eigen::VectorXd::Zero(belief.P.rows());
+    dx.segment<3>(place) = step_m * line;
+    moved.inject(dx);
+    const TeamTrajectories paths = moved.trajectories(interval);
+    const TeamInstant instant(moved, paths, readings.time_s(interval));
+    return linearized(interval, paths, instant, moved, readings, instant.image_of(dx)).at(0);
+  };
+
+  const TeamRow first = row_after(0.0);
+  const TeamRow second = row_after(0.3);
+
+  EXPECT_GT(first.residual.x(), 0.35) << "it may be false, so that its variance is larger";
+  EXPECT_NEAR(second.variance, first.variance, 0.02 * first.variance);
+  EXPECT_NEAR(second.residual.x() + 0.3, first.residual.x(), 0.02);
 }
 
 }  // namespace
