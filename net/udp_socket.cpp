@@ -96,6 +96,23 @@ struct FreeInterfaces {
   void operator()(ifaddrs* list) const { ::freeifaddrs(list); }
 };
 
+in_addr_t ipv4_of(const sockaddr* address) {
+  sockaddr_in ipv4{};
+  std::memcpy(&ipv4, address, sizeof(ipv4));
+  return ipv4.sin_addr.s_addr;
+}
+
+/// An address that was given without a broadcast address (`ip address add` without `brd`) has its
+/// own there; all hosts of its network are reached all the same.
+std::optional<in_addr_t> broadcast_of(const ifaddrs& entry) {
+  if ((entry.ifa_flags & IFF_BROADCAST) == 0 || entry.ifa_netmask == nullptr) return std::nullopt;
+  const in_addr_t own = ipv4_of(entry.ifa_addr);
+  const in_addr_t of_network = own | ~ipv4_of(entry.ifa_netmask);
+  if (of_network == own) return std::nullopt;  // a network of one host
+  const in_addr_t given = entry.ifa_broadaddr == nullptr ? 0 : ipv4_of(entry.ifa_broadaddr);
+  return given == 0 || given == own ? of_network : given;
+}
+
 Result<Endpoint> broadcast_address(const std::string& interface, std::uint16_t port) {
   ifaddrs* list = nullptr;
   if (::getifaddrs(&list) != 0) return fail_errno("interfaces", errno);
@@ -109,15 +126,12 @@ Result<Endpoint> broadcast_address(const std::string& interface, std::uint16_t p
     if ((entry->ifa_flags & IFF_UP) == 0)
       return fail(ErrorCode::kIo, fmt::format("{}: interface is down; see `ip link`", interface));
     if ((entry->ifa_flags & IFF_LOOPBACK) != 0) return Endpoint::ipv4({127, 255, 255, 255}, port);
-    if ((entry->ifa_flags & IFF_BROADCAST) == 0 || entry->ifa_broadaddr == nullptr) {
+    const std::optional<in_addr_t> broadcast = broadcast_of(*entry);
+    if (!broadcast) {
       return fail(ErrorCode::kIo,
                   fmt::format("{}: interface cannot broadcast; name another", interface));
     }
-    sockaddr_storage storage{};
-    std::memcpy(&storage, entry->ifa_broadaddr, sizeof(sockaddr_in));
-    Endpoint endpoint = to_endpoint(storage);
-    endpoint.port = port;
-    return endpoint;
+    return Endpoint::ipv4(std::bit_cast<std::array<std::uint8_t, 4>>(*broadcast), port);
   }
   if (!exists) {
     return fail(ErrorCode::kNotFound,
@@ -143,9 +157,11 @@ Result<UdpSocket> UdpSocket::open(const Endpoint& address, std::string name, boo
   // As large as the kernel allows, twice its default: it holds a burst while the thread is busy.
   constexpr int kBuffer = 1 << 20;
   (void)::setsockopt(socket.fd_.get(), SOL_SOCKET, SO_RCVBUF, &kBuffer, sizeof(kBuffer));
+  // Without its interface, nothing may leave by a gateway, unnoticed.
   const bool ready =
       (!broadcast || (set_option(socket.fd_.get(), SOL_SOCKET, SO_REUSEADDR) == 0 &&
-                      set_option(socket.fd_.get(), SOL_SOCKET, SO_BROADCAST) == 0)) &&
+                      set_option(socket.fd_.get(), SOL_SOCKET, SO_BROADCAST) == 0 &&
+                      set_option(socket.fd_.get(), SOL_SOCKET, SO_DONTROUTE) == 0)) &&
       (family == AF_INET || set_option(socket.fd_.get(), IPPROTO_IPV6, IPV6_V6ONLY) == 0) &&
       with_sockaddr(address, [&](const sockaddr* to, socklen_t length) {
         return ::bind(socket.fd_.get(), to, length) == 0;
@@ -162,10 +178,16 @@ Result<UdpSocket> UdpSocket::open(const Endpoint& address, std::string name, boo
 }
 
 Result<UdpSocket> UdpSocket::open_broadcast(const std::string& interface, std::uint16_t port) {
-  // A socket bound to the broadcast address receives nothing else, and on this interface only.
-  return broadcast_address(interface, port).and_then([&](const Endpoint& address) {
+  // A socket bound to the broadcast address receives nothing else. If the system allows it, also
+  // nothing that comes to that address by another interface.
+  auto socket = broadcast_address(interface, port).and_then([&](const Endpoint& address) {
     return open(address, fmt::format("{} ({})", interface, address.to_string()), true);
   });
+  if (socket) {
+    (void)::setsockopt(socket->fd_.get(), SOL_SOCKET, SO_BINDTODEVICE, interface.c_str(),
+                       static_cast<socklen_t>(interface.size()));
+  }
+  return socket;
 }
 
 Result<UdpSocket> UdpSocket::bind(const std::string& address, std::uint16_t port) {

@@ -69,7 +69,7 @@ std::optional<PeerSessions::Accepted> PeerSessions::accept(const PeerMessage& me
   Session* const session = accepted_by(peer, message, arrival, from);
   if (session == nullptr) return std::nullopt;
   const bool is_live = peer.live && session == &*peer.live;
-  if (is_live || !peer.live) record_reachability(message, arrival, from);
+  if (is_live) record_reachability(message, arrival, from);
   return Accepted{session, is_live};
 }
 

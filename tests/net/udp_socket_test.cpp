@@ -116,15 +116,44 @@ TEST(UdpSocket, ReportsWhatItCannotSend) {
   EXPECT_EQ(sent.error().code, ErrorCode::kIo);
 }
 
+/// Runs the commands in a network of the calling thread's own.
+bool have_network(const std::string& commands) {
+  return ::unshare(CLONE_NEWNET) == 0 &&
+         std::system(commands.c_str()) == 0;  // NOLINT(concurrency-mt-unsafe)
+}
+
+// The mesh's interface and another one, by which everything else goes.
+TEST(UdpSocket, ReachesTheNetworkOfItsInterfaceAndNothingElse) {
+  bool is_permitted = false;
+  std::thread([&] {
+    is_permitted = have_network(
+        "ip link add mesh0 type veth peer mesh1 && ip link add up0 type veth peer up1 && "
+        "ip address add 10.9.0.1/24 dev mesh0 && ip address add 192.168.50.1/24 dev up0 && "
+        "ip link set mesh1 up && ip link set up1 up && "
+        "ip link set mesh0 up && ip link set up0 up && ip route add default via 192.168.50.2");
+    if (!is_permitted) return;
+    auto socket = UdpSocket::open_broadcast("mesh0", some_port());
+    ASSERT_TRUE(socket) << socket.error().message;
+    EXPECT_EQ(socket->local().to_string(), "10.9.0.255:" + std::to_string(socket->local().port))
+        << "though the address was given without a broadcast address";
+    EXPECT_TRUE(socket->broadcast(std::vector<std::uint8_t>(10)));
+
+    ASSERT_EQ(std::system("ip link delete mesh0"), 0);  // NOLINT(concurrency-mt-unsafe)
+    const auto sent = socket->broadcast(std::vector<std::uint8_t>(10));
+    ASSERT_FALSE(sent);
+    EXPECT_NE(sent.error().code, ErrorCode::kBusy);
+  }).join();
+  if (!is_permitted) GTEST_SKIP() << "needs root and ip(8) for a network of its own";
+}
+
 // On a link of its own that passes a kilobyte a second.
 TEST(UdpSocket, DistinguishesACongestedLinkFromABrokenOne) {
   bool is_permitted = false;
   std::optional<Error> refusal;
   std::thread([&] {
-    is_permitted = ::unshare(CLONE_NEWNET) == 0 &&
-                   std::system(
-                       "ip link set lo up && "  // NOLINT(concurrency-mt-unsafe)
-                       "tc qdisc add dev lo root tbf rate 8kbit burst 3000 limit 9999999") == 0;
+    is_permitted = have_network(
+        "ip link set lo up && "
+        "tc qdisc add dev lo root tbf rate 8kbit burst 3000 limit 9999999");
     if (!is_permitted) return;
     auto socket = UdpSocket::open_broadcast("lo", some_port());
     ASSERT_TRUE(socket);
