@@ -150,7 +150,7 @@ void Runtime::start_sensor(const std::string& name, const SensorSource& source) 
   });
 }
 
-/// Creates simulated devices; the readers open their ports instead of the configured ones. The
+/// Creates simulated devices; the readers open their ports and never the configured ones. The
 /// simulated IMU is a WitMotion without errors, aligned with the body.
 void Runtime::open_simulation() {
   config_.imu.device.protocol = ImuProtocol::kWitMotion;
@@ -159,6 +159,7 @@ void Runtime::open_simulation() {
   config_.imu.device.gyroscope = {};
   world_.emplace(config_.sim);
   const auto connect = [this](Result<SimSerial> device, std::string& port) {
+    port.clear();
     if (!device) return log_message(LogLevel::kError, "simulation: " + device.error().message);
     port = device->path();
     sim_devices_.push_back(std::move(*device));

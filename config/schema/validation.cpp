@@ -257,7 +257,8 @@ void check_listen(const std::vector<std::string>& listen, RuleFaults& faults) {
   for (const std::string& address : listen) {
     const auto endpoint = Endpoint::parse(address, 1);
     const bool is_any = address == "0.0.0.0" || address == "::";
-    const auto refuse = [&](const char* reason) {
+    const std::string any = endpoint && endpoint->is_ipv4() ? "0.0.0.0" : "::";
+    const auto refuse = [&](const std::string& reason) {
       faults.push_back({"subscription.listen", fmt::format("\"{}\" {}", address, reason)});
     };
     if (!endpoint) {
@@ -266,6 +267,8 @@ void check_listen(const std::vector<std::string>& listen, RuleFaults& faults) {
       refuse("is no host's address");
     } else if (!known.insert(*endpoint).second) {
       refuse("is listed twice");
+    } else if (!is_any && std::ranges::count(listen, any) > 0) {
+      refuse(fmt::format("is contained in \"{}\": name one of them", any));
     }
   }
 }

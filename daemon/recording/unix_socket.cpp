@@ -32,6 +32,12 @@ Result<UniqueFd> open_with(const std::string& path, int flags, Call call) {
   return fd;
 }
 
+/// A symbolic link is none.
+bool is_socket(const std::string& path) {
+  struct stat found {};
+  return ::lstat(path.c_str(), &found) == 0 && S_ISSOCK(found.st_mode);
+}
+
 }  // namespace
 
 Result<UniqueFd> connect_unix(const std::string& path) { return open_with(path, 0, ::connect); }
@@ -39,6 +45,7 @@ Result<UniqueFd> connect_unix(const std::string& path) { return open_with(path, 
 Result<UniqueFd> listen_unix(const std::string& path) {
   Result<UniqueFd> socket = open_with(path, SOCK_NONBLOCK, ::bind);
   if (!socket && errno == EADDRINUSE) {
+    if (!is_socket(path)) return fail(ErrorCode::kConfig, path + ": is there and is no socket");
     if (connect_unix(path)) return fail(ErrorCode::kIo, path + ": another daemon listens there");
     if (errno != ECONNREFUSED || ::unlink(path.c_str()) != 0) return failure(path);
     socket = open_with(path, SOCK_NONBLOCK, ::bind);

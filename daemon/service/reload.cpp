@@ -24,7 +24,9 @@ void refuse(const Error& error, Runtime& runtime) {
 }
 
 /// The mesh that is wanted is claimed before, and the old one released after the change.
-Result<ConfigChange> reconfigure(const Config& wanted, Runtime& runtime, RobotLock& lock) {
+Result<ConfigChange> reconfigure(const CheckedConfig& checked, Runtime& runtime, RobotLock& lock) {
+  if (!checked.faults.empty()) return fail(ErrorCode::kConfig, to_string(checked.faults));
+  const Config& wanted = checked.config;
   auto moved = lock.moved_to(wanted.net.interface, wanted.net.port);
   if (!moved) return tl::unexpected(moved.error());
   auto change = runtime.reconfigure(wanted);
@@ -36,12 +38,14 @@ Result<ConfigChange> reconfigure(const Config& wanted, Runtime& runtime, RobotLo
 
 void reload(const std::string& file, Runtime& runtime, RobotLock& lock, const Clock& machine) {
   Watchdog::notify_reloading(machine.now());
-  const auto change = load_config(file).and_then(
-      [&](const Config& wanted) { return reconfigure(wanted, runtime, lock); });
+  const CheckedConfig checked = check_config(file);
+  const auto change = reconfigure(checked, runtime, lock);
   if (!change) {
     refuse(change.error(), runtime);
   } else {
     set_log_level(change->config.log.level);
+    for (const ConfigFault& doubt : checked.warnings)
+      log_message(LogLevel::kWarning, to_string(doubt));
     log_message(LogLevel::kInfo, change->live.empty()
                                      ? "reloaded: nothing has changed that can change live"
                                      : "reloaded: " + joined(change->live));

@@ -9,10 +9,10 @@
 
 namespace crepes {
 
-/// Applies the live changes in `file`. Reports the changes that need a restart in the log and in
-/// STATUS. A faulty file changes nothing, and all its faults are logged. `lock` follows to another
-/// mesh; one on which a daemon has the robot's id is refused. `machine` is the clock whose time
-/// systemd expects.
+/// Applies the live changes in `file` and logs its warnings. Reports the changes that need a
+/// restart in the log and in STATUS. A faulty file changes nothing, and all its faults are logged.
+/// `lock` follows to another mesh; one on which a daemon has the robot's id is refused. `machine`
+/// is the clock whose time systemd expects.
 void reload(const std::string& file, Runtime& runtime, RobotLock& lock, const Clock& machine);
 
 }  // namespace crepes

@@ -19,11 +19,18 @@ UdpSocket* MeshSocket::get(Timestamp now) {
     close_for_retry(opened.error(), now);
     return nullptr;
   }
-  if (!fault_.empty()) log_message(LogLevel::kInfo, "mesh: works again");
-  fault_.clear();
-  retry_ = kFirstRetry;
+  // Only a broadcast shows that a socket can be used again. Other faults end here, because a robot
+  // without a tilt sends nothing.
+  if (!failed_in_use_) end_fault();
   socket_ = std::move(*opened);
   return &*socket_;
+}
+
+void MeshSocket::end_fault() {
+  if (fault_.empty()) return;
+  log_message(LogLevel::kInfo, "mesh: works again");
+  fault_.clear();
+  retry_ = kFirstRetry;
 }
 
 Result<UdpSocket> MeshSocket::open() {
@@ -31,9 +38,11 @@ Result<UdpSocket> MeshSocket::open() {
   if (!keys) return tl::unexpected(keys.error());
   auto socket =
       UdpSocket::open_broadcast(config_.interface, static_cast<std::uint16_t>(config_.port));
-  if (socket && !keys->empty()) log_message(LogLevel::kInfo, "mesh: " + *keys);
-  if (socket && keys_may_be_swapped())
+  if (!socket || *keys == logged_keys_) return socket;
+  log_message(LogLevel::kInfo, "mesh: " + *keys);
+  if (keys_may_be_swapped())
     log_message(LogLevel::kWarning, fmt::format("mesh: {}", kKeysUnlocked));
+  logged_keys_ = *keys;
   return socket;
 }
 
@@ -57,6 +66,7 @@ Result<std::string> MeshSocket::read_keys() {
 
 void MeshSocket::close_for_retry(const Error& error, Timestamp now) {
   constexpr Duration kLastRetry = std::chrono::seconds{5};
+  failed_in_use_ = socket_.has_value();
   socket_.reset();
   if (error.message != fault_) log_message(LogLevel::kWarning, "mesh: " + error.message);
   fault_ = error.message;

@@ -28,10 +28,13 @@ class MeshSocket {
  public:
   explicit MeshSocket(NetConfig config) : config_(std::move(config)) {}
 
-  /// Null while it cannot be opened. It is opened again after 0.1 s; the delay grows to 5 s.
+  /// Null while it cannot be opened. It is opened again after 0.1 s; the delay grows to 5 s, also
+  /// while it opens but cannot be used.
   [[nodiscard]] UdpSocket* get(Timestamp now);
   /// Closes the socket after an error and schedules the next attempt.
   void close_for_retry(const Error& error, Timestamp now);
+  /// Call it after a successful broadcast.
+  void end_fault();
 
   [[nodiscard]] const std::optional<PacketSeal>& seal() const { return seal_; }
   [[nodiscard]] const std::optional<PacketSigner>& signer() const { return signer_; }
@@ -57,6 +60,8 @@ class MeshSocket {
   std::string fault_;
   Timestamp retry_at_{};
   Duration retry_ = kFirstRetry;
+  bool failed_in_use_ = false;  ///< the current fault is one of an open socket
+  std::string logged_keys_;
 };
 
 /// Detects that datagrams arrive but none of them is believed.

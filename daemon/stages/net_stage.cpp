@@ -107,6 +107,7 @@ class NetLoop {
   void every_second() {
     next_second_ = clock_.now() + std::chrono::seconds{1};
     key_monitor_.update(link_);
+    server_->open_missing();
     const AirTotals before = std::exchange(air_totals_, link_.air_totals(clock_.now()));
     air_ = air_share(before, air_totals_, settings_.send.broadcasts);
     notify_service();
@@ -137,7 +138,6 @@ class NetLoop {
     server_.reset();
     server_.emplace(settings_.self, settings_.members, settings_.subscription,
                     [this] { return status(); });
-    for (const std::string& fault : server_->faults()) log_message(LogLevel::kWarning, fault);
   }
 
   void wait() {
@@ -194,7 +194,7 @@ class NetLoop {
     UdpSocket* socket = mesh_.get(now);
     if (socket == nullptr) return;
     const Result<void> sent = socket->broadcast(datagram);
-    if (sent) return;
+    if (sent) return mesh_.end_fault();
     ++unsent_;
     // A congested mesh is no reason to close the socket, which may hold datagrams to be read.
     if (sent.error().code != ErrorCode::kBusy) mesh_.close_for_retry(sent.error(), now);
@@ -213,6 +213,8 @@ class NetLoop {
     status.config_age_s = to_seconds(status.stamp - config_status_.since);
     for (const auto& [name, sensor] : sensors_) status.sensors.push_back(sensor);
     status.sensors.push_back({"mesh", 0.0, mesh_fault().empty(), mesh_fault(), {}});
+    if (!server_->fault().empty())
+      status.sensors.push_back({"subscription", 0.0, false, server_->fault(), {}});
     status.estimator = estimator_;
     status.clocks = link_.clocks();
     status.traffic = link_.traffic(status.stamp);

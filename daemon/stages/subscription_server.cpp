@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "daemon/service/logging.hpp"
 #include "daemon/version.hpp"
 #include "net/subscription/subscription_json.hpp"
 
@@ -27,26 +28,66 @@ HashKey random_key() {
   return key;
 }
 
+void append(std::string& faults, const std::string& fault) {
+  if (!faults.empty() && !fault.empty()) faults += "; ";
+  faults += fault;
+}
+
+/// Where there is no IPv6, nobody can ask at ::1, which is served by default.
+bool is_without_clients(const std::string& address) {
+  return address == "::1" && !UdpSocket::bind(address, 0);
+}
+
 }  // namespace
 
 SubscriptionServer::SubscriptionServer(RobotId self, const std::map<RobotId, std::string>& names,
                                        const SubscriptionConfig& config,
                                        SubscriptionService::StatusSource status)
-    : self_(self), service_(config, std::string(kVersion), std::move(status), random_key()) {
-  for (const std::string& address : config.listen) {
-    Result<UdpSocket> socket = UdpSocket::bind(address, static_cast<std::uint16_t>(config.port));
-    if (socket) {
-      sockets_.push_back(std::move(*socket));
-    } else {
-      faults_.push_back("subscription: " + socket.error().message);
-    }
-  }
+    : self_(self),
+      service_(config, std::string(kVersion), std::move(status), random_key()),
+      port_(static_cast<std::uint16_t>(config.port)),
+      unserved_(config.listen) {
   reconfigure(names, config);
 }
 
-void SubscriptionServer::open_push(const std::vector<PushConfig>& pushes) {
+void SubscriptionServer::reconfigure(const std::map<RobotId, std::string>& names,
+                                     const SubscriptionConfig& config) {
+  names_ = names;
+  service_.reconfigure(config);
   pushes_.clear();
-  for (const PushConfig& push : pushes) pushes_.emplace_back(push, self_, names_);
+  for (const PushConfig& push : config.push) pushes_.emplace_back(push, self_, names_);
+  open_missing();
+}
+
+void SubscriptionServer::open_missing() {
+  std::string fault = open_listen();
+  append(fault, open_push());
+  if (fault == fault_) return;
+  if (fault.empty()) {
+    log_message(LogLevel::kInfo, "subscription: works again");
+  } else {
+    log_message(LogLevel::kWarning, "subscription: " + fault);
+  }
+  fault_ = std::move(fault);
+}
+
+/// Subscribers refer to sockets by their index, so new ones are appended.
+std::string SubscriptionServer::open_listen() {
+  std::string faults;
+  std::erase_if(unserved_, [&](const std::string& address) {
+    Result<UdpSocket> opened = UdpSocket::bind(address, port_);
+    if (!opened) {
+      if (!is_without_clients(address)) append(faults, opened.error().message);
+      return false;
+    }
+    sockets_.push_back(std::move(*opened));
+    return true;
+  });
+  return faults;
+}
+
+std::string SubscriptionServer::open_push() {
+  std::string faults;
   const auto open = [&](bool ipv4, std::optional<UdpSocket>& socket) {
     const bool is_needed = std::ranges::any_of(
         pushes_, [&](const PosePush& push) { return push.target().is_ipv4() == ipv4; });
@@ -55,18 +96,12 @@ void SubscriptionServer::open_push(const std::vector<PushConfig>& pushes) {
     if (opened) {
       socket = std::move(*opened);
     } else {
-      faults_.push_back("subscription.push: " + opened.error().message);
+      append(faults, "push: " + opened.error().message);
     }
   };
   open(true, push_ipv4_);
   open(false, push_ipv6_);
-}
-
-void SubscriptionServer::reconfigure(const std::map<RobotId, std::string>& names,
-                                     const SubscriptionConfig& config) {
-  names_ = names;
-  service_.reconfigure(config);
-  open_push(config.push);
+  return faults;
 }
 
 void SubscriptionServer::serve(Timestamp now) {

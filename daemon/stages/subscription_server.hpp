@@ -17,13 +17,17 @@ namespace crepes {
 
 class SubscriptionServer {
  public:
-  /// Addresses that cannot be served are skipped and reported by `faults`.
+  /// What cannot be opened is the `fault`.
   SubscriptionServer(RobotId self, const std::map<RobotId, std::string>& names,
                      const SubscriptionConfig& config, SubscriptionService::StatusSource status);
 
   /// Changes names, limits and push targets; subscribers stay. `listen` and `port` must be the
   /// same.
   void reconfigure(const std::map<RobotId, std::string>& names, const SubscriptionConfig& config);
+
+  /// Opens what could not be opened yet; call it about once a second. Changes of `fault` are
+  /// logged.
+  void open_missing();
 
   /// Answers a bounded number of the requests that wait on all sockets.
   void serve(Timestamp now);
@@ -32,22 +36,27 @@ class SubscriptionServer {
 
   /// For poll(2).
   [[nodiscard]] std::vector<int> descriptors() const;
-  [[nodiscard]] const std::vector<std::string>& faults() const { return faults_; }
+  /// The addresses that cannot be served now; empty without any.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
   /// Totals by name.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
 
  private:
-  void open_push(const std::vector<PushConfig>& pushes);
+  // Both return what failed.
+  [[nodiscard]] std::string open_listen();
+  [[nodiscard]] std::string open_push();
   void send(UdpSocket& socket, const std::string& json, const Endpoint& to);
 
   RobotId self_;
   std::map<RobotId, std::string> names_;
   SubscriptionService service_;
+  std::uint16_t port_;
+  std::vector<std::string> unserved_;  ///< addresses of `listen` without a socket
   std::vector<UdpSocket> sockets_;
   std::vector<PosePush> pushes_;
   std::optional<UdpSocket> push_ipv4_;
   std::optional<UdpSocket> push_ipv6_;
-  std::vector<std::string> faults_;
+  std::string fault_;
   std::uint64_t poses_ = 0;
   std::uint64_t pushed_ = 0;
   std::uint64_t unsent_ = 0;

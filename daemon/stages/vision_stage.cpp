@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -134,6 +135,12 @@ SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::ui
   return totals;
 }
 
+/// What was published last. It stays while no frames come; only the rate falls to 0.
+struct Published {
+  std::string message;
+  SensorTotals totals;
+};
+
 }  // namespace
 
 void run_vision(const VisionStage& stage, const StageContext& context,
@@ -145,6 +152,7 @@ void run_vision(const VisionStage& stage, const StageContext& context,
   SpotLevels levels;
   AutoExposure exposure{LightSettings{}};
   std::uint64_t failures = 0;
+  std::optional<Published> last;
   while (!stop.stop_requested()) {
     context.iterations.add();
     if (const auto settings = stage.settings.receive()) detector.emplace(*settings);
@@ -154,7 +162,10 @@ void run_vision(const VisionStage& stage, const StageContext& context,
       if (const auto exposure_us = exposure.exposure_us()) stage.light.expose(*exposure_us);
     }
     std::optional<Frame> frame = stage.frames.pop_for(milliseconds{100}, stop);
-    if (!frame) continue;
+    if (!frame) {
+      if (last && health.is_due()) health.publish(last->message, last->totals);
+      continue;
+    }
     const Detection found =
         detector->detect({frame->data(), frame->width, frame->height, frame->stride()});
     stage.sink(SpotFrame{frame->stamp, frame->camera, {found.spots.begin(), found.spots.end()}});
@@ -169,8 +180,9 @@ void run_vision(const VisionStage& stage, const StageContext& context,
     rejected += found.rejected;
     failures += found.failure.empty() ? 0 : 1;
     if (health.is_due()) {
-      health.publish(std::string(diagnosis_of(found, stage.is_calibrated)),
-                     totals_of(found, rejected, failures, delays, levels, exposure));
+      last = {.message = std::string(diagnosis_of(found, stage.is_calibrated)),
+              .totals = totals_of(found, rejected, failures, delays, levels, exposure)};
+      health.publish(last->message, last->totals);
     }
     if (stage.tap.requests.try_pop()) stage.tap.pictures.push(picture_of(*frame, found));
     stage.recycled.push(std::move(*frame));

@@ -30,6 +30,19 @@ TEST(Runtime, ReportsWhatIsWrongWithDevicesThatAreNotThere) {
   }));
 }
 
+TEST(Runtime, OpensNoRealDeviceInASimulation) {
+  const LogSession log(LogLevel::kError);
+  const MonotonicClock machine;
+  Config config = pair_config(1, free_port());
+  config.uwb.device.port = "/dev/nothing-here";
+  config.swarm.members[1].uwb_id = 300;  // which the simulated module cannot send
+  const Runtime runtime(config, machine);
+  Client client(config);
+
+  EXPECT_TRUE(client.await_status(
+      [](const Json& status) { return mentions(sensor_of(status, "uwb"), "set uwb.port"); }));
+}
+
 TEST(Runtime, StopsWithinASecondAndAllLoopsTurnUntilThen) {
   const LogSession log(LogLevel::kError);
   const MonotonicClock machine;

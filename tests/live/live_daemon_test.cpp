@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -83,6 +84,26 @@ TEST_F(LiveDaemon, ReportsThatTheMeshInterfaceIsNotThereAndGoesOn) {
            sensor_of(status, "imu").value("ok", false) &&
            status["neighbors"][0]["reason"] == "never heard";
   }));
+}
+
+TEST_F(LiveDaemon, ServesAnAddressAsSoonAsItCan) {
+  Config config = without_devices(mesh_port_);
+  config.subscription.listen = {"127.0.0.2", "127.0.0.1"};
+  const auto port = static_cast<std::uint16_t>(config.subscription.port);
+  std::optional<UdpSocket> other = UdpSocket::bind("127.0.0.2", port).value();
+  const Runtime runtime(config, machine_);
+  Client client(config);
+  EXPECT_TRUE(client.await_status([](const Json& status) {
+    return mentions(sensor_of(status, "subscription"), "127.0.0.2") &&
+           sensor_of(status, "subscription")["message"].get<std::string>().find("127.0.0.1") ==
+               std::string::npos;
+  }));
+
+  other.reset();
+
+  EXPECT_TRUE(client.await_status(
+      [](const Json& status) { return sensor_of(status, "subscription").empty(); }));
+  EXPECT_TRUE(Client(config, {127, 0, 0, 2}).await_status([](const Json&) { return true; }));
 }
 
 TEST_F(LiveDaemon, CountsForeignDatagramsAndAnswersFoolishRequests) {

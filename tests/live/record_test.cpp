@@ -137,6 +137,23 @@ TEST_F(Record, ReplaysTogetherWithTheOtherRobotsRecording) {
   EXPECT_GT(good, 0.9 * rows);
 }
 
+TEST_F(Record, HasTheClocksInCaseItIsKilled) {
+  const Config first = recorded_config(1);
+  const Runtime runtime_1(first, machine_);
+  const Runtime runtime_2(recorded_config(2), machine_);
+  expect_true_poses(first);
+  RecordOptions wanted = options(first, to_seconds(kPatience));
+  // Before the manifest of the end is written.
+  wanted.is_enough = [&] {
+    return text_of(wanted.dir / "swarm.yaml").find("# - {id: 2") != std::string::npos;
+  };
+
+  const auto recorded = record(wanted);
+
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  EXPECT_EQ(recorded->end_reason, "ended");
+}
+
 TEST_F(Record, WritesPicturesThatTheDataSetReaderFinds) {
   const Config config = recorded_config(1);
   const Runtime runtime(config, machine_);

@@ -339,6 +339,10 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsNotified) {
   write("");
   daemon->send_signal(SIGHUP);
   EXPECT_TRUE(client.await_status(has_generation(3)));
+  config.swarm.members.back().p_body_led.setZero();  // hardly meant
+  write("");
+  daemon->send_signal(SIGHUP);
+  EXPECT_TRUE(client.await_status(has_generation(4)));
 
   // A pipe in the place of the file neither blocks the daemon nor its end.
   std::filesystem::remove(file);
@@ -351,6 +355,8 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsNotified) {
   const Timestamp end_of_first = clock.now() + std::chrono::seconds{20};
   while (!daemon->exit_reason() && clock.now() < end_of_first) ::poll(nullptr, 0, 20);
   EXPECT_EQ(daemon->exit_reason(), "exit code 0");
+  EXPECT_NE(read_text_file(folder.path() / "log").value().find("p_body_led: is 0"),
+            std::string::npos);
 
   const std::string heard = systemd.finish();
   EXPECT_NE(heard.find("RELOADING=1\nMONOTONIC_USEC="), std::string::npos) << heard;

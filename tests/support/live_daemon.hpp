@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -59,9 +61,8 @@ inline Config without_devices(int mesh_port) {
 /// A program on the robot.
 class Client {
  public:
-  explicit Client(const Config& config)
-      : daemon_(
-            Endpoint::ipv4({127, 0, 0, 1}, static_cast<std::uint16_t>(config.subscription.port))),
+  explicit Client(const Config& config, const std::array<std::uint8_t, 4>& address = {127, 0, 0, 1})
+      : daemon_(Endpoint::ipv4(address, static_cast<std::uint16_t>(config.subscription.port))),
         socket_(UdpSocket::bind("127.0.0.1", 0).value()) {}
 
   void send(const std::string& request) {

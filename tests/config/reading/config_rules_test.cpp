@@ -106,6 +106,12 @@ TEST(ConfigRules, RefusesAddressesThatCannotServe) {
             "f:11: subscription.listen: \"224.0.0.1\" is no host's address");
   EXPECT_EQ(listening("127.0.0.1, 127.0.0.1"),
             "f:11: subscription.listen: \"127.0.0.1\" is listed twice");
+  EXPECT_EQ(
+      listening("127.0.0.1, \"::1\", 0.0.0.0"),
+      "f:11: subscription.listen: \"127.0.0.1\" is contained in \"0.0.0.0\": name one of them");
+  EXPECT_EQ(listening("127.0.0.1, \"::\", \"::1\""),
+            "f:11: subscription.listen: \"::1\" is contained in \"::\": name one of them");
+  EXPECT_EQ(listening("0.0.0.0, \"::\""), "");  // each of its own family only
 }
 
 TEST(ConfigRules, RefusesNumbersThatCannotBeMeant) {
