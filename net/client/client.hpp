@@ -110,7 +110,7 @@ struct Status {
     bool ok = false;
     std::string message;  ///< what is wrong, and what to do
     Totals faults;
-    Totals counts;
+    Totals counts;           ///< totals of zero are omitted; all are, where STATUS has no room
     bool calibrated = true;  ///< false: a camera whose lens is a guess
   };
   /// The neighbor's clock minus ours.
@@ -206,12 +206,13 @@ struct Answer {
 };
 
 /// A request for STATUS that is repeated every `period_s`: of everything as far as it fits, of one
-/// neighbor, or of one part: "sensors", "network", "team" (of `peer` in full, if there is one) or
-/// "pair" of `peer`.
+/// neighbor, of one sensor, or of one part: "sensors", "network", "team" (of `peer` in full, if
+/// there is one) or "pair" of `peer`.
 struct Poll {
   std::optional<std::uint16_t> peer{};
   std::string about{};
   double period_s = 1.0;
+  std::string sensor{};  ///< as STATUS names it; empty: none
 };
 
 /// What a program wants from the daemon.

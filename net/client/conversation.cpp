@@ -35,6 +35,7 @@ std::string poll_request(const Poll& poll) {
   Json request{{"class", "POLL"}};
   if (poll.peer) request["peer"] = *poll.peer;
   if (!poll.about.empty()) request["about"] = poll.about;
+  if (!poll.sensor.empty()) request["sensor"] = poll.sensor;
   return without_brace(request);
 }
 
@@ -52,7 +53,7 @@ std::optional<std::string> cookie_in(std::string_view datagram) {
 }  // namespace
 
 void Conversation::ask(const Requests& requests) {
-  once_.clear();
+  if (requests.watch) once_.clear();  // else the end of the poses may still have to be sent
   if (is_watching_ && !requests.watch) once_.push_back(unwatch_request());
   is_watching_ = requests.watch;
   retry_ = Seconds(requests.retry_s);
@@ -85,11 +86,12 @@ Conversation::Time Conversation::next_due() const {
   return next == periodic_.end() ? Time::max() : next->due;
 }
 
-/// A daemon elsewhere sends no cookie in reply to a request that is shorter.
+/// A daemon elsewhere sends no cookie in reply to a request that is shorter. Any request may need
+/// that answer: a cookie expires, and a daemon that restarts accepts no older one.
 std::string Conversation::signed_with_cookie(const std::string& request) const {
   constexpr std::size_t kCookieAnswer = 64;
-  return cookie_.empty() ? request + R"(,"pad":")" + std::string(kCookieAnswer, ' ') + R"("})"
-                         : request + R"(,"cookie":)" + Json(cookie_).dump() + "}";
+  const std::string padded = request + R"(,"pad":")" + std::string(kCookieAnswer, ' ') + '"';
+  return cookie_.empty() ? padded + "}" : padded + R"(,"cookie":)" + Json(cookie_).dump() + "}";
 }
 
 std::optional<Answer> Conversation::take(std::string datagram, Time now) {

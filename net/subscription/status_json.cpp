@@ -238,11 +238,18 @@ bool drop_last_neighbor(Json& status) {
   return drop_last(status, "neighbors");
 }
 
+/// The first faults of this robot remain; an empty list would claim that there are none.
+bool drop_last_fault(Json& status) {
+  if (!drop_last(status, "faults")) return false;
+  if (status["faults"].empty()) status.erase("faults");
+  return true;
+}
+
 /// Reductions in order, the least important part first. Each applies only if the rest is still too
 /// long.
 std::string fitted(Json status) {
   using Cut = void (*)(Json&);
-  constexpr std::array<Cut, 15> kCuts{
+  constexpr std::array<Cut, 16> kCuts{
       [](Json& s) { erase_in_each(s, "sensors", "counts"); },
       [](Json& s) { erase_in_each(s, "neighbors", "measured"); },
       [](Json& s) { erase_in_each(s, "neighbors", "measurements"); },
@@ -261,6 +268,7 @@ std::string fitted(Json status) {
       [](Json& s) { s.erase("queues"); },
       [](Json& s) { s.erase("config"); },
       [](Json& s) { s.erase("clocks"); },
+      [](Json& s) { erase_in_each(s, "neighbors", "faults"); },
   };
   std::string text = dump(status);
   for (const Cut cut : kCuts) {
@@ -270,7 +278,8 @@ std::string fitted(Json status) {
     text = dump(status);
   }
   while (text.size() > kMaxSubscriptionDatagram) {
-    if (!drop_last_neighbor(status) && !drop_last(status, "more") && !drop_last(status, "sensors"))
+    if (!drop_last_neighbor(status) && !drop_last(status, "more") && !drop_last_fault(status) &&
+        !drop_last(status, "sensors"))
       break;
     text = dump(status);
   }
@@ -342,6 +351,17 @@ std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId 
   json["clocks"] = Json::array();
   const auto clock = std::ranges::find(status.clocks, peer, &ClockStatus::peer);
   if (clock != status.clocks.end()) json["clocks"].push_back(clock_json(*clock));
+  return fitted(std::move(json));
+}
+
+std::optional<std::string> sensor_status_json(const SystemStatus& status, std::string_view sensor) {
+  const auto is_meant = [sensor](const SensorStatus& one) {
+    return truncated_utf8(one.name, kMaxName) == sensor;
+  };
+  const auto found = std::ranges::find_if(status.sensors, is_meant);
+  if (found == status.sensors.end()) return std::nullopt;
+  Json json = head_json(status);
+  json["sensors"] = Json::array({sensor_json(*found)});
   return fitted(std::move(json));
 }
 

@@ -9,7 +9,7 @@ namespace crepes {
 namespace {
 
 constexpr Duration kErrorInterval = std::chrono::seconds{1};
-constexpr std::size_t kMaxErring = 256;  // clients that are stored at a time
+constexpr std::size_t kMaxErring = 256;  // clients that are stored at a time, here and elsewhere
 
 bool wants(const WatchRequest& request, RobotId neighbor) {
   return !request.peers || std::count(request.peers->begin(), request.peers->end(), neighbor) > 0;
@@ -35,10 +35,21 @@ Result<void> SubscriberTable::watch(const Endpoint& client, const WatchRequest& 
   return {};
 }
 
-Result<void> SubscriberTable::make_room(const Endpoint& client, Timestamp now, bool is_light_user) {
-  const auto limit = static_cast<std::size_t>(config_.max_subscribers);
-  if (subscribers_.size() >= limit)
+/// Remote clients leave room for programs of this machine, whatever the size of the table.
+Result<void> SubscriberTable::find_place(const Endpoint& client) const {
+  const int limit = config_.max_subscribers;
+  if (subscribers_.size() >= static_cast<std::size_t>(limit))
     return fail(ErrorCode::kUsage, fmt::format("too many subscribers, at most {}", limit));
+  if (client.is_loopback()) return {};
+  const int remote_limit = limit - std::min(config_.max_per_address, limit / 2);
+  const auto is_remote = [](const auto& entry) { return !entry.first.is_loopback(); };
+  if (std::ranges::count_if(subscribers_, is_remote) < remote_limit) return {};
+  return fail(ErrorCode::kUsage,
+              fmt::format("too many subscribers on other machines, at most {}", remote_limit));
+}
+
+Result<void> SubscriberTable::make_room(const Endpoint& client, Timestamp now, bool is_light_user) {
+  if (Result<void> place = find_place(client); !place) return place;
   const auto is_beside = [&](const auto& entry) {
     return entry.first.address == client.address ||
            (entry.first.is_loopback() && client.is_loopback());
@@ -78,10 +89,11 @@ void SubscriberTable::expire(Timestamp now) {
 }
 
 bool SubscriberTable::allows_error(const Endpoint& client, Timestamp now) {
-  std::erase_if(last_errors_,
+  auto& last_errors = client.is_loopback() ? last_local_errors_ : last_remote_errors_;
+  std::erase_if(last_errors,
                 [&](const auto& entry) { return now - entry.second >= kErrorInterval; });
-  if (last_errors_.size() >= kMaxErring) return false;
-  return last_errors_.try_emplace(client, now).second;
+  if (last_errors.size() >= kMaxErring) return false;
+  return last_errors.try_emplace(client, now).second;
 }
 
 }  // namespace crepes

@@ -30,7 +30,8 @@ class SubscriberTable {
   void reconfigure(const SubscriptionConfig& config) { config_ = config; }
 
   /// Begins, renews, changes or ends a subscription. Refused when the table is full or the address
-  /// has used all its subscriptions; this machine's addresses are one. In the latter case a new
+  /// has used all its subscriptions; this machine's addresses are one. Remote clients never take
+  /// the room of this machine's: `max_per_address`, at most half of all. At a full address a new
   /// client that `is_light_user` replaces one that recently exceeded its rate. Replies are sent
   /// over `socket`.
   [[nodiscard]] Result<void> watch(const Endpoint& client, const WatchRequest& request,
@@ -48,7 +49,8 @@ class SubscriberTable {
   void expire(Timestamp now);
 
   /// Whether an ERROR may be sent to a client now: at most one a second, and to a limited number of
-  /// clients at a time. If so, it counts as sent.
+  /// clients at a time; remote clients do not take the room of local ones. If so, it counts as
+  /// sent.
   [[nodiscard]] bool allows_error(const Endpoint& client, Timestamp now);
 
   [[nodiscard]] std::size_t size() const { return subscribers_.size(); }
@@ -64,11 +66,13 @@ class SubscriberTable {
     Timestamp last_excess = Timestamp::min();  ///< when a request found no token
   };
 
+  [[nodiscard]] Result<void> find_place(const Endpoint& client) const;
   [[nodiscard]] Result<void> make_room(const Endpoint& client, Timestamp now, bool is_light_user);
 
   SubscriptionConfig config_;
   std::map<Endpoint, Subscriber> subscribers_;
-  std::map<Endpoint, Timestamp> last_errors_;
+  std::map<Endpoint, Timestamp> last_local_errors_;
+  std::map<Endpoint, Timestamp> last_remote_errors_;
 };
 
 }  // namespace crepes

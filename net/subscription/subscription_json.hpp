@@ -31,6 +31,7 @@ enum class StatusPart : std::uint8_t { kAll, kSensors, kNetwork, kTeam, kPair };
 struct PollRequest {
   std::optional<RobotId> peer;  ///< report only this neighbor, in full; with kTeam any robot
   StatusPart about = StatusPart::kAll;
+  std::optional<std::string> sensor;  ///< report only this sensor, in full
 };
 
 /// A request of a client, parsed.
@@ -56,6 +57,9 @@ struct SubscriptionRequest {
                                       StatusPart about = StatusPart::kAll);
 /// Everything about one neighbor; empty if the neighbor is unknown.
 [[nodiscard]] std::optional<std::string> peer_status_json(const SystemStatus& status, RobotId peer);
+/// Everything about one sensor, by its name in STATUS; empty if there is none.
+[[nodiscard]] std::optional<std::string> sensor_status_json(const SystemStatus& status,
+                                                            std::string_view sensor);
 /// The robots as the team's filter knows them; or one of them in full, empty if it is no member.
 [[nodiscard]] std::string team_status_json(const SystemStatus& status);
 [[nodiscard]] std::optional<std::string> team_status_json(const SystemStatus& status,

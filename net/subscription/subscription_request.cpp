@@ -89,6 +89,11 @@ Result<PollRequest> read_poll(const ParsedJson& json) {
     poll.peer = id_from(*peer);
     if (!poll.peer) return fail(ErrorCode::kFormat, "\"peer\" must be a robot id, 1 to 65534");
   }
+  if (const auto sensor = json.find("sensor"); sensor != json.end()) {
+    if (!sensor->is_string())
+      return fail(ErrorCode::kFormat, "\"sensor\" must be the name of a sensor");
+    poll.sensor = sensor->get<std::string>();
+  }
   if (const auto about = json.find("about"); about != json.end()) {
     const auto part = std::ranges::find(kParts, *about, &Part::name);
     if (part == kParts.end())

@@ -57,7 +57,9 @@ std::optional<std::string> SubscriptionService::serve(const Endpoint& client,
                                                       Timestamp now, std::size_t socket) {
   if (const auto* poll = std::get_if<PollRequest>(&request.what)) {
     if (auto status = status_of(*poll)) return status;
-    return refuse(client, {ErrorCode::kNotFound, "\"peer\" is no other robot of this swarm"}, now);
+    const char* const reason = poll->sensor ? "\"sensor\" is no sensor of this robot"
+                                            : "\"peer\" is no other robot of this swarm";
+    return refuse(client, {ErrorCode::kNotFound, reason}, now);
   }
   const auto watched = table_.watch(client, std::get<WatchRequest>(request.what), now, socket,
                                     limiter_.is_light_user(client));
@@ -65,9 +67,10 @@ std::optional<std::string> SubscriptionService::serve(const Endpoint& client,
   return version_json(release_, lease_s_);
 }
 
-/// Empty if there is no such peer.
+/// Empty if there is no such peer or sensor.
 std::optional<std::string> SubscriptionService::status_of(const PollRequest& poll) const {
   const SystemStatus status = status_();
+  if (poll.sensor) return sensor_status_json(status, *poll.sensor);
   if (!poll.peer)
     return poll.about == StatusPart::kTeam ? team_status_json(status)
                                            : status_json(status, poll.about);

@@ -81,29 +81,24 @@ std::string setting(const std::optional<double>& value) {
   return value ? fmt::format("{}", *value) : "-";
 }
 
-std::uint64_t level(const client::Status::Sensor& sensor, const char* name) {
-  const auto found = sensor.counts.find(name);
-  return found == sensor.counts.end() ? 0 : found->second;
-}
-
-const client::Status::Sensor* spots_of(const client::Status& status, const std::string& camera) {
-  const auto found =
-      std::ranges::find(status.sensors, camera + " spots", &client::Status::Sensor::name);
-  return found == status.sensors.end() ? nullptr : &*found;
+/// The gray levels of a camera's spots; null while they are unknown.
+const StatusTotals* levels_of(const client::Status& status, const std::string& camera) {
+  const client::Status::Sensor* const spots = sensor_of(status, camera + " spots");
+  return spots == nullptr || spots->counts.empty() ? nullptr : &spots->counts;
 }
 
 std::string lights_table(const client::Status& status, const CameraLights& lights) {
   std::vector<std::vector<std::string>> rows{{"camera", "exposure us", "gain", "background",
                                               "threshold", "faintest", "brightest", "lights"}};
   for (const auto& [camera, light] : lights.all()) {
-    const client::Status::Sensor* const spots = spots_of(status, camera);
-    const std::uint64_t automatic_us = spots == nullptr ? 0 : level(*spots, "auto_exposure_us");
+    const StatusTotals* const levels = levels_of(status, camera);
+    const std::uint64_t automatic_us = levels == nullptr ? 0 : total(*levels, "auto_exposure_us");
     std::vector<std::string> row{
         camera,
         automatic_us == 0 ? setting(light.exposure_us) : fmt::format("{} auto", automatic_us),
         setting(light.gain)};
     for (const char* name : {"background", "threshold", "faintest", "brightest", "spots"})
-      row.push_back(spots == nullptr ? "-" : std::to_string(level(*spots, name)));
+      row.push_back(levels == nullptr ? "-" : std::to_string(total(*levels, name)));
     rows.push_back(std::move(row));
   }
   std::string text = text_table(rows);
@@ -118,10 +113,10 @@ Json lights_json(const client::Status& status, const CameraLights& lights) {
     Json one{{"name", camera}};
     if (light.exposure_us) one["exposure_us"] = *light.exposure_us;
     if (light.gain) one["gain"] = *light.gain;
-    if (const client::Status::Sensor* const spots = spots_of(status, camera)) {
+    if (const StatusTotals* const levels = levels_of(status, camera)) {
       for (const char* name : {"background", "threshold", "faintest", "brightest", "spots"})
-        one[name] = level(*spots, name);
-      if (const std::uint64_t automatic_us = level(*spots, "auto_exposure_us"); automatic_us > 0)
+        one[name] = total(*levels, name);
+      if (const std::uint64_t automatic_us = total(*levels, "auto_exposure_us"); automatic_us > 0)
         one["auto_exposure_us"] = automatic_us;
     }
     json["cameras"].push_back(std::move(one));

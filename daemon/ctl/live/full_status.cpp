@@ -61,13 +61,32 @@ Result<void> ask_neighbors(client::Connection& daemon, Json& whole) {
   return {};
 }
 
-Result<void> ask_part(client::Connection& daemon, const std::string& part, Json& whole) {
+/// Returns whether all of the part has come.
+Result<bool> ask_part(client::Connection& daemon, const std::string& part, Json& whole) {
   auto answer = ask(daemon, {.about = part}, [&](const Json& json) {
     return json.contains(part) && !json.contains("neighbors");
   });
   if (!answer) return tl::unexpected(answer.error());
-  if (*answer) replace(whole, **answer, {"sensors", "queues", "estimator", "mesh", "network"});
-  return {};
+  if (!*answer) return false;
+  replace(whole, **answer,
+          {"config", "faults", "sensors", "queues", "estimator", "mesh", "network"});
+  return !(**answer).value("truncated", false);
+}
+
+/// Sensor by sensor, where one datagram has no room for the counts of all. What a daemon does not
+/// answer, as one of an older version, stays unknown.
+void ask_sensors(client::Connection& daemon, Json& whole) {
+  for (Json& sensor : whole["sensors"]) {
+    if (sensor.contains("counts")) continue;
+    const Json name = sensor["name"];
+    const auto part =
+        ask(daemon, {.about = "sensors", .sensor = name.get<std::string>()}, [&](const Json& json) {
+          return json.contains("sensors") && !json.contains("neighbors") &&
+                 json["sensors"].size() == 1 && json["sensors"][0]["name"] == name;
+        });
+    if (!part || !*part) return;
+    sensor = (**part)["sensors"][0];
+  }
 }
 
 /// Of every robot that the team's filter estimates, in full. A daemon of an older version refuses.
@@ -99,9 +118,12 @@ Result<Json> ask_all(client::Connection& daemon, const DaemonAddress& address) {
   if (!brief) return tl::unexpected(brief.error());
   if (!*brief) return tl::unexpected(no_answer_from(address, daemon.send_fault()));
   Json whole = std::move(**brief);
-  for (const auto& done : {ask_part(daemon, "sensors", whole), ask_part(daemon, "network", whole),
-                           ask_neighbors(daemon, whole)})
-    if (!done) return tl::unexpected(done.error());
+  const Result<bool> has_sensors = ask_part(daemon, "sensors", whole);
+  if (!has_sensors) return tl::unexpected(has_sensors.error());
+  if (!*has_sensors) ask_sensors(daemon, whole);
+  if (const auto done = ask_part(daemon, "network", whole); !done)
+    return tl::unexpected(done.error());
+  if (const auto done = ask_neighbors(daemon, whole); !done) return tl::unexpected(done.error());
   ask_team(daemon, whole);
   whole.erase("truncated");
   whole.erase("more");

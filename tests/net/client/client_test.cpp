@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "net/subscription/subscription_json.hpp"
+#include "net/subscription/subscription_service.hpp"
 #include "net/udp_socket.hpp"
 
 namespace crepes::client::client_test {
@@ -216,6 +217,41 @@ TEST(Conversation, EchoesTheCookieAtOnceInEveryRequest) {
   EXPECT_EQ(request_in(conversation.farewell().value()).cookie, "fedcba9876543210");
 }
 
+/// A daemon that may start again, as a program on another machine finds it.
+class RemoteDaemon {
+ public:
+  explicit RemoteDaemon(const HashKey& key)
+      : service_(
+            {}, "1", [] { return SystemStatus{}; }, key) {}
+
+  /// Whether an answer to the requests that are due is a message.
+  bool answers(Conversation& conversation, Conversation::Time now) {
+    bool is_answered = false;
+    for (const std::string& request : conversation.due(now)) {
+      const auto answer = service_.answer(kClient, request, Timestamp{now.time_since_epoch()});
+      if (answer && conversation.take(*answer, now)) is_answered = true;
+    }
+    return is_answered;
+  }
+
+ private:
+  inline static const Endpoint kClient = Endpoint::ipv4({10, 0, 0, 7}, 40000);
+  SubscriptionService service_;
+};
+
+TEST(Conversation, ThatOnlyPollsOutlivesItsCookie) {
+  RemoteDaemon daemon(HashKey{1});
+  RemoteDaemon restarted(HashKey{2});
+  Conversation conversation({.watch = false, .polls = {{}}});
+  EXPECT_FALSE(daemon.answers(conversation, kStart));
+  EXPECT_TRUE(daemon.answers(conversation, kStart));
+
+  EXPECT_FALSE(daemon.answers(conversation, kStart + 150s));  // the cookie has expired
+  EXPECT_TRUE(daemon.answers(conversation, kStart + 150s));
+  EXPECT_FALSE(restarted.answers(conversation, kStart + 160s));
+  EXPECT_TRUE(restarted.answers(conversation, kStart + 160s));
+}
+
 TEST(Conversation, EndsPosesThatAreWantedNoMore) {
   Conversation conversation({});
   (void)conversation.due(kStart);
@@ -226,6 +262,28 @@ TEST(Conversation, EndsPosesThatAreWantedNoMore) {
   ASSERT_EQ(requests.size(), 2U);
   EXPECT_FALSE(std::get<WatchRequest>(request_in(requests[0]).what).enable);
   EXPECT_TRUE(std::holds_alternative<PollRequest>(request_in(requests[1]).what));
+}
+
+TEST(Conversation, EndsPosesEvenIfAskedForSomethingElseBefore) {
+  Conversation conversation({});
+  (void)conversation.due(kStart);
+
+  conversation.ask({.watch = false, .polls = {{}}});
+  conversation.ask({.watch = false, .polls = {{.peer = 3}}});
+  const auto requests = conversation.due(kStart + 1ms);
+
+  ASSERT_EQ(requests.size(), 2U);
+  EXPECT_FALSE(std::get<WatchRequest>(request_in(requests[0]).what).enable);
+  EXPECT_EQ(std::get<PollRequest>(request_in(requests[1]).what).peer, RobotId{3});
+}
+
+TEST(Conversation, AsksForOneSensor) {
+  Conversation conversation({.watch = false, .polls = {{.sensor = "cam0 spots"}}});
+
+  const auto requests = conversation.due(kStart);
+
+  ASSERT_EQ(requests.size(), 1U);
+  EXPECT_EQ(std::get<PollRequest>(request_in(requests[0]).what).sensor, "cam0 spots");
 }
 
 /// The daemon's end of a connection.

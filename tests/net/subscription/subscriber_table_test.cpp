@@ -139,6 +139,15 @@ TEST(SubscriberTable, StoresABoundedNumberOfClientsWithErrors) {
   EXPECT_TRUE(table.allows_error(client(60000), kStart + seconds{2}));
 }
 
+TEST(SubscriberTable, AllowsAnErrorHereWhateverOtherMachinesSend) {
+  SubscriberTable table{SubscriptionConfig{}};
+  for (std::uint16_t port = 1; port <= 1000; ++port)
+    (void)table.allows_error(Endpoint::ipv4({10, 0, 0, 1}, port), kStart);
+
+  EXPECT_FALSE(table.allows_error(Endpoint::ipv4({10, 0, 0, 2}, 1), kStart));
+  EXPECT_TRUE(table.allows_error(client(1), kStart));
+}
+
 TEST(SubscriberTable, GivesAnAddressItsShareAndLeavesRoomForOthers) {
   SubscriberTable table{SubscriptionConfig{}};
   for (std::uint16_t port = 1; port <= 4; ++port)
@@ -188,13 +197,26 @@ TEST(SubscriberTable, ForgivesAfterALease) {
   EXPECT_FALSE(table.watch(client(5), {}, kStart + seconds{12}, 0, /*is_light_user=*/true));
 }
 
-TEST(SubscriberTable, HasRoomForThirtyTwo) {
+TEST(SubscriberTable, HasRoomForThirtyTwoOfWhichFourAreForThisMachine) {
   SubscriberTable table{SubscriptionConfig{}};
-  for (std::uint8_t host = 1; host <= 8; ++host)
+  for (std::uint8_t host = 1; host <= 7; ++host)
     for (std::uint16_t port = 1; port <= 4; ++port)
       ASSERT_TRUE(table.watch(Endpoint::ipv4({10, 0, 0, host}, port), {}, kStart));
 
-  EXPECT_FALSE(table.watch(Endpoint::ipv4({10, 0, 0, 9}, 1), {}, kStart));
+  const auto refused = table.watch(Endpoint::ipv4({10, 0, 0, 9}, 1), {}, kStart);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("at most 28"), std::string::npos);
+  for (std::uint16_t port = 1; port <= 4; ++port)
+    EXPECT_TRUE(table.watch(client(port), {}, kStart)) << port;
+  EXPECT_EQ(table.size(), 32U);
+}
+
+TEST(SubscriberTable, LeavesHalfOfASmallTableToOtherMachines) {
+  SubscriberTable table{config_for(2)};
+
+  EXPECT_TRUE(table.watch(Endpoint::ipv4({10, 0, 0, 1}, 1), {}, kStart));
+  EXPECT_FALSE(table.watch(Endpoint::ipv4({10, 0, 0, 2}, 1), {}, kStart));
+  EXPECT_TRUE(table.watch(client(1), {}, kStart));
 }
 
 TEST(SubscriberTable, AnswersOverTheSocketThatTheClientAsked) {

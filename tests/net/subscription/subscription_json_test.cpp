@@ -97,6 +97,7 @@ TEST(SubscriptionJson, ReadsAPollOfEverythingOfOneNeighborOrOfAPart) {
   EXPECT_FALSE(poll_of(R"({"class":"POLL","about":"team"})").peer.has_value());
   EXPECT_EQ(poll_of(R"({"class":"POLL","about":"team","peer":1})").peer, RobotId{1});
   EXPECT_EQ(poll_of(R"({"class":"POLL","about":"pair","peer":3})").about, StatusPart::kPair);
+  EXPECT_EQ(poll_of(R"({"class":"POLL","sensor":"cam0"})").sensor, "cam0");
 }
 
 TEST(SubscriptionJson, ReadsTheCookieOfAnyRequest) {
@@ -121,6 +122,7 @@ TEST(SubscriptionJson, NamesTheErrorInARequest) {
   EXPECT_NE(message_of(R"({"class":"WATCH","peers":2})").find("peers"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"WATCH","cookie":7})").find("cookie"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"POLL","peer":"r2"})").find("peer"), std::string::npos);
+  EXPECT_NE(message_of(R"({"class":"POLL","sensor":0})").find("sensor"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"POLL","about":"love"})").find("about"), std::string::npos);
   EXPECT_NE(message_of(R"({"class":"POLL","about":"pair"})").find("peer"), std::string::npos);
 }
@@ -326,6 +328,48 @@ TEST(SubscriptionJson, ReportsOnePartAlone) {
   EXPECT_EQ(network["network"]["refused_14"], 1014);
   EXPECT_EQ(network["queues"]["events"], 42);
   EXPECT_FALSE(network.contains("sensors"));
+}
+
+TEST(SubscriptionJson, ReportsOneSensorWithTheCountsThatFitNowhereElse) {
+  SystemStatus status = big_status(2);
+  const std::string long_name(40, 'n');
+  for (const std::string& name : {std::string("cam0 spots"), std::string("cam1 spots"), long_name})
+    status.sensors.push_back({name, 100.0, true, std::string(160, 'x'), {{}, {{"background", 4}}}});
+  const Json part = Json::parse(status_json(status, StatusPart::kSensors));
+  ASSERT_FALSE(part["sensors"][5].contains("counts"));
+
+  const Json json = Json::parse(sensor_status_json(status, "cam1 spots").value());
+
+  EXPECT_FALSE(json.contains("truncated"));
+  ASSERT_EQ(json["sensors"].size(), 1U);
+  EXPECT_EQ(json["sensors"][0]["name"], "cam1 spots");
+  EXPECT_EQ(json["sensors"][0]["counts"], Json({{"background", 4}}));
+  EXPECT_TRUE(sensor_status_json(status, part["sensors"][6]["name"].get<std::string>()));
+  EXPECT_FALSE(sensor_status_json(status, "cam9"));
+}
+
+TEST(SubscriptionJson, NeverWritesMoreThanADatagramHoweverManyFaultsThereAre) {
+  const auto with_faults = [](std::size_t own, std::size_t of_others) {
+    SystemStatus status = big_status(3);
+    const TeamFault fault{.robot = {}, .kind = TeamFault::Kind::kCameraTurned, .size = 0.1};
+    status.estimator.faults.assign(own, fault);
+    for (NeighborStatus& neighbor : status.estimator.neighbors)
+      neighbor.faults.assign(of_others, fault);
+    return status;
+  };
+
+  const std::string some = status_json(with_faults(2, 3));
+  const std::string many = status_json(with_faults(50, 50));
+  const std::string of_one = peer_status_json(with_faults(0, 50), RobotId{2}).value();
+
+  for (const std::string& text : {some, many, of_one}) {
+    EXPECT_LE(text.size(), kMaxSubscriptionDatagram);
+    EXPECT_EQ(Json::parse(text)["truncated"], true);
+  }
+  EXPECT_EQ(Json::parse(some)["faults"].size(), 2U);
+  EXPECT_EQ(Json::parse(some)["sensors"].size(), 4U);
+  EXPECT_GT(Json::parse(many)["faults"].size(), 0U);
+  EXPECT_EQ(Json::parse(many)["neighbors"].size(), 3U);
 }
 
 /// Keys of an object and of the objects in it, but not names that the data choose.

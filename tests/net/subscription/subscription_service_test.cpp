@@ -23,6 +23,8 @@ SystemStatus some_status() {
   status.self = RobotId{1};
   status.estimator.neighbors.resize(1);
   status.estimator.neighbors[0].neighbor = kNeighbor;
+  status.sensors.resize(1);
+  status.sensors[0].name = "imu";
   return status;
 }
 
@@ -215,6 +217,12 @@ TEST_F(Service, ServesALightUserDuringFloodsFromItsAddress) {
 TEST_F(Service, ReportsOneNeighborInFullAndRefusesTheUnknown) {
   EXPECT_EQ(json_answer(kLocal, R"({"class":"POLL","peer":2})")["neighbors"][0]["peer"], 2);
   EXPECT_EQ(json_answer(kLocal, R"({"class":"POLL","peer":9})")["class"], "ERROR");
+}
+
+TEST_F(Service, ReportsOneSensorAndRefusesTheUnknown) {
+  EXPECT_EQ(json_answer(kLocal, R"({"class":"POLL","sensor":"imu"})")["sensors"][0]["name"], "imu");
+  EXPECT_EQ(json_answer(kLocal, R"({"class":"POLL","sensor":"cam9"})")["message"],
+            "\"sensor\" is no sensor of this robot");
 }
 
 TEST_F(Service, SendsOneErrorASecondAtMost) {

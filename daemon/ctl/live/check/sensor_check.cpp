@@ -13,6 +13,8 @@ namespace {
 using SensorLine = client::Status::Sensor;
 
 constexpr std::string_view kSpots = " spots";
+constexpr const char* kAskAgain =
+    "the daemon did not report its counts: ask again; is it as new as crepesctl?";
 
 bool is_spots(const SensorLine& sensor) { return sensor.name.ends_with(kSpots); }
 
@@ -32,22 +34,25 @@ void check_spot_rate(const SensorLine& spots, const client::Status& status, Chec
   constexpr double kShare = 0.9;
   const SensorLine* const camera =
       sensor_of(status, spots.name.substr(0, spots.name.size() - kSpots.size()));
+  const std::string rate = fmt::format("{}: {} Hz", spots.name, fixed(spots.rate_hz, 1));
   const auto delay_us = static_cast<double>(total(spots.counts, "delay_p99_us"));
   if (camera != nullptr && spots.rate_hz < kShare * camera->rate_hz) {
-    section.doubt(fmt::format("{}: {} Hz, the camera has {}", spots.name, fixed(spots.rate_hz, 1),
-                              fixed(camera->rate_hz, 1)),
+    section.doubt(fmt::format("{}, the camera has {}", rate, fixed(camera->rate_hz, 1)),
                   "the computer is too slow: end other programs, or lower rate_hz");
+  } else if (spots.counts.empty()) {
+    section.doubt(rate + ", time from picture to spots unknown", kAskAgain);
   } else if (delay_us > kSlow) {
     section.doubt(
         fmt::format("{}: {} ms from picture to spots", spots.name, fixed(1e-3 * delay_us, 1)),
         "the computer is too slow, or the picture too bright");
   } else {
-    section.good(fmt::format("{}: {} Hz, {} ms", spots.name, fixed(spots.rate_hz, 1),
-                             fixed(1e-3 * delay_us, 1)));
+    section.good(fmt::format("{}, {} ms", rate, fixed(1e-3 * delay_us, 1)));
   }
 }
 
 void check_picture(const SensorLine& spots, CheckSection& section) {
+  if (spots.counts.empty())
+    return section.doubt(spots.name + ": background and lights unknown", kAskAgain);
   const std::uint64_t background = total(spots.counts, "background");
   const std::uint64_t brightest = total(spots.counts, "brightest");
   const std::string text =
@@ -90,7 +95,7 @@ void check_sensors(const RobotObservation& seen, CheckSection section) {
 
 void check_rates(const RobotObservation& seen, CheckSection section) {
   for (const SensorLine& sensor : seen.after.sensors) {
-    if (sensor.name == "mesh") continue;  // it has a section of its own
+    if (sensor.name == "mesh" || sensor.name == "subscription") continue;  // they have no rate
     if (is_spots(sensor)) {
       check_spot_rate(sensor, seen.after, section);
     } else if (sensor.rate_hz <= 0.0) {

@@ -76,7 +76,7 @@ class Conversation:
     def _echo(self, cookie: str, now: float) -> None:
         if self._proof.get("cookie") == cookie:
             return  # already echoed: the next renewal suffices
-        self._proof = {"cookie": cookie}
+        self._proof["cookie"] = cookie
         self._due = [now] * len(self._due)
 
     def _renew_within(self, lease_s: float) -> None:
