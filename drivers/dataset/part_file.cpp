@@ -11,7 +11,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path part_of(fs::path file) { return file += ".part"; }
+/// What a link leads to keeps its name, and the link too.
+fs::path target_of(const fs::path& file) {
+  std::error_code status;
+  if (!fs::is_symlink(file, status)) return file;
+  fs::path target = fs::weakly_canonical(file, status);
+  return status ? file : target;
+}
+
+/// A device or a pipe is written as it is: another file must not take its name.
+fs::path part_of(fs::path file) {
+  std::error_code status;
+  const bool is_special = fs::exists(file, status) && !fs::is_regular_file(file, status);
+  return is_special ? file : file += ".part";
+}
 
 Result<void> write_text(const fs::path& file, std::string_view text, std::ios::openmode mode) {
   std::ofstream out(file, std::ios::binary | mode);
@@ -24,8 +37,10 @@ Result<void> write_text(const fs::path& file, std::string_view text, std::ios::o
 
 /// Gives the written part its final name.
 Result<void> publish_part(const fs::path& file) {
+  const fs::path part = part_of(file);
+  if (part == file) return {};
   std::error_code status;
-  fs::rename(part_of(file), file, status);
+  fs::rename(part, file, status);
   if (!status) return {};
   return fail(ErrorCode::kIo, fmt::format("{}: {}", file.string(), status.message()));
 }
@@ -33,14 +48,14 @@ Result<void> publish_part(const fs::path& file) {
 }  // namespace
 
 Result<void> replace_text_file(const fs::path& file, std::string_view text) {
-  return write_text(part_of(file), text, std::ios::trunc).and_then([&] {
-    return publish_part(file);
+  const fs::path target = target_of(file);
+  return write_text(part_of(target), text, std::ios::trunc).and_then([&] {
+    return publish_part(target);
   });
 }
 
 Result<PartFile> PartFile::create(fs::path file, std::string_view header) {
-  std::error_code status;
-  fs::remove(file, status);
+  file = target_of(file);
   if (auto done = write_text(part_of(file), header, std::ios::trunc); !done)
     return tl::unexpected(done.error());
   return PartFile(std::move(file));

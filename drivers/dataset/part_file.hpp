@@ -14,10 +14,10 @@ namespace crepes {
 [[nodiscard]] Result<void> replace_text_file(const std::filesystem::path& file,
                                              std::string_view text);
 
-/// A text file that is written as NAME.part. `publish` renames it to NAME.
+/// A text file that is written as NAME.part. `publish` renames it to NAME; an earlier NAME stays
+/// until then. What is no regular file, a pipe or a device, is written at once.
 class PartFile {
  public:
-  /// Removes an existing NAME.
   [[nodiscard]] static Result<PartFile> create(std::filesystem::path file, std::string_view header);
 
   /// The text to append to; call `flush_if_large` regularly. `publish` reports write errors.
