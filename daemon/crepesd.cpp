@@ -26,7 +26,8 @@ constexpr Duration kCheckPeriod = std::chrono::seconds{1};  // of the watchdog
 
 int print(const Result<std::string>& text) {
   (text ? std::cout << *text : std::cerr << text.error().message << '\n') << std::flush;
-  return text ? kDone : kBadInput;
+  if (text && !std::cout) std::cerr << "standard output: cannot be written\n";
+  return text && std::cout ? kDone : kBadInput;
 }
 
 void print_lines(const std::string& prefix, const std::vector<ConfigFault>& faults) {

@@ -291,7 +291,12 @@ class Convert(unittest.TestCase):
         self.assertLess(worst, 0.3)
 
     def test_what_cannot_be_converted_is_refused_with_the_reason(self):
+        other = pathlib.Path(self.directory.name) / "other"
+        other.mkdir()
+        manifest = (pathlib.Path(RECORDING) / "swarm.yaml").read_text()
+        (other / "swarm.yaml").write_text(manifest.replace("scenario: manual", "scenario: four"))
         for words, code, reason in (((self.results, "--to", "mcap"), 2, "--truth SWARM_DIR"),
+                                    ((self.results, "--to", "mcap", "--truth", other), 1, "the truth (scenario four"),
                                     ((RECORDING, "--to", "mcap", "--truth", RECORDING), 2, "a recording has its own"),
                                     ((self.directory.name, "--to", "mcap"), 1, "neither swarm.yaml"),
                                     ((RECORDING, "--to", "rosbag9"), 2, "--to")):

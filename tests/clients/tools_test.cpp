@@ -1,6 +1,7 @@
 /// crepesctl as a user or a script runs it, with live daemons of a simulated pair.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -210,6 +211,39 @@ TEST(ToolsAlone, ReplayNothingWhereNoRowOfASensorIsGood) {
       << ending.errors;
 }
 
+TEST(ToolsAlone, SayWhyAReplayHasNoPoses) {
+  const TinySwarm files;
+  const std::string out = (files.dir() / "out").string();
+  files.write("r1/imu0/data.csv", "");
+
+  const Ending empty = crepesctl({"replay", files.dir().string(), "--out", out});
+  files.write("r1/imu0/data.csv", "#t_ns,wx,wy,wz,ax,ay,az\n");
+  const Ending header = crepesctl({"replay", files.dir().string(), "--out", out});
+
+  for (const Ending& ending : {empty, header}) {
+    EXPECT_EQ(ending.how, "exit code 1");
+    EXPECT_NE(ending.errors.find("r1/imu0/data.csv: no samples, so there are no poses"),
+              std::string::npos)
+        << ending.errors;
+  }
+  EXPECT_NE(empty.errors.find("no header"), std::string::npos) << empty.errors;
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
+TEST(ToolsAlone, ReplayIntoADirectoryOfItsOwnOnly) {
+  const TinySwarm files;
+  const std::string swarm = files.dir().string();
+
+  const Ending nowhere = crepesctl({"replay", swarm, "--out", ""});
+  const Ending into_itself = crepesctl({"replay", swarm, "--out", swarm + "/"});
+
+  EXPECT_EQ(nowhere.how, "exit code 2");
+  EXPECT_NE(nowhere.errors.find("names no directory"), std::string::npos) << nowhere.errors;
+  EXPECT_EQ(into_itself.how, "exit code 1");
+  EXPECT_NE(into_itself.errors.find("has a data set"), std::string::npos) << into_itself.errors;
+  EXPECT_FALSE(std::filesystem::exists(files.dir() / "report.json"));
+}
+
 TEST(DaemonAlone, RefusesWarningsOnlyIfItIsStrict) {
   const TinySwarm files;  // without lever arms, on a mesh that is not there
   const std::string file = (files.dir() / "r1/crepesd.yaml").string();
@@ -245,6 +279,15 @@ TEST(ToolsAlone, EndWithTwoWhenTheyAreUsedWrongly) {
                                                 {"status", "--address", "home"}})
     EXPECT_EQ(crepesctl(words).how, "exit code 2") << (words.empty() ? "" : words.front());
   EXPECT_NE(crepesctl({"--help"}).output.find("Exit codes: 0"), std::string::npos);
+}
+
+TEST(ToolsAlone, RefuseNumbersThatAreNone) {
+  for (const char* number : {"nan", "NaN"}) {
+    const Ending ending = crepesctl({"evaluate", "results", "--truth", "swarm", "--after", number});
+    EXPECT_EQ(ending.how, "exit code 2") << number;
+    EXPECT_NE(ending.errors.find("is no number"), std::string::npos) << ending.errors;
+  }
+  EXPECT_EQ(crepesctl({"exposure", "--exposure-us", "300", "--pid=-1"}).how, "exit code 2");
 }
 
 TEST(ToolsAlone, NameTheNearestSubcommand) {

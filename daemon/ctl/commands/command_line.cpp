@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <system_error>
@@ -18,6 +19,19 @@ namespace {
 constexpr int kBarColumns = 79;
 
 }  // namespace
+
+void require_finite_numbers(CLI::App& app) {
+  const CLI::Validator finite(
+      [](const std::string& text) {
+        double number = 0.0;
+        const bool is_wrong = CLI::detail::lexical_cast(text, number) && !std::isfinite(number);
+        return is_wrong ? text + " is no number" : std::string();
+      },
+      "");
+  for (CLI::Option* option : app.get_options())
+    if (option->get_type_name().starts_with("FLOAT")) option->check(finite);
+  for (CLI::App* sub : app.get_subcommands({})) require_finite_numbers(*sub);
+}
 
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon) {
   sub->add_option("--address", daemon.address, "where the daemon serves poses")
@@ -42,8 +56,8 @@ Result<void> write_output(const std::string& text, const std::string& file) {
   std::ofstream out(file, std::ios::binary);
   out << text;
   out.close();
-  if (!out) return fail(ErrorCode::kIo, file + ": cannot be written");
-  return {};
+  if (out) return {};
+  return fail(ErrorCode::kIo, file + ": " + std::generic_category().message(errno));
 }
 
 TerminalProgress::TerminalProgress()

@@ -64,6 +64,10 @@ void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<
       ->check(CLI::IsMember(names));
 }
 
+/// Refuses NaN and infinity as numbers of all options of `app` and its subcommands: checks of a
+/// range let NaN pass.
+void require_finite_numbers(CLI::App& app);
+
 /// --address and --port of the daemon.
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon);
 

@@ -1,5 +1,7 @@
 #include "daemon/ctl/live/exposure.hpp"
 
+#include <limits>
+
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
 
@@ -22,7 +24,8 @@ void add_exposure(CommandLine& line) {
   sub->add_option("--gain", options.gain, "in the device's own unit")
       ->check(CLI::Range(0.0, 1000.0));
   sub->add_option("--pid", options.pid,
-                  "process of the daemon, to reload it; default: systemctl reload crepesd");
+                  "process of the daemon, to reload it; default: systemctl reload crepesd")
+      ->check(CLI::Range(1, std::numeric_limits<int>::max()));
   add_json_flag(sub, options.json);
   line.run(sub, [&options] { return exposure(options); });
 }

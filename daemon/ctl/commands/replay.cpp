@@ -32,6 +32,7 @@ Result<ReplaySummary> replay_with_progress(ReplayOptions options) {
 }
 
 Result<void> run_replay(const ReplayOptions& options, bool json) {
+  if (options.out_dir.empty()) return fail(ErrorCode::kUsage, "--out: names no directory");
   const Result<ReplaySummary> summary = replay_with_progress(options);
   if (!summary) return tl::unexpected(summary.error());
   for (const std::string& fault : summary->faults.list())

@@ -4,23 +4,23 @@
 
 #include "daemon/ctl/commands/command_line.hpp"
 #include "daemon/ctl/commands/commands.hpp"
-#include "daemon/ctl/live/live_screen.hpp"
 
 namespace crepes {
 namespace {
 
 Result<void> run_spots(SpotsOptions options) {
   const TerminalProgress progress;
+  Result<void> printed;
   options.on_text = [&](const std::string& text) {
     progress.clear();
-    print(text);
+    if (printed) printed = print_result(text);
   };
   options.on_fault = [&](const std::string& fault) {
     progress.clear();
     std::fprintf(stderr, "skipped: %s\n", fault.c_str());
   };
   options.on_progress = progress.sink();
-  return inspect_spots(options).map([](const SpotsSummary&) {});
+  return inspect_spots(options).and_then([&](const SpotsSummary&) { return printed; });
 }
 
 }  // namespace

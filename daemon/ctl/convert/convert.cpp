@@ -11,6 +11,7 @@
 #include "daemon/ctl/convert/mcap_writer.hpp"
 #include "daemon/ctl/convert/replay_streams.hpp"
 #include "daemon/ctl/convert/swarm_streams.hpp"
+#include "daemon/ctl/replay/replay_output.hpp"
 #include "daemon/version.hpp"
 
 namespace crepes {
@@ -132,6 +133,8 @@ Result<ConvertSummary> convert_replay(const ConvertOptions& options) {
   if (!options.swarm.empty()) {
     auto read = load_manifest(options.swarm);
     if (!read) return tl::unexpected(read.error());
+    if (auto same = check_same_recording(options.source, *read); !same)
+      return tl::unexpected(same.error());
     manifest = std::move(*read);
     auto found = truth_of(options.swarm, *manifest);
     if (!found) return tl::unexpected(found.error());

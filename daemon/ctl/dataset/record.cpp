@@ -139,12 +139,19 @@ class Recording {
   RecordProgress progress_;
 };
 
-/// The peers' clocks as the daemon knows them; empty without an answer.
-std::vector<client::Status::Clock> ask_for_clocks(const SubscriptionConfig& subscription) {
-  if (subscription.listen.empty()) return {};
+/// Polls the status once a second; empty if there is no socket to do so.
+std::optional<client::Connection> connect_to(const SubscriptionConfig& subscription) {
+  if (subscription.listen.empty()) return std::nullopt;
   auto daemon =
       connect({subscription.listen.front(), static_cast<std::uint16_t>(subscription.port)},
               {.watch = false, .polls = {{}}});
+  if (!daemon) return std::nullopt;
+  return std::move(*daemon);
+}
+
+/// The peers' clocks as the daemon knows them; empty without an answer.
+std::vector<client::Status::Clock> ask_for_clocks(const SubscriptionConfig& subscription) {
+  auto daemon = connect_to(subscription);
   if (!daemon) return {};
   for (int i = 0; i < 10; ++i) {
     const auto answer = daemon->receive(50ms);
@@ -153,6 +160,24 @@ std::vector<client::Status::Clock> ask_for_clocks(const SubscriptionConfig& subs
   }
   return {};
 }
+
+/// The peers' clocks, as the daemon reported them last. Asks once a second and never waits, because
+/// the measurements do not, either.
+class KnownClocks {
+ public:
+  void update(const SubscriptionConfig& subscription) {
+    if (!daemon_) daemon_ = connect_to(subscription);
+    while (auto answer = daemon_ ? daemon_->receive(0ms) : std::nullopt) {
+      auto* status = std::get_if<client::Status>(&answer->message);
+      if (status != nullptr && !status->clocks.empty()) clocks_ = std::move(status->clocks);
+    }
+  }
+  [[nodiscard]] const std::vector<client::Status::Clock>& clocks() const { return clocks_; }
+
+ private:
+  std::optional<client::Connection> daemon_;
+  std::vector<client::Status::Clock> clocks_;
+};
 
 /// Why the recording ends now; empty while it continues.
 std::string end_reason(const RecordOptions& options, const RecordProgress& progress,
@@ -170,7 +195,7 @@ std::string end_reason(const RecordOptions& options, const RecordProgress& progr
 
 /// Records until something ends the recording. Returns the reason.
 Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recording& recording,
-                        StopSignals& signals) {
+                        KnownClocks& known, StopSignals& signals) {
   const MonotonicClock clock;
   const Timestamp start = clock.now();
   Timestamp next_manifest = start;
@@ -188,9 +213,10 @@ Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recor
     if (std::string why = end_reason(options, recording.progress(), elapsed, signals); !why.empty())
       return why;
     if (!*goes_on) return "the daemon hung up";
+    if (recording.has_begun()) known.update(recording.config().subscription);
     if (clock.now() < next_manifest) continue;
     next_manifest = clock.now() + kManifestPeriod;
-    if (auto written = recording.write_manifest({}); !written)
+    if (auto written = recording.write_manifest(known.clocks()); !written)
       return tl::unexpected(written.error());
   }
 }
@@ -212,8 +238,10 @@ Result<RecordSummary> record(const RecordOptions& options) {
   if (auto asked = daemon.request(options.pictures ? kPicturesRequest : kRecordRequest); !asked)
     return tl::unexpected(asked.error());
   Recording recording(options);
-  const Result<std::string> why = run(options, daemon, recording, signals);
-  const auto clocks = ask_for_clocks(recording.config().subscription);
+  KnownClocks known;
+  const Result<std::string> why = run(options, daemon, recording, known, signals);
+  auto clocks = ask_for_clocks(recording.config().subscription);
+  if (clocks.empty()) clocks = known.clocks();  // the daemon has ended
   const Result<void> written = recording.write_manifest(clocks);
   if (!why) return tl::unexpected(why.error());
   if (!written) return tl::unexpected(written.error());

@@ -55,6 +55,7 @@ Result<RobotObservation> observe(const CheckOptions& options) {
   if (!after) return tl::unexpected(after.error());
   seen.before = std::move(before->message);
   seen.after = std::move(after->message);
+  seen.config_state = config_state_of(after->json);
   seen.duration_s = to_seconds(clock.now() - start);
   seen.poses = std::move(*poses);
   return seen;

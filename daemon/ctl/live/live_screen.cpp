@@ -50,8 +50,8 @@ bool StopSignals::requested() {
 }
 
 bool print(const std::string& text) {
-  std::fwrite(text.data(), 1, text.size(), stdout);
-  return std::fflush(stdout) == 0;
+  const bool is_taken = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
+  return std::fflush(stdout) == 0 && is_taken;
 }
 
 KeyReader::KeyReader() {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "daemon/ctl/live/full_status.hpp"
@@ -15,6 +16,7 @@
 namespace crepes {
 namespace {
 
+using Json = nlohmann::ordered_json;
 using Rows = std::vector<std::vector<std::string>>;
 
 /// For example "gated 3, late 1"; empty without totals.
@@ -29,6 +31,26 @@ std::string head_of(const client::Status& status) {
   const double share = status.uptime_s > 0 ? 100.0 * status.cpu_s / status.uptime_s : 0.0;
   return fmt::format("robot {} {}, up {} s, {} % of a core, {} MB\n", status.self, status.name,
                      fixed(status.uptime_s, 0), fixed(share, 1), fixed(status.rss_mb, 0));
+}
+
+/// Several faults stand on a line each.
+std::string one_line(const std::string& lines) {
+  std::string text;
+  for (const char c : lines) text += c == '\n' ? std::string("; ") : std::string(1, c);
+  return text;
+}
+
+/// What is not as the configuration files say; empty if all is.
+std::string config_text(const ConfigState& config) {
+  std::string text;
+  if (!config.fault.empty())
+    text += fmt::format("configuration: the last reload was refused: {}\n", config.fault);
+  if (!config.restart.empty()) {
+    text +=
+        fmt::format("configuration: changed, not in use before `systemctl restart crepesd`: {}\n",
+                    config.restart);
+  }
+  return text;
 }
 
 std::string sensors_of(const client::Status& status) {
@@ -183,15 +205,28 @@ std::string totals_of(const client::Status& status) {
 
 }  // namespace
 
-std::string status_text(const client::Status& status) {
-  return fmt::format("{}\n{}\n{}\n{}{}{}{}{}{}{}", head_of(status), sensors_of(status),
-                     neighbors_of(status), advice_of(status), light_of(status), team_of(status),
-                     faults_of(status), mesh_of(status), thinned_of(status), totals_of(status));
+ConfigState config_state_of(const std::string& status_json) {
+  const Json status = Json::parse(status_json, nullptr, /*allow_exceptions=*/false);
+  const auto config = status.is_object() ? status.find("config") : status.end();
+  if (config == status.end() || !config->is_object()) return {};
+  const auto text_of_key = [&](const char* key) {
+    const auto found = config->find(key);
+    const bool is_text = found != config->end() && found->is_string();
+    return is_text ? one_line(found->get<std::string>()) : std::string();
+  };
+  return {.fault = text_of_key("fault"), .restart = text_of_key("restart")};
+}
+
+std::string status_text(const client::Status& status, const ConfigState& config) {
+  return fmt::format("{}{}\n{}\n{}\n{}{}{}{}{}{}{}", head_of(status), config_text(config),
+                     sensors_of(status), neighbors_of(status), advice_of(status), light_of(status),
+                     team_of(status), faults_of(status), mesh_of(status), thinned_of(status),
+                     totals_of(status));
 }
 
 Result<std::string> status(const StatusOptions& options) {
   return request_full_status(options.daemon).map([&](const FullStatus& full) {
-    return options.json ? full.json + "\n" : status_text(full.message);
+    return options.json ? full.json + "\n" : status_text(full.message, config_state_of(full.json));
   });
 }
 

@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <fstream>
+#include <set>
 
 #include "drivers/dataset/pose_file.hpp"
 #include "drivers/dataset/record_file.hpp"
@@ -16,19 +18,65 @@ namespace fs = std::filesystem;
 
 constexpr Duration kCalibrationPeriod = std::chrono::milliseconds(100);
 
-/// Of an earlier replay.
-void remove_records(const fs::path& stem) {
+/// Whether a replay wrote this file of poses, or began to.
+bool is_pose_file(const fs::path& file) {
   std::error_code status;
-  for (const char* extension : {".innovations.csv", ".calibration.csv"})
-    fs::remove(fs::path(stem) += extension, status);
+  if (!fs::is_regular_file(file, status)) return false;
+  std::ifstream in(file);
+  std::string header;
+  return std::getline(in, header) && header == pose_file_header();
+}
+
+/// The files of a pair or of the team, whole and begun.
+void remove_results(const fs::path& stem) {
+  std::error_code status;
+  for (const char* extension : {".csv", ".tum", ".innovations.csv", ".calibration.csv"}) {
+    fs::path file = stem;
+    fs::remove(file += extension, status);
+    fs::remove(file += ".part", status);
+  }
+}
+
+/// The pairs of an earlier replay in an observer's directory: those with a file of poses.
+std::set<fs::path> stems_in(const fs::path& observer) {
+  std::set<fs::path> stems;
+  std::error_code status;
+  for (const auto& entry : fs::directory_iterator(observer, status)) {
+    fs::path name = entry.path().filename();
+    if (name.extension() == ".part") name = name.stem();
+    if (name.extension() == ".csv" && is_pose_file(entry.path()))
+      stems.insert(observer / name.stem());
+  }
+  return stems;
+}
+
+/// Everything else in `dir` stays. A directory that is empty then goes, too.
+void remove_earlier_replay(const fs::path& dir) {
+  std::error_code status;
+  fs::remove(dir / "report.json", status);  // the mark of a complete result is removed first
+  std::vector<fs::path> observers;
+  for (const auto& entry : fs::directory_iterator(dir, status))
+    if (entry.is_directory(status) && !entry.is_symlink(status)) observers.push_back(entry.path());
+  for (const fs::path& observer : observers) {
+    const std::set<fs::path> stems = stems_in(observer);
+    if (stems.empty()) continue;
+    for (const fs::path& stem : stems) remove_results(stem);
+    remove_results(observer / kTeamStem);
+    fs::remove(observer, status);  // only if it is empty
+  }
 }
 
 }  // namespace
 
 Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names, Detail detail) {
-  ReplayOutput output(dir, std::move(names));
   std::error_code status;
-  fs::remove(dir / "report.json", status);  // the mark of a complete result is removed first
+  if (fs::exists(dir / "swarm.yaml", status)) {
+    return fail(ErrorCode::kConfig, dir.string() +
+                                        ": has a data set; the results of a replay need a "
+                                        "directory of their own");
+  }
+  ReplayOutput output(dir, std::move(names));
+  remove_earlier_replay(dir);
   for (const auto& [observer, observer_name] : output.names_) {
     fs::create_directories(dir / observer_name, status);
     if (status) {
@@ -41,14 +89,10 @@ Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names, Deta
       if (!files) return tl::unexpected(files.error());
       output.pairs_.emplace(std::pair(observer, neighbor), std::move(*files));
     }
-    const fs::path team = dir / observer_name / kTeamStem;
-    if (detail == Detail::kPoses) {
-      remove_records(team);
-      continue;
-    }
+    if (detail == Detail::kPoses) continue;
     if (std::ranges::any_of(output.names_, [](const auto& e) { return e.second == kTeamStem; }))
       return fail(ErrorCode::kConfig, "a robot named 'team' has the same files as the team");
-    auto files = create_team(team);
+    auto files = create_team(dir / observer_name / kTeamStem);
     if (!files) return tl::unexpected(files.error());
     output.teams_.emplace(observer, std::move(*files));
   }
@@ -56,6 +100,7 @@ Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names, Deta
 }
 
 Result<ReplayOutput::PairFiles> ReplayOutput::create_pair(const fs::path& stem, Detail detail) {
+  remove_results(stem);
   const auto create = [&stem](const char* extension, const std::string& header) {
     fs::path file = stem;
     return PartFile::create(file += extension, header);
@@ -65,10 +110,7 @@ Result<ReplayOutput::PairFiles> ReplayOutput::create_pair(const fs::path& stem, 
   auto tum = create(".tum", "");
   if (!tum) return tl::unexpected(tum.error());
   PairFiles files{.csv = std::move(*csv), .tum = std::move(*tum), .records = {}};
-  if (detail == Detail::kPoses) {
-    remove_records(stem);
-    return files;
-  }
+  if (detail == Detail::kPoses) return files;
   auto innovations = create(".innovations.csv", innovation_file_header() + '\n');
   if (!innovations) return tl::unexpected(innovations.error());
   auto calibration = create(".calibration.csv", calibration_file_header() + '\n');

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/ctl/dataset/swarm_manifest.hpp"
 #include "drivers/dataset/dataset_faults.hpp"
 #include "drivers/dataset/part_file.hpp"
 #include "estimator/core/outputs.hpp"
@@ -52,7 +53,7 @@ struct ReplayReport {
 /// Writes DIR/<observer>/<neighbor>.csv and .tum during the replay, and DIR/report.json at the end;
 /// with records also <neighbor>.innovations.csv and .calibration.csv, and those of the team. Files
 /// have their final names only after `finish`. Before, they end in ".part", and the results of an
-/// earlier replay are removed.
+/// earlier replay are removed, those of robots that are no more among the names, too.
 class ReplayOutput {
  public:
   /// The name of each robot's directory.
@@ -60,6 +61,7 @@ class ReplayOutput {
   /// Whether the files of records are written besides those of poses.
   enum class Detail { kPoses, kRecords };
 
+  /// A directory with a data set is refused.
   [[nodiscard]] static Result<ReplayOutput> create(const std::filesystem::path& dir, Names names,
                                                    Detail detail = Detail::kPoses);
 
@@ -107,5 +109,10 @@ class ReplayOutput {
 /// `names` are an error.
 [[nodiscard]] Result<std::vector<ClockSample>> read_clock_samples(const std::filesystem::path& file,
                                                                   const ReplayOutput::Names& names);
+
+/// Refuses results whose report.json is of another scenario or duration than `manifest`. What is
+/// missing on either side is not compared; the seed is not, as `replay --seed` changes it.
+[[nodiscard]] Result<void> check_same_recording(const std::filesystem::path& results,
+                                                const SwarmManifest& manifest);
 
 }  // namespace crepes

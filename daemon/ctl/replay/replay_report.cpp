@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "daemon/ctl/replay/replay_output.hpp"
@@ -125,6 +126,10 @@ ClockSample clock_from(const Json& json, const ReplayOutput::Names& names) {
                     .sigma_s = json.value("sigma_s", 0.0)}};
 }
 
+std::string recording_text(const std::string& scenario, double duration_s) {
+  return fmt::format("scenario {}, {} s", scenario, duration_s);
+}
+
 }  // namespace
 
 std::string report_json(const ReplayReport& report, const ReplayOutput::Names& names) {
@@ -157,6 +162,31 @@ Result<std::vector<ClockSample>> read_clock_samples(const std::filesystem::path&
     std::vector<ClockSample> samples;
     for (const Json& sample : report.at("clocks")) samples.push_back(clock_from(sample, names));
     return samples;
+  } catch (const nlohmann::json::exception& e) {
+    return fail(ErrorCode::kFormat, fmt::format("{}: {}", file.string(), e.what()));
+  }
+}
+
+Result<void> check_same_recording(const std::filesystem::path& results,
+                                  const SwarmManifest& manifest) {
+  constexpr double kSame = 1e-3;  // s
+  const std::filesystem::path file = results / "report.json";
+  const Result<std::string> text = read_text_file(file);
+  if (!text && text.error().code == ErrorCode::kNotFound) return {};
+  if (!text) return tl::unexpected(text.error());
+  try {
+    const Json report = Json::parse(*text);
+    const std::string scenario = report.value("scenario", "");
+    const double duration_s = report.value("duration_s", 0.0);
+    const bool is_other =
+        !scenario.empty() && !manifest.scenario.empty() && scenario != manifest.scenario;
+    const bool is_longer = duration_s > 0.0 && manifest.duration_s > 0.0 &&
+                           std::abs(duration_s - manifest.duration_s) > kSame;
+    if (!is_other && !is_longer) return {};
+    return fail(ErrorCode::kConfig,
+                fmt::format("{} is of another recording ({}) than the truth ({})", file.string(),
+                            recording_text(scenario, duration_s),
+                            recording_text(manifest.scenario, manifest.duration_s)));
   } catch (const nlohmann::json::exception& e) {
     return fail(ErrorCode::kFormat, fmt::format("{}: {}", file.string(), e.what()));
   }

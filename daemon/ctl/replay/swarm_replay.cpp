@@ -1,5 +1,8 @@
 #include "daemon/ctl/replay/swarm_replay.hpp"
 
+#include <fmt/core.h>
+
+#include <algorithm>
 #include <array>
 #include <string>
 #include <utility>
@@ -8,6 +11,24 @@
 #include "daemon/ctl/replay/virtual_swarm.hpp"
 
 namespace crepes {
+namespace {
+
+/// Robots without inertial samples neither have poses nor are in anybody's. One of several may be
+/// missing, as long as a pair is left.
+Result<void> check_imu(const SwarmDataset& dataset, const std::filesystem::path& dir) {
+  constexpr std::ptrdiff_t kPair = 2;
+  const auto has_imu = [](const RobotRecording& robot) { return !robot.imu.empty(); };
+  const auto silent = std::ranges::find_if_not(dataset.robots, has_imu);
+  if (silent == dataset.robots.end() || std::ranges::count_if(dataset.robots, has_imu) >= kPair)
+    return {};
+  const std::string& last = dataset.faults.last();
+  return fail(ErrorCode::kFormat,
+              fmt::format("{}: no samples, so there are no poses{}{}",
+                          (dir / silent->robot.dir / "imu0" / "data.csv").string(),
+                          last.empty() ? "" : "; refused: ", last));
+}
+
+}  // namespace
 
 Endpoint replay_address(RobotId robot) {
   constexpr std::uint16_t kPort = 47474;
@@ -33,6 +54,8 @@ Result<ReplayReport> replay_dataset(SwarmDataset dataset, const std::optional<Sw
 Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
   auto dataset = load_swarm(options.swarm_dir);
   if (!dataset) return tl::unexpected(dataset.error());
+  if (auto good = check_imu(*dataset, options.swarm_dir); !good)
+    return tl::unexpected(good.error());
   ReplayOutput::Names names;
   for (const RobotRecording& robot : dataset->robots) names[robot.robot.id] = robot.robot.name;
   std::optional<SwarmTruth> truth;  // judges IDs for the report; no estimator sees it

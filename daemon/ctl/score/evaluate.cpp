@@ -242,6 +242,11 @@ Json swarm_json(const SwarmScore& swarm) {
 Result<std::string> evaluate(const EvaluateOptions& options) {
   const Result<SwarmManifest> manifest = load_manifest(options.swarm);
   if (!manifest) return tl::unexpected(manifest.error());
+  if (options.after_s >= manifest->duration_s) {
+    return fail(ErrorCode::kConfig,
+                fmt::format("--after: nothing is left after {} s: {} ends at {} s", options.after_s,
+                            options.swarm.string(), manifest->duration_s));
+  }
   const Result<SwarmTruth> truth = SwarmTruth::load(options.swarm, *manifest);
   if (!truth) return tl::unexpected(truth.error());
   Result<SwarmScore> score =

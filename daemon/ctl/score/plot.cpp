@@ -10,6 +10,7 @@
 #include "daemon/ctl/dataset/replay_pairs.hpp"
 #include "daemon/ctl/dataset/swarm_manifest.hpp"
 #include "daemon/ctl/dataset/truth.hpp"
+#include "daemon/ctl/replay/replay_output.hpp"
 #include "daemon/ctl/score/plot_pair.hpp"
 #include "daemon/ctl/score/plot_parts.hpp"
 #include "daemon/ctl/score/plot_team.hpp"
@@ -26,10 +27,12 @@ struct PlottedRecording {
   SwarmTruth truth;
 };
 
-Result<PlottedRecording> load_recording(const fs::path& swarm) {
-  auto manifest = load_manifest(swarm);
+Result<PlottedRecording> load_recording(const PlotOptions& options) {
+  auto manifest = load_manifest(options.swarm);
   if (!manifest) return tl::unexpected(manifest.error());
-  auto truth = SwarmTruth::load(swarm, *manifest);
+  if (auto same = check_same_recording(options.results, *manifest); !same)
+    return tl::unexpected(same.error());
+  auto truth = SwarmTruth::load(options.swarm, *manifest);
   if (!truth) return tl::unexpected(truth.error());
   return PlottedRecording{std::move(*manifest), std::move(*truth)};
 }
@@ -167,7 +170,7 @@ Result<fs::path> plot(const PlotOptions& options) {
   }
   std::optional<PlottedRecording> recording;
   if (!options.swarm.empty()) {
-    auto loaded = load_recording(options.swarm);
+    auto loaded = load_recording(options);
     if (!loaded) return tl::unexpected(loaded.error());
     recording = std::move(*loaded);
   }

@@ -63,6 +63,8 @@ std::vector<ClockScore> score_clocks(const std::vector<ClockSample>& samples,
 Result<SwarmScore> score_swarm(const fs::path& results, const SwarmManifest& manifest,
                                const SwarmTruth& truth, double after_s,
                                const std::function<void(double)>& on_progress) {
+  if (auto same = check_same_recording(results, manifest); !same)
+    return tl::unexpected(same.error());
   const std::size_t pairs = manifest.robots.size() * (manifest.robots.size() - 1);
   SwarmScore swarm;
   std::size_t files = 0;

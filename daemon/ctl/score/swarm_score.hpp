@@ -36,7 +36,8 @@ struct SwarmScore {
 };
 
 /// Reads DIR/<observer>/<neighbor>.csv of every ordered pair and DIR/report.json, and scores the
-/// rows after `after_s`. A pair without a file has no poses; no file at all is an error.
+/// rows after `after_s`. A pair without a file has no poses; no file at all is an error,
+/// and so is a report of another recording.
 /// `on_progress` receives the share of the pairs that is done.
 [[nodiscard]] Result<SwarmScore> score_swarm(const std::filesystem::path& results,
                                              const SwarmManifest& manifest, const SwarmTruth& truth,

@@ -307,9 +307,14 @@ std::string next_steps(const RobotPlan& plan, const InitOptions& options) {
   const std::string dir = options.dir.string();
   return fmt::format(
       "\nNext:\n"
-      "  1. Measure (above), write it into {0}/swarm.yaml, and copy that file to all robots.\n"
-      "  2. crepesctl led --port /dev/ttyUSB0 set --id {1} --library {0}/swarm.yaml\n"
-      "  3. crepesctl keygen {0}/mesh.key {0}/robot.key     (a key for the swarm's radio)\n"
+      "  1. Keys, without which anybody can read and forge (first copy mesh.key from a robot that\n"
+      "     has one; robot.key stays here):\n"
+      "     crepesctl keygen {0}/mesh.key {0}/robot.key\n"
+      "     chgrp crepes {0}/*.key; chmod 640 {0}/*.key\n"
+      "     In {0}/crepesd.yaml, under net: key_file: mesh.key, robot_key_file: robot.key\n"
+      "  2. Measure (above). Write it and the public_key that each robot printed into its item of\n"
+      "     {0}/swarm.yaml, then copy that file to all robots.\n"
+      "  3. crepesctl led --port /dev/ttyUSB0 set --id {1} --library {0}/swarm.yaml\n"
       "  4. systemctl start crepesd; crepesctl check\n"
       "  5. crepesctl calibrate camera RECORDING --live --out {0}/camchain-imucam.yaml\n"
       "     (another robot's board at rest in view, this robot turned by hand)\n"

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/reading/config_file.hpp"
+#include "daemon/ctl/replay/replay_output.hpp"
 #include "daemon/ctl/view/field_of_view.hpp"
 #include "daemon/ctl/view/view_json.hpp"
 #include "net/subscription/json_parts.hpp"
@@ -172,6 +173,8 @@ Result<RecordedFeed> RecordedFeed::open(const fs::path& results, const fs::path&
   if (swarm.empty()) return feed;
   auto manifest = load_manifest(swarm);
   if (!manifest) return tl::unexpected(manifest.error());
+  if (auto same = check_same_recording(results, *manifest); !same)
+    return tl::unexpected(same.error());
   auto truth = SwarmTruth::load(swarm, *manifest);
   if (!truth) return tl::unexpected(truth.error());
   auto configs = configs_of(swarm, *manifest);

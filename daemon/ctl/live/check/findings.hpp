@@ -9,6 +9,7 @@
 
 #include "config/schema/config.hpp"
 #include "daemon/ctl/live/daemon_access.hpp"
+#include "daemon/ctl/live/status.hpp"
 
 namespace crepes {
 
@@ -23,7 +24,7 @@ enum class CheckVerdict : std::uint8_t {
 
 /// One result of a check.
 struct CheckFinding {
-  std::string about;  ///< sensors, rates, clocks, exposure, board, mesh, calibration
+  std::string about;  ///< configuration, sensors, rates, clocks, exposure, board, mesh, calibration
   CheckVerdict verdict = CheckVerdict::kGood;
   std::string text;
   std::string advice;  ///< what to do; empty if all is good
@@ -36,6 +37,7 @@ struct RobotObservation {
   double duration_s = 0.0;                ///< between the two
   std::map<RobotId, client::Pose> poses;  ///< the newest of each neighbor
   std::optional<Config> config;           ///< for rates that it should have
+  ConfigState config_state{};             ///< what the daemon has not taken over
 };
 
 /// Collects the findings of one section.

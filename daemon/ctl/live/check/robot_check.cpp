@@ -21,6 +21,23 @@ std::string side_text(double deg) {
   return fmt::format("{} deg to the {}", fixed(std::abs(deg), 0), deg > 0 ? "left" : "right");
 }
 
+/// Whether the daemon runs what its files say. Silent where it does.
+void check_configuration(const RobotObservation& seen, CheckSection section) {
+  if (seen.config && seen.config->robot.id.value != seen.after.self) {
+    section.fault(fmt::format("--config is robot {}'s, this daemon is robot {}",
+                              seen.config->robot.id.value, seen.after.self),
+                  "name this daemon's own file, or ask the other robot (--address, --port)");
+  }
+  const auto& [fault, restart] = seen.config_state;
+  if (!fault.empty()) {
+    section.fault("the last reload was refused: " + fault,
+                  "the earlier settings stay in use: correct the file, then systemctl reload "
+                  "crepesd");
+  }
+  if (!restart.empty())
+    section.doubt("changed, but not in use yet: " + restart, "systemctl restart crepesd");
+}
+
 }  // namespace
 
 std::vector<CheckFinding> check_exposure(const client::Status& status) {
@@ -31,6 +48,7 @@ std::vector<CheckFinding> check_exposure(const client::Status& status) {
 
 std::vector<CheckFinding> check_robot(const RobotObservation& seen) {
   std::vector<CheckFinding> findings;
+  check_configuration(seen, {"configuration", findings});
   check_sensors(seen, {"sensors", findings});
   check_rates(seen, {"rates", findings});
   check_clocks(seen, {"clocks", findings});

@@ -85,6 +85,13 @@ TEST(RobotCheck, RepeatsWhatASensorSaysOfItself) {
   EXPECT_EQ(complaints(seen), "sensors fault: uwb: no such file\nrates fault: uwb: silent");
 }
 
+TEST(RobotCheck, NamesAnAddressThatIsNotServedOnce) {
+  RobotObservation seen = healthy();
+  seen.after.sensors.push_back({"subscription", 0.0, false, "10.0.0.1:47475: in use", {}, {}});
+
+  EXPECT_EQ(complaints(seen), "sensors fault: subscription: 10.0.0.1:47475: in use");
+}
+
 TEST(RobotCheck, CountsOnlyFaultsThatGrow) {
   RobotObservation seen = healthy();
   seen.before.sensors[2].faults = {{"dropped", 7}};
@@ -99,9 +106,31 @@ TEST(RobotCheck, CountsOnlyFaultsThatGrow) {
 TEST(RobotCheck, ComparesRatesWithTheConfiguration) {
   RobotObservation seen = healthy();
   seen.config.emplace();
+  seen.config->robot.id = RobotId{1};
   seen.config->imu.noise.update_rate = 200.0;
 
   EXPECT_EQ(complaints(seen), "rates doubt: imu: 100.0 of 200 Hz");
+}
+
+TEST(RobotCheck, NamesTheConfigurationOfAnotherRobotFirst) {
+  RobotObservation seen = healthy();
+  seen.config.emplace();
+  seen.config->robot.id = RobotId{2};
+  seen.config->imu.noise.update_rate = 200.0;
+
+  EXPECT_EQ(complaints(seen),
+            "configuration fault: --config is robot 2's, this daemon is robot 1\n"
+            "rates doubt: imu: 100.0 of 200 Hz");
+}
+
+TEST(RobotCheck, NamesWhatTheDaemonDidNotTakeOver) {
+  RobotObservation seen = healthy();
+  seen.config_state = {.fault = "r1.yaml:20: uwb.noise: unknown key", .restart = "cameras"};
+
+  EXPECT_EQ(complaints(seen),
+            "configuration fault: the last reload was refused: r1.yaml:20: uwb.noise: unknown key\n"
+            "configuration doubt: changed, but not in use yet: cameras");
+  EXPECT_EQ(check_robot(seen)[1].advice, "systemctl restart crepesd");
 }
 
 TEST(RobotCheck, NoticesSpotsThatFallBehindTheirCamera) {
@@ -109,6 +138,15 @@ TEST(RobotCheck, NoticesSpotsThatFallBehindTheirCamera) {
   sensor(seen, "cam0 spots").rate_hz = 90.0;
 
   EXPECT_EQ(complaints(seen), "rates doubt: cam0 spots: 90.0 Hz, the camera has 200.0");
+}
+
+TEST(RobotCheck, ClaimsNothingAboutSpotsWhoseCountsAreUnknown) {
+  RobotObservation seen = healthy();
+  sensor(seen, "cam0 spots").counts.clear();
+
+  EXPECT_EQ(complaints(seen),
+            "rates doubt: cam0 spots: 200.0 Hz, time from picture to spots unknown\n"
+            "exposure doubt: cam0 spots: background and lights unknown");
 }
 
 TEST(RobotCheck, NoticesAClockThatIsNotKnown) {

@@ -312,6 +312,41 @@ TEST(ReplayOutput, LooksWholeOnlyWhenItIs) {
   EXPECT_EQ(read_pose_file(dir / "r2/r1.csv", RobotId{1})->size(), 0U);
 }
 
+TEST(ReplayOutput, RemovesTheRobotsOfAnEarlierReplayAndNothingElse) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const fs::path& dir = scratch.path();
+  const ReplayOutput::Names three{{RobotId{1}, "r1"}, {RobotId{2}, "r2"}, {RobotId{3}, "r3"}};
+  ASSERT_TRUE(ReplayOutput::create(dir, three, ReplayOutput::Detail::kRecords)->finish({}));
+  const ReplayOutput::Names four{{RobotId{3}, "r3"}, {RobotId{4}, "r4"}};
+  ASSERT_TRUE(ReplayOutput::create(dir / "other", four));  // never finished
+  fs::rename(dir / "other/r4", dir / "r4");
+  fs::create_directories(dir / "truth");
+  for (const char* file : {"r1/notes.csv", "r1/notes.tum", "truth/r1.csv", "plot.html"})
+    std::ofstream(dir / file) << "#t,x\n";
+
+  auto output = ReplayOutput::create(dir, kNames);
+
+  ASSERT_TRUE(output) << output.error().message;
+  ASSERT_TRUE(output->finish({}));
+  for (const char* file : {"r3", "r4", "r1/r3.csv", "r1/r3.tum", "r1/r3.innovations.csv",
+                           "r1/r3.calibration.csv", "r1/team.innovations.csv", "r2/r3.csv"})
+    EXPECT_FALSE(fs::exists(dir / file)) << file;
+  for (const char* file :
+       {"r1/r2.csv", "r2/r1.tum", "r1/notes.csv", "r1/notes.tum", "truth/r1.csv", "plot.html"})
+    EXPECT_TRUE(fs::exists(dir / file)) << file;
+}
+
+TEST(ReplayOutput, RefusesADirectoryWithADataSet) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  std::ofstream(scratch.path() / "swarm.yaml") << "scenario: tiny\n";
+
+  const auto output = ReplayOutput::create(scratch.path(), kNames);
+
+  ASSERT_FALSE(output);
+  EXPECT_EQ(output.error().code, ErrorCode::kConfig);
+  EXPECT_FALSE(fs::exists(scratch.path() / "r1"));
+}
+
 TEST(ReplayOutput, ReportsADirectoryThatCannotBe) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
   std::ofstream(scratch.path() / "file") << "in the way";

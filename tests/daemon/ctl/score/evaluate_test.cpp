@@ -343,5 +343,35 @@ TEST_F(Evaluate, SaysWhatIsMissing) {
             std::string::npos);
 }
 
+TEST_F(Evaluate, RefusesTheTruthOfAnotherRecording) {
+  write_results(0.1);
+  swarm_.write("out/report.json", R"({"scenario":"manual","duration_s":0.2,"clocks":[]})");
+  const auto other = evaluate(options());
+  swarm_.write("out/report.json", R"({"scenario":"tiny","duration_s":60.0,"clocks":[]})");
+  const auto longer = evaluate(options());
+  swarm_.write("out/report.json",
+               R"({"scenario":"tiny","seed":9,"duration_s":0.2,"clocks":[]})");  // replay --seed
+
+  ASSERT_FALSE(other);
+  for (const char* part : {"report.json", "scenario manual", "scenario tiny"})
+    EXPECT_NE(other.error().message.find(part), std::string::npos) << other.error().message;
+  ASSERT_FALSE(longer);
+  EXPECT_NE(longer.error().message.find("60 s"), std::string::npos) << longer.error().message;
+  EXPECT_TRUE(evaluate(options()));
+}
+
+TEST_F(Evaluate, SaysThatNothingIsLeftAfterTheEnd) {
+  write_results(0.1);
+  EvaluateOptions late = options();
+  late.after_s = 0.5;
+
+  const auto nothing = evaluate(late);
+
+  ASSERT_FALSE(nothing);
+  EXPECT_EQ(nothing.error().code, ErrorCode::kConfig);
+  EXPECT_NE(nothing.error().message.find("nothing is left after 0.5 s"), std::string::npos)
+      << nothing.error().message;
+}
+
 }  // namespace
 }  // namespace crepes::evaluate_test

@@ -214,5 +214,16 @@ TEST_F(Plot, SaysWhatIsMissing) {
   EXPECT_NE(message(swarm_.dir()).find("no robot 'stranger'"), std::string::npos);
 }
 
+TEST_F(Plot, RefusesTheTruthOfAnotherRecording) {
+  write_results(ReplayOutput::Detail::kPoses);
+  swarm_.write("out/report.json", R"({"scenario":"manual"})");
+
+  const auto file = plot({.results = results(), .swarm = swarm_.dir(), .out = {}});
+
+  ASSERT_FALSE(file);
+  for (const char* part : {"scenario manual", "scenario tiny"})
+    EXPECT_NE(file.error().message.find(part), std::string::npos) << file.error().message;
+}
+
 }  // namespace
 }  // namespace crepes::plot_test

@@ -241,6 +241,22 @@ TEST_F(Init, PrintsASheetWithTheAxesAndRoomForEveryRobot) {
   EXPECT_FALSE(report->warnings.empty());  // lever arms that nobody measured
 }
 
+TEST_F(Init, LeadsToASealedAndSignedMesh) {
+  options_.id = 1;
+  options_.robots = 2;
+
+  const auto report = run();
+
+  // In this order: a file of members that is copied before has no keys.
+  ASSERT_TRUE(report);
+  std::size_t at = report->text.find("Next:");
+  for (const char* part : {"keygen", "key_file: mesh.key", "robot_key_file: robot.key",
+                           "public_key", "copy that file to all robots", "systemctl start"}) {
+    at = report->text.find(part, at);
+    ASSERT_NE(at, std::string::npos) << part << "\n" << report->text;
+  }
+}
+
 TEST_F(Init, ReportsInJsonWhatItWrote) {
   options_.id = 1;
   options_.robots = 2;

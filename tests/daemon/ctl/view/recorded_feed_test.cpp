@@ -114,6 +114,16 @@ TEST_F(RecordedFeedTest, NamesARobotThatTheTruthDoesNotKnow) {
   EXPECT_NE(feed.error().message.find("'r9'"), std::string::npos);
 }
 
+TEST_F(RecordedFeedTest, RefusesTheTruthOfAnotherRecording) {
+  swarm_.write("results/report.json", R"({"scenario":"manual","duration_s":0.2})");
+
+  const auto feed = RecordedFeed::open(results(), swarm_.dir());
+
+  ASSERT_FALSE(feed);
+  EXPECT_NE(feed.error().message.find("scenario manual"), std::string::npos)
+      << feed.error().message;
+}
+
 TEST(PageFiles, AreFoundByTheirNamesOnly) {
   ASSERT_NE(page_file("/"), nullptr);
   EXPECT_EQ(page_file("/"), page_file("/index.html"));
