@@ -100,9 +100,10 @@ Result<BoardSightings> board_sightings(const RobotRecording& recording,
     by_board.add(frame->stamp, tracker.step(*frame), camera.T_cam_imu, *model);
   }
   BoardSightings all = std::move(by_board).boards();
-  if (source.size() > 1)
+  if (source.size() > 1) {
     all.frame_rate_hz = static_cast<double>(source.size() - 1) /
                         to_seconds(source.stamp(source.size() - 1) - source.stamp(0));
+  }
   return all;
 }
 

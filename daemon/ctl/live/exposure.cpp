@@ -72,9 +72,15 @@ Result<void> await_reload(const DaemonAddress& daemon, int generation) {
 Result<void> apply(const ExposureOptions& options, CameraLights& lights, const CameraLight& light) {
   const Result<Json> before = config_status(options.daemon);
   if (!before) return tl::unexpected(before.error());
-  return lights.change(light).and_then([&] { return request_reload(options); }).and_then([&] {
-    return await_reload(options.daemon, before->value("generation", 0));
-  });
+  const auto reload = [&] {
+    return request_reload(options)
+        .and_then([&] { return await_reload(options.daemon, before->value("generation", 0)); })
+        .map_error([](Error error) {
+          error.message += "; 90-exposure.yaml has the new values, for the daemon's next start";
+          return error;
+        });
+  };
+  return lights.change(light).and_then(reload);
 }
 
 std::string setting(const std::optional<double>& value) {

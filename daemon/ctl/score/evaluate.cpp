@@ -242,7 +242,7 @@ Json swarm_json(const SwarmScore& swarm) {
 Result<std::string> evaluate(const EvaluateOptions& options) {
   const Result<SwarmManifest> manifest = load_manifest(options.swarm);
   if (!manifest) return tl::unexpected(manifest.error());
-  if (options.after_s >= manifest->duration_s) {
+  if (manifest->duration_s > 0.0 && options.after_s >= manifest->duration_s) {
     return fail(ErrorCode::kConfig,
                 fmt::format("--after: nothing is left after {} s: {} ends at {} s", options.after_s,
                             options.swarm.string(), manifest->duration_s));
