@@ -284,6 +284,10 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
     const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
     return found == solution.calibrations.end() ? ImuBiasEstimate{} : found->imu;
   };
+  for (auto& [robot, neighbor] : neighbors) {
+    if (std::ranges::find(solution.poses, robot, &TeamPose::neighbor) == solution.poses.end())
+      neighbor.end_team_pose();
+  }
   for (const TeamPose& pose : solution.poses) {
     const auto neighbor = neighbors.find(pose.neighbor);
     if (neighbor != neighbors.end())

@@ -41,6 +41,8 @@ class Neighbor {
   void tick(Timestamp now, const RobotState& self);
   /// The team found its gyroscope false: no filter runs until then.
   void refuse_imu_until(Timestamp t) { body_.refused_until = t; }
+  /// The team does not know it any more.
+  void end_team_pose() { publisher_.end_team_pose(); }
 
   /// The pose at the last tick.
   [[nodiscard]] const PosePublisher& output() const { return publisher_; }

@@ -40,6 +40,7 @@ class PosePublisher {
   void add_graph_correction(Timestamp stamp, const GraphPose& pose);
   /// Replaces the former one.
   void add_team_pose(TeamEstimate estimate) { team_ = std::move(estimate); }
+  void end_team_pose() { team_.reset(); }
   /// Carries the newest team pose to now.
   void update_team(Timestamp now, const RobotState& self, const RobotState& neighbor,
                    const LastContact& last);

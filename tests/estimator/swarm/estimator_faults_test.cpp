@@ -214,6 +214,29 @@ TEST(EstimatorFaults, AGyroscopeThatTheTeamFoundFalseTakesThePoseAway) {
   EXPECT_LE(others.after.dishonest_share(), 0.02);
 }
 
+TEST(EstimatorFaults, ANeighborThatTheTeamKnowsNoMoreHasNoPose) {
+  Conditions hidden;
+  hidden.in_view = false;
+  EstimatorPair pair(1);
+  pair.run_for(2s, hidden);
+  ASSERT_EQ(pair.latest(), nullptr);
+  TeamPose known{.neighbor = EstimatorPair::kOther, .T_B_N = {{3.0, 0.0, 0.0}, {}}};
+  known.covariance.diagonal().setConstant(1e-4);
+  TeamSolution solution;
+  solution.stamp = pair.own_time(pair.now() - 100ms);
+  known.last_sighting = solution.stamp;
+  solution.poses = {known};
+
+  pair.solve(solution);
+  pair.run_for(20ms, hidden);
+  EXPECT_NE(pair.latest(), nullptr);
+  solution.stamp += 20ms;
+  solution.poses.clear();
+  pair.solve(solution);
+  pair.run_for(20ms, hidden);
+  EXPECT_EQ(pair.latest(), nullptr);
+}
+
 TEST(EstimatorFaults, HundredStartsAfterASaturatedImuAreHonest) {
   // A pose that starts three sigma off stays so for a while: a few of these decide the share. Our
   // tilt starts anew from a single sample in flight, as wrong as the robot then accelerates.
