@@ -120,7 +120,7 @@ class NetLoop {
   }
 
   [[nodiscard]] std::string mesh_warning() const {
-    const std::string keys = key_warning(settings_);
+    std::string keys = key_warning(settings_);
     if (!mesh_.keys_may_be_swapped()) return keys;
     return std::string(kKeysUnlocked) + (keys.empty() ? "" : "; ") + keys;
   }

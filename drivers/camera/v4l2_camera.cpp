@@ -334,9 +334,9 @@ class V4l2Camera final : public Camera {
 
 Result<std::unique_ptr<Camera>> open_v4l2_camera(const CameraConfig& config, std::uint8_t index,
                                                  const Clock& clock) {
-  return open_v4l2_device(config.device.id).and_then([&](std::unique_ptr<V4l2Device> device) {
-    return start_v4l2_camera(std::move(device), config, index, clock);
-  });
+  auto device = open_v4l2_device(config.device.id);
+  if (!device) return tl::unexpected(std::move(device.error()));
+  return start_v4l2_camera(std::move(*device), config, index, clock);
 }
 
 Result<std::unique_ptr<Camera>> start_v4l2_camera(std::unique_ptr<V4l2Device> device,

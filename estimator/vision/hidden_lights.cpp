@@ -89,9 +89,10 @@ std::optional<HiddenLights::Return> HiddenLights::extract_match(
   for (const ExpectedLight& light : expected)
     if (is_most(density_at(u_B, light.u_B, light.sigma_rad))) by_pose = &light;
   if (most == 0.0 || most < (1.0 - kMostStranger) * sum) return std::nullopt;
-  if (by_pose != nullptr)
+  if (by_pose != nullptr) {
     likeliest = std::ranges::find_if(
         lights_, [&](const HiddenLight& light) { return is_of(light, *by_pose); });
+  }
   Return found{
       .evidence = {}, .stranger = std::max(kLeastStranger, 1.0 - most / sum), .by_pose = by_pose};
   if (likeliest != lights_.end()) {

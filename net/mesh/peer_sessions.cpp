@@ -83,9 +83,10 @@ MeshCounter PeerSessions::counted_copy(MeshCounter refusal, const DatagramId& id
 void PeerSessions::record_reachability(const PeerMessage& message, Timestamp arrival,
                                        const Endpoint& from) {
   if (message.mark == 0) relay_.record_heard(message.report.sender, from, arrival);
-  for (const ClockEcho& echo : message.echoes)
+  for (const ClockEcho& echo : message.echoes) {
     if (echo.is_direct && (echo.peer == self_ || peers_.contains(echo.peer)))
       relay_.record_hears(message.report.sender, echo.peer, arrival);
+  }
 }
 
 /// The session of the message, if the message is new in it and its stamps agree with it. A session

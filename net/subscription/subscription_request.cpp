@@ -95,7 +95,7 @@ Result<PollRequest> read_poll(const ParsedJson& json) {
     poll.sensor = sensor->get<std::string>();
   }
   if (const auto about = json.find("about"); about != json.end()) {
-    const auto part = std::ranges::find(kParts, *about, &Part::name);
+    const auto* const part = std::ranges::find(kParts, *about, &Part::name);
     if (part == kParts.end())
       return fail(ErrorCode::kFormat, R"("about" must be "sensors", "network", "team" or "pair")");
     poll.about = part->part;

@@ -71,9 +71,10 @@ std::optional<std::string> SubscriptionService::serve(const Endpoint& client,
 std::optional<std::string> SubscriptionService::status_of(const PollRequest& poll) const {
   const SystemStatus status = status_();
   if (poll.sensor) return sensor_status_json(status, *poll.sensor);
-  if (!poll.peer)
+  if (!poll.peer) {
     return poll.about == StatusPart::kTeam ? team_status_json(status)
                                            : status_json(status, poll.about);
+  }
   switch (poll.about) {
     case StatusPart::kTeam:
       return team_status_json(status, *poll.peer);

@@ -208,9 +208,10 @@ class Inspection {
   }
 
   void add(const PictureFindings& findings) {
-    if (options_.on_progress)
+    if (options_.on_progress) {
       options_.on_progress(static_cast<double>(summary_.pictures + summary_.refused) /
                            static_cast<double>(total_));
+    }
     count(findings, first_, summary_);
     album_.add(findings);
     if (options_.on_text && (options_.json || total_ == 1))

@@ -83,10 +83,12 @@ std::string innovation_row(double t_s, const MeasurementRecord& record) {
 template <class Seconds>
 std::string gated_rows(const std::vector<MeasurementRecord>& records, const Seconds& seconds) {
   std::map<std::int64_t, int> gated;  // by whole second
-  for (const MeasurementRecord& record : records)
+  for (const MeasurementRecord& record : records) {
     gated[std::llround(std::floor(seconds(record.stamp)))] +=
         record.fusion.verdict == Verdict::kGated ? 1 : 0;
+  }
   std::vector<std::string> rows;
+  rows.reserve(gated.size());
   for (const auto& [second, count] : gated) rows.push_back(fmt::format("[{},{}]", second, count));
   return joined(rows);
 }

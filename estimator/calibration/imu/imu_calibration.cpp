@@ -59,32 +59,28 @@ struct RateStep {
 /// eq. 43: coning over two intervals).
 struct TurnFactor {
   std::vector<RateStep> steps;
-  Eigen::Vector3d up_before;
-  Eigen::Matrix<double, 3, 2> across;  ///< the direction after the turn, its two tangents
-  double sigma;
+  Eigen::Vector3d up_before = Eigen::Vector3d::UnitZ();
+  /// The direction after the turn, its two tangents.
+  Eigen::Matrix<double, 3, 2> across = Eigen::Matrix<double, 3, 2>::Zero();
+  double sigma = 1.0;
 
   template <class T>
   bool operator()(const T* x, T* residual) const {
+    using Vector = Eigen::Matrix<T, 3, 1>;
     constexpr double kConing = 1.0 / 12.0;
-    T u[3] = {T(up_before.x()), T(up_before.y()), T(up_before.z())};
-    T before[3] = {T(0.0), T(0.0), T(0.0)};
+    const Eigen::Map<const Eigen::Matrix<T, 3, 3, Eigen::RowMajor>> M(x);
+    Vector u = up_before.cast<T>();
+    Vector before = Vector::Zero();
     for (const RateStep& step : steps) {
-      T d[3];
-      for (int i = 0; i < 3; ++i)
-        d[i] = (x[3 * i] * step.rate.x() + x[3 * i + 1] * step.rate.y() +
-                x[3 * i + 2] * step.rate.z()) *
-               step.dt_s;
-      T coning[3];
-      ceres::CrossProduct(before, d, coning);
-      T back[3];
-      for (int i = 0; i < 3; ++i) back[i] = -(d[i] + kConing * coning[i]);
-      T turned[3];
-      ceres::AngleAxisRotatePoint(back, u, turned);
-      std::copy(turned, turned + 3, u);
-      std::copy(d, d + 3, before);
+      const Vector d = M * (step.dt_s * step.rate).cast<T>();
+      const Vector back = -(d + T(kConing) * before.cross(d));
+      Vector turned;
+      ceres::AngleAxisRotatePoint(back.data(), u.data(), turned.data());
+      u = turned;
+      before = d;
     }
-    for (int k = 0; k < 2; ++k)
-      residual[k] = (across(0, k) * u[0] + across(1, k) * u[1] + across(2, k) * u[2]) / sigma;
+    Eigen::Map<Eigen::Matrix<T, 2, 1>> weighed(residual);
+    weighed = across.cast<T>().transpose() * u / T(sigma);
     return true;
   }
 };
@@ -171,9 +167,10 @@ TurnFactor turn_between(std::span<const ImuSample> samples, const Rest& from, co
                         const Eigen::Vector3d& bias, const ImuCalibration& found,
                         double gravity_mps2) {
   TurnFactor turn;
-  for (std::size_t i = from.last; i < to.first; ++i)
+  for (std::size_t i = from.last; i < to.first; ++i) {
     turn.steps.push_back(
         {samples[i].gyro_radps - bias, to_seconds(samples[i].stamp - samples[i - 1].stamp)});
+  }
   turn.up_before = up_at(from, found.accelerometer);
   turn.across = tangent_basis(up_at(to, found.accelerometer));
   const double turn_s = to.begin_s - from.end_s;
