@@ -1,13 +1,13 @@
 #include "tests/faults/flight.hpp"
 
 #include <fmt/core.h>
-#include <malloc.h>
 
 #include <algorithm>
 #include <numeric>
 
 #include "estimator/core/contract.hpp"
 #include "tests/faults/sensor_faults.hpp"
+#include "tests/support/heap.hpp"
 
 namespace crepes::faults {
 namespace {
@@ -21,11 +21,6 @@ ReplayOptions options_of(bool sealed) {
   ReplayOptions options;
   options.sealed = sealed;
   return options;
-}
-
-std::uint64_t heap_in_use() {
-  const struct mallinfo2 heap = ::mallinfo2();
-  return heap.uordblks + heap.hblkhd;
 }
 
 /// Datagrams that were received and gave no report.
@@ -81,7 +76,7 @@ void Flight::strike(const std::vector<Fault>& faults) {
   // With a neighbor go its counters.
   counts_readings_ = std::ranges::none_of(
       faults, [](const Fault& fault) { return fault.kind == Kind::kMemberRemoved; });
-  heap_before_ = heap_in_use();
+  heap_before_ = static_cast<std::uint64_t>(test::heap_bytes());
 }
 
 void Flight::fly_until(double true_s) {
@@ -118,7 +113,7 @@ void Flight::check() {
     check_readings(robot);
   }
   if (heap_before_ == 0) return;
-  const std::uint64_t heap = heap_in_use();
+  const std::uint64_t heap = static_cast<std::uint64_t>(test::heap_bytes());
   heap_growth_ = std::max(heap_growth_, heap - std::min(heap, heap_before_));
   if (heap_growth_ > kMostGrowth)
     complain(fmt::format("the heap has grown by {} bytes", heap_growth_));

@@ -1,6 +1,5 @@
 /// memory_growth: what a swarm keeps in memory over hours under attack. See README.md.
 #include <fmt/core.h>
-#include <malloc.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -14,6 +13,7 @@
 #include "daemon/ctl/replay/virtual_swarm.hpp"
 #include "tests/faults/network_faults.hpp"
 #include "tests/study/crowd.hpp"
+#include "tests/support/heap.hpp"
 
 namespace crepes::faults {
 namespace {
@@ -21,10 +21,7 @@ namespace {
 constexpr double kPiece_s = 60.0;
 constexpr double kPause_s = 3.0;  // the robots stop, and are elsewhere when they go on
 
-double heap_mb() {
-  const struct mallinfo2 heap = ::mallinfo2();
-  return 1e-6 * static_cast<double>(heap.uordblks + heap.hblkhd);
-}
+double heap_mb() { return 1e-6 * static_cast<double>(test::heap_bytes()); }
 
 /// Floods, copies, replays, doubled ids and liars, ten seconds each in turn, each robot in turn.
 std::vector<Fault> attacks(std::size_t robots, double from_s) {
