@@ -11,8 +11,12 @@ static bool comes(const reg32* reg, uint32_t mask, uint32_t value) {
   return false;
 }
 
+/// The PLL can be configured only while it neither runs nor drives the chip. The boot loader may
+/// leave it so.
 static bool run_on_pll(uint32_t source_and_factor) {
-  RCC->CR &= ~(uint32_t)RCC_CR_PLLON;  // the PLL cannot be configured while it runs
+  RCC->CFGR = 0;
+  if (!comes(&RCC->CFGR, RCC_CFGR_SWS, 0)) return false;
+  RCC->CR &= ~(uint32_t)RCC_CR_PLLON;
   RCC->CFGR = source_and_factor;
   RCC->CR |= RCC_CR_PLLON;
   if (!comes(&RCC->CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY)) return false;

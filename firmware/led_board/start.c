@@ -9,12 +9,7 @@ int main(void);
 void systick_handler(void);
 void usart1_handler(void);
 
-void reset_handler(void) {
-  const uint32_t* from = data_image;
-  for (uint32_t* to = data_begin; to < data_end; ++to) *to = *from++;
-  for (uint32_t* to = bss_begin; to < bss_end; ++to) *to = 0;
-  main();
-}
+void reset_handler(void);
 
 /// A fault, an unexpected interrupt, or (NMI) a crystal that has stopped.
 static void start_over(void) {
@@ -41,6 +36,15 @@ __attribute__((section(".vectors"), used)) static const struct vectors kVectors 
                    [USART1_IRQ] = usart1_handler,
                    [USART1_IRQ + 1 ... 60] = start_over},
 };
+
+void reset_handler(void) {
+  const uint32_t* from = data_image;
+  for (uint32_t* to = data_begin; to < data_end; ++to) *to = *from++;
+  for (uint32_t* to = bss_begin; to < bss_end; ++to) *to = 0;
+  // After the boot loader, address 0 is still its own ROM.
+  SCB_VTOR = (uint32_t)&kVectors;
+  main();
+}
 
 // The compiler calls these to copy and clear structures.
 void* memcpy(void* to, const void* from, size_t size);

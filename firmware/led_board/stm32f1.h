@@ -45,6 +45,7 @@ struct systick {
 #define SYSTICK ((struct systick*)0xE000E010)
 #define NVIC_ISER ((reg32*)0xE000E100)
 #define NVIC_IPR ((volatile uint8_t*)0xE000E400)
+#define SCB_VTOR (*(reg32*)0xE000ED08)
 #define SCB_AIRCR (*(reg32*)0xE000ED0C)
 
 enum {

@@ -67,13 +67,13 @@ struct led_status {
 /// What drives the clock of the board.
 enum led_clock {
   LED_CLOCK_CRYSTAL,    ///< 24 MHz from the crystal
-  LED_CLOCK_RC,         ///< 24 MHz from the internal oscillator, with an error of 1 % at most
+  LED_CLOCK_RC,         ///< 24 MHz from the internal oscillator, typically 1 % off, up to 3 %
   LED_CLOCK_RC_NO_PLL,  ///< 8 MHz from the internal oscillator
 };
 
 enum led_fault led_settings_fault(const struct led_settings* settings);
 
-/// Settings of a new board: dark.
+/// Settings of a new board: dark, but a test lights it up.
 struct led_settings led_settings_unset(void);
 
 void led_settings_write(const struct led_settings* settings, uint8_t out[LED_SETTINGS_SIZE]);
