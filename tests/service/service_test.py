@@ -79,6 +79,10 @@ def device_rules():
     reported = module.stdout + module.stderr
     check("udev finds no fault with the rules", not re.search(r"70-crepes\.rules:\d+ (?!GROUP|MODE|ATTR|LINK|RUN)", reported))
     check("the UWB module has a name, and is the seat's", "DEVLINKS=/dev/crepes/uwb" in reported and ":uaccess:" in reported)
+    named = pathlib.Path("/etc/udev/rules.d/69-crepes.rules")
+    named.write_text('SUBSYSTEM=="tty", KERNEL=="ttyACM0", ENV{CREPES_NAMED}="1", SYMLINK+="crepes/imu"\n')
+    check("an administrator's name is the only one", "DEVLINKS=/dev/crepes/imu\n" in udev_says("1-3/1-3:1.0/tty/ttyACM0").stdout)
+    named.unlink()
     for device, kind in (("1-1", "MindVision"), ("1-2", "USB3 Vision")):
         camera = udev_says(device)
         check(f"a camera ({kind}) has a name, belongs to the group, and stays awake",
@@ -229,10 +233,12 @@ def stop():
 
 def remove():
     run("systemctl", "start", "crepesd")
+    run("systemctl", "enable", "crepes-view")
     check("the package is removed from under the running service", run("dpkg", "--purge", "crepes").returncode == 0)
     check("which stops", not awaited(lambda: shown("ActiveState") == "active", 0.1)[0])
     left = [path for path in ("/lib/systemd/system/crepesd.service", "/lib/systemd/system/crepes-view.service", "/etc/systemd/system/crepesd.service",
-                              "/etc/systemd/system/multi-user.target.wants/crepesd.service", "/usr/bin/crepesd")
+                              "/etc/systemd/system/multi-user.target.wants/crepesd.service",
+                              "/etc/systemd/system/multi-user.target.wants/crepes-view.service", "/usr/bin/crepesd")
             if os.path.lexists(path)]
     check("and leaves nothing but the robot's own file", not left and CONFIG.exists(), left)
 
