@@ -11,7 +11,10 @@
 namespace crepes {
 namespace {
 
-constexpr double kFirstSigma = 0.15;         // rad; a robot in flight at the first sample
+constexpr double kFirstSigma = 0.15;     // rad; a robot in flight at the first sample, at least
+constexpr double kMostFirstSigma = 0.5;  // rad
+// Of a robot's tilt in what its acceleration explains: one that turns fast may lean by 30 degrees.
+constexpr double kFirstShare = 0.5;
 constexpr double kAccelerationTime = 1.0;    // s; how long a robot's acceleration keeps its sign
 constexpr double kStillAcceleration = 0.03;  // m/s^2
 // A robot that turns at w tilts by w T and accelerates by g w T: with T about a second.
@@ -30,12 +33,18 @@ void TiltFilter::start(const ImuSample& sample) {
   q_L_B_ = shortest_rotation(sample.accel_mps2, Eigen::Vector3d::UnitZ());
   gyro_bias_.setZero();
   P_.setZero();
-  P_.diagonal().head<3>().setConstant(kFirstSigma * kFirstSigma);
-  P_.diagonal().tail<3>().setConstant(config_.gyroscope_bias_sigma * config_.gyroscope_bias_sigma);
   turning_radps_ = sample.gyro_radps.norm();
   surplus_mps2_ = std::abs(sample.accel_mps2.norm() - kGravityMps2);
+  const double sigma =
+      std::clamp(kFirstShare * acceleration() / kGravityMps2, kFirstSigma, kMostFirstSigma);
+  P_.diagonal().head<3>().setConstant(sigma * sigma);
+  P_.diagonal().tail<3>().setConstant(config_.gyroscope_bias_sigma * config_.gyroscope_bias_sigma);
   samples_ = 1;
   last_ = sample;
+}
+
+double TiltFilter::acceleration() const {
+  return kStillAcceleration + kAccelerationPerTurn * turning_radps_ + surplus_mps2_;
 }
 
 bool TiltFilter::add(const ImuSample& sample) {
@@ -77,9 +86,7 @@ void TiltFilter::correct(const ImuSample& sample, double dt) {
   if (force < 0.5 * kGravityMps2 || force > 2.0 * kGravityMps2) return;  // falling or thrown about
 
   // White noise that weighs as much per second as an acceleration of this size and duration.
-  const double acceleration =
-      kStillAcceleration + kAccelerationPerTurn * turning_radps_ + surplus_mps2_;
-  const double sigma = acceleration / kGravityMps2 * std::sqrt(2.0 * kAccelerationTime / dt);
+  const double sigma = acceleration() / kGravityMps2 * std::sqrt(2.0 * kAccelerationTime / dt);
 
   const Eigen::Vector3d up_B = q_L_B_.conjugate() * Eigen::Vector3d::UnitZ();
   const Eigen::Matrix<double, 3, 2> across = tangent_basis(up_B);

@@ -38,6 +38,8 @@ class TiltFilter {
   void start(const ImuSample& sample);
   void predict(const ImuSample& sample, double dt);
   void correct(const ImuSample& sample, double dt);
+  /// What the present motion lets one expect, one sigma [m/s^2].
+  [[nodiscard]] double acceleration() const;
 
   ImuNoise config_;
   std::optional<ImuSample> last_;

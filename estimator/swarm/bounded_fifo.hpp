@@ -28,6 +28,11 @@ class BoundedFifo {
                                  [t](const Reading& reading) { return reading.stamp >= t; }));
   }
 
+  template <class Predicate>
+  void erase_if(Predicate is_unwanted) {
+    std::erase_if(readings_, is_unwanted);
+  }
+
   [[nodiscard]] const std::vector<Reading>& all() const { return readings_; }
 
  private:

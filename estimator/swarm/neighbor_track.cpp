@@ -248,10 +248,13 @@ bool NeighborTrack::is_range_diverged() const {
 }
 
 bool NeighborTrack::is_contradicted() const {
-  const Timestamp sighted = last_sighting() + kGlimpseGap;
+  const Timestamp sighted = last_sighting();
   const auto is_contrary = [&](MeasurementKind kind) {
     const GatedRun& gated = gated_[static_cast<std::size_t>(kind)];
-    return gated.count >= kMinContradicting && gated.since > sighted;
+    // A pose that drifts off leaves no gap between the last bearing that fits and the first that
+    // does not.
+    return gated.count >= kMinContradicting &&
+           (gated.since > sighted + kGlimpseGap || gated.latest >= sighted + kDivergenceTime);
   };
   const GatedRun& ranges = gated_[static_cast<std::size_t>(MeasurementKind::kRange)];
   const bool are_ranges_contrary =  // old ones say nothing, if no more come

@@ -136,9 +136,9 @@ Sighting ObservationBuffer::sighting(const Bearing& bearing, const Tilt& tilt,
           .tilt_sigma_rad = tilt.sigma_rad};
 }
 
-std::variant<std::vector<MutualInitialization>, NoPoseReason>
-ObservationBuffer::mutual_initializations(const Bearing& peer_bearing, const RobotState& self,
-                                          const RobotState& neighbor) const {
+MutualInitializations ObservationBuffer::mutual_initializations(const Bearing& peer_bearing,
+                                                                const RobotState& self,
+                                                                const RobotState& neighbor) const {
   const Timestamp t = peer_bearing.stamp;
   const auto tilt_B = self.tilt_at(t);
   const auto tilt_N = neighbor.tilt_at(t);
@@ -177,13 +177,18 @@ ObservationBuffer::mutual_initializations(const Bearing& peer_bearing, const Rob
 std::optional<Measurement> ObservationBuffer::one_way_initialization(
     const RobotState& self, const RobotState& neighbor) const {
   constexpr int kHeadings = 24;
-  if (own_.all().empty()) return std::nullopt;
-  const Bearing& bearing = own_.all().back();
+  // A range may arrive later than the picture of its instant.
+  std::optional<RangeReading> range;
+  const auto newest = std::find_if(own_.all().rbegin(), own_.all().rend(), [&](const Bearing& own) {
+    range = range_at(own.stamp);
+    if (!range) range = range_by_ring(own);
+    return range.has_value();
+  });
+  if (newest == own_.all().rend()) return std::nullopt;
+  const Bearing& bearing = *newest;
   const auto tilt_B = self.tilt_at(bearing.stamp);
   const auto tilt_N = neighbor.tilt_at(bearing.stamp);
-  const auto measured = range_at(bearing.stamp);
-  const auto range = measured ? measured : range_by_ring(bearing);
-  if (!tilt_B || !tilt_N || !range) return std::nullopt;
+  if (!tilt_B || !tilt_N) return std::nullopt;
   // Only now: without a tilt there may be no inertial sample either.
   if (!is_confirmed(bearing, own_, self.imu)) return std::nullopt;
   auto poses = poses_by_heading(sighting(bearing, *tilt_B, self_), sighting({}, *tilt_N, neighbor_),

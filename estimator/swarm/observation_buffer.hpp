@@ -13,6 +13,9 @@
 
 namespace crepes {
 
+/// Poses at the stamp of a mutual sighting, or why there is none.
+using MutualInitializations = std::variant<std::vector<MutualInitialization>, NoPoseReason>;
+
 /// Keeps the last half second, in order of arrival.
 class ObservationBuffer {
  public:
@@ -38,11 +41,12 @@ class ObservationBuffer {
   /// there is none. Where there is no range, the size of the ring gives the distance, if it may. A
   /// bearing counts only if another one within 0.1 s has about its direction: a single flicker is
   /// not a robot. If the peer sent none within 0.1 s, one within 0.3 s counts.
-  [[nodiscard]] std::variant<std::vector<MutualInitialization>, NoPoseReason>
-  mutual_initializations(const Bearing& peer_bearing, const RobotState& self,
-                         const RobotState& neighbor) const;
+  [[nodiscard]] MutualInitializations mutual_initializations(const Bearing& peer_bearing,
+                                                             const RobotState& self,
+                                                             const RobotState& neighbor) const;
 
-  /// Poses at the stamp of the newest own bearing, for a neighbor that does not see us.
+  /// Poses at the stamp of the newest own bearing with a range, for a neighbor that does not see
+  /// us.
   [[nodiscard]] std::optional<Measurement> one_way_initialization(const RobotState& self,
                                                                   const RobotState& neighbor) const;
 

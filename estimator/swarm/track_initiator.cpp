@@ -4,6 +4,15 @@
 #include <variant>
 
 namespace crepes {
+namespace {
+
+bool lacks_reading(const MutualInitializations& result) {
+  const auto* const reason = std::get_if<NoPoseReason>(&result);
+  return reason != nullptr &&
+         (*reason == NoPoseReason::kNotSeen || *reason == NoPoseReason::kNoRange);
+}
+
+}  // namespace
 
 TrackInitiator::TrackInitiator(const MemberConfig& self, const MemberConfig& neighbor,
                                const FilterSettings& settings)
@@ -17,22 +26,48 @@ void TrackInitiator::reconfigure(const FilterSettings& settings) {
                            settings.raw_pose_range_sigma_m);
 }
 
+bool TrackInitiator::needs_raw_pose(const Bearing& bearing, const RobotState& self,
+                                    const RobotState& neighbor,
+                                    const HypothesisSet& hypotheses) const {
+  const bool wanted = !traits_.fuses_single_readings || hypotheses.accepts_raw_pose(bearing.stamp);
+  return wanted && !self.lacks_imu(bearing.stamp) && !neighbor.lacks_imu(bearing.stamp);
+}
+
+void TrackInitiator::enqueue_raw_poses(Timestamp stamp, const MutualInitializations& result,
+                                       ReadingIntake& intake) {
+  if (const auto* found = std::get_if<std::vector<MutualInitialization>>(&result)) {
+    raw_pose_reason_ = NoPoseReason::kNone;
+    for (const MutualInitialization& first : *found)
+      intake.enqueue({stamp, MeasurementKind::kRawPose, first});
+  } else {
+    raw_pose_reason_ = std::get<NoPoseReason>(result);
+    intake.outcomes().add(stamp, MeasurementKind::kRawPose, {.verdict = Verdict::kDegenerate});
+  }
+}
+
 void TrackInitiator::add_peer_bearing(const Bearing& bearing, const RobotState& self,
                                       const RobotState& neighbor, const HypothesisSet& hypotheses,
                                       ReadingIntake& intake) {
   observations_.add_peer_bearing(bearing);
-  const bool wanted = !traits_.fuses_single_readings || hypotheses.accepts_raw_pose(bearing.stamp);
-  if (!wanted || self.lacks_imu(bearing.stamp) || neighbor.lacks_imu(bearing.stamp)) return;
+  if (!needs_raw_pose(bearing, self, neighbor, hypotheses)) return;
   const auto result = observations_.mutual_initializations(bearing, self, neighbor);
-  if (const auto* found = std::get_if<std::vector<MutualInitialization>>(&result)) {
-    raw_pose_reason_ = NoPoseReason::kNone;
-    for (const MutualInitialization& first : *found)
-      intake.enqueue({bearing.stamp, MeasurementKind::kRawPose, first});
+  if (lacks_reading(result)) {
+    waiting_.add(bearing);
   } else {
-    raw_pose_reason_ = std::get<NoPoseReason>(result);
-    intake.outcomes().add(bearing.stamp, MeasurementKind::kRawPose,
-                          {.verdict = Verdict::kDegenerate});
+    enqueue_raw_poses(bearing.stamp, result, intake);
   }
+}
+
+// Once: whatever is older than the lag has arrived, or comes too late for the reorder buffer.
+void TrackInitiator::join_waiting(Timestamp due, const RobotState& self, const RobotState& neighbor,
+                                  const HypothesisSet& hypotheses, ReadingIntake& intake) {
+  const auto is_due = [due](const Bearing& bearing) { return bearing.stamp <= due; };
+  for (const Bearing& bearing : waiting_.all()) {
+    if (!is_due(bearing) || !needs_raw_pose(bearing, self, neighbor, hypotheses)) continue;
+    enqueue_raw_poses(bearing.stamp, observations_.mutual_initializations(bearing, self, neighbor),
+                      intake);
+  }
+  waiting_.erase_if(is_due);
 }
 
 void TrackInitiator::add_peer_estimate(const NeighborEstimate& estimate,
@@ -45,6 +80,7 @@ void TrackInitiator::add_peer_estimate(const NeighborEstimate& estimate,
 
 void TrackInitiator::tick(Timestamp now, const RobotState& self, const RobotState& neighbor,
                           const HypothesisSet& hypotheses, ReadingIntake& intake) {
+  join_waiting(now - intake.buffer().lag(), self, neighbor, hypotheses, intake);
   constexpr Duration kSeenRecently = std::chrono::milliseconds{500};
   constexpr Duration kLasting = std::chrono::seconds{2};
   const bool we_see = now - intake.last_contact().seen < kSeenRecently;

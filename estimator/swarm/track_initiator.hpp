@@ -25,13 +25,15 @@ class TrackInitiator {
   void add_bearing(const Bearing& bearing) { observations_.add_own_bearing(bearing); }
   /// A range of either module.
   void add_range(Timestamp stamp, double range_m) { observations_.add_range(stamp, range_m); }
-  /// Queues the raw poses that the bearing completes, if `hypotheses` need one.
+  /// Queues the raw poses that the bearing completes, if `hypotheses` need one. If a reading of
+  /// ours is missing, it may come later than the bearing: the next ticks try again.
   void add_peer_bearing(const Bearing& bearing, const RobotState& self, const RobotState& neighbor,
                         const HypothesisSet& hypotheses, ReadingIntake& intake);
   /// Queues the inverse of the neighbor's estimate of us, if only the neighbor sees us.
   void add_peer_estimate(const NeighborEstimate& estimate, const HypothesisSet& hypotheses,
                          ReadingIntake& intake) const;
-  /// Queues a one-way initialization, if only we see the neighbor. Call once a tick.
+  /// Queues raw poses of bearings that have waited for the reorder buffer's lag, and a one-way
+  /// initialization, if only we see the neighbor. Call once a tick.
   void tick(Timestamp now, const RobotState& self, const RobotState& neighbor,
             const HypothesisSet& hypotheses, ReadingIntake& intake);
 
@@ -46,8 +48,17 @@ class TrackInitiator {
   [[nodiscard]] NoPoseReason raw_pose_reason() const { return raw_pose_reason_; }
 
  private:
+  [[nodiscard]] bool needs_raw_pose(const Bearing& bearing, const RobotState& self,
+                                    const RobotState& neighbor,
+                                    const HypothesisSet& hypotheses) const;
+  void enqueue_raw_poses(Timestamp stamp, const MutualInitializations& result,
+                         ReadingIntake& intake);
+  void join_waiting(Timestamp due, const RobotState& self, const RobotState& neighbor,
+                    const HypothesisSet& hypotheses, ReadingIntake& intake);
+
   ProfileTraits traits_;
   ObservationBuffer observations_;
+  BoundedFifo<Bearing, 256> waiting_;  ///< of the neighbor; readings of ours are missing
   Timestamp one_way_since_ = kNever;
   bool one_way_lasts_ = false;
   NoPoseReason raw_pose_reason_ = NoPoseReason::kNotSeen;

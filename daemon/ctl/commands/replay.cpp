@@ -74,6 +74,17 @@ void add_replay(CommandLine& line) {
   sub->add_flag("--no-forwarding{false},--forwarding{true}", options.forwards,
                 "with --reach: no flooding, as by batman-adv; robots still forward "
                 "what is marked");
+  const auto delay = [sub](const std::string& option, double& delay_s, const char* sensor) {
+    sub->add_option(option, delay_s,
+                    std::string("seconds that pass until the daemon has ") + sensor)
+        ->check(CLI::Range(0.0, 0.5));
+  };
+  delay("--camera-delay", options.delays.camera_s, "a picture");
+  delay("--uwb-delay", options.delays.uwb_s, "a range");
+  delay("--imu-delay", options.delays.imu_s, "an inertial sample");
+  sub->add_option("--delayed", options.delays.robots,
+                  "names of the robots whose sensors have these delays; without it, all")
+      ->delimiter(',');
   sub->add_flag("--sealed", options.sealed,
                 "seal and sign the datagrams, with keys made for the replay");
   sub->add_flag(

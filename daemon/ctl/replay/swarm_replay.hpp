@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "config/schema/config.hpp"
@@ -20,6 +21,14 @@
 
 namespace crepes {
 
+/// What passes from a measurement to its arrival in the daemon: exposure, transfer, detection.
+struct SensorDelays {
+  std::vector<std::string> robots;  ///< by name; empty: of all
+  double camera_s = 0.0;
+  double uwb_s = 0.0;
+  double imu_s = 0.0;
+};
+
 /// Options of `crepesctl replay`.
 struct ReplayOptions {
   std::filesystem::path swarm_dir;
@@ -34,6 +43,7 @@ struct ReplayOptions {
   bool forwards =
       true;  ///< what a robot hears, it forwards to those that do not, as batman-adv does
   bool sealed = false;  ///< datagrams are sealed and signed, with keys for the replay
+  SensorDelays delays;
   std::function<void(double)> on_progress;  ///< progress, 0..1, called regularly
 };
 

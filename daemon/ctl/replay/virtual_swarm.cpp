@@ -34,6 +34,10 @@ bool is_own_reading(const Event& event) {
          std::holds_alternative<SpotFrame>(event);
 }
 
+bool concerns(const SensorDelays& delays, const std::string& name) {
+  return delays.robots.empty() || std::ranges::count(delays.robots, name) > 0;
+}
+
 bool is_tick(const VirtualInput& input) {
   const auto* const event = std::get_if<Event>(&input);
   return event != nullptr && std::holds_alternative<Tick>(*event);
@@ -55,7 +59,8 @@ VirtualSwarm::VirtualSwarm(SwarmDataset dataset, const std::optional<SwarmTruth>
       network_(network_model(manifest_.network, options),
                options.seed.value_or(manifest_.network.seed), options.burst_s),
       reach_m_(options.reach_m),
-      forwards_(options.forwards) {
+      forwards_(options.forwards),
+      delays_(options.delays) {
   for (RobotRecording& recording : dataset.robots) {
     recording.config.graph.enabled &= options.graph;
     if (options.profile) recording.config.estimator.profile = *options.profile;
@@ -70,24 +75,29 @@ void VirtualSwarm::schedule(double true_s, std::size_t robot, VirtualInput what)
   std::ranges::push_heap(queue_, Later{});
 }
 
-void VirtualSwarm::schedule_at(Timestamp local, std::size_t robot, VirtualInput what) {
-  schedule(robots_[robot].recording.robot.clock.true_s(local), robot, std::move(what));
+void VirtualSwarm::schedule_at(Timestamp local, std::size_t robot, VirtualInput what,
+                               double delay_s) {
+  schedule(robots_[robot].recording.robot.clock.true_s(local) + delay_s, robot, std::move(what));
 }
 
 void VirtualSwarm::schedule_recording(std::size_t index) {
   RobotRecording& recording = robots_[index].recording;
-  for (const ImuSample& sample : recording.imu) schedule_at(sample.stamp, index, Event(sample));
-  for (const UwbRange& range : recording.ranges) schedule_at(range.stamp, index, Event(range));
+  const SensorDelays delays = concerns(delays_, recording.robot.name) ? delays_ : SensorDelays{};
+  for (const ImuSample& sample : recording.imu)
+    schedule_at(sample.stamp, index, Event(sample), delays.imu_s);
+  for (const UwbRange& range : recording.ranges)
+    schedule_at(range.stamp, index, Event(range), delays.uwb_s);
   for (std::size_t k = 0; k < recording.cameras.size(); ++k) {
     CameraRecording& camera = recording.cameras[k];
     for (SpotFrame& frame : camera.spots) {
       const Timestamp stamp = frame.stamp;
-      schedule_at(stamp, index, Event(std::move(frame)));
+      schedule_at(stamp, index, Event(std::move(frame)), delays.camera_s);
     }
     // If a camera has both, the spots are the smaller input.
     if (!std::exchange(camera.spots, {}).empty()) continue;
     for (const RecordedImage& image : camera.images) {
-      schedule_at(image.stamp, index, PendingImage{static_cast<std::uint8_t>(k), image});
+      schedule_at(image.stamp, index, PendingImage{static_cast<std::uint8_t>(k), image},
+                  delays.camera_s);
     }
   }
   if (recording.imu.empty()) return;

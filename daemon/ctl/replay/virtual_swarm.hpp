@@ -63,7 +63,7 @@ class VirtualSwarm {
   };
 
   void schedule(double true_s, std::size_t robot, VirtualInput what);
-  void schedule_at(Timestamp local, std::size_t robot, VirtualInput what);
+  void schedule_at(Timestamp local, std::size_t robot, VirtualInput what, double delay_s = 0.0);
   void schedule_recording(std::size_t index);
   [[nodiscard]] Result<void> deliver_next();
   [[nodiscard]] Result<void> deliver(Arrival& arrival);
@@ -85,6 +85,7 @@ class VirtualSwarm {
   SimulatedNetwork network_;
   double reach_m_;
   bool forwards_;
+  SensorDelays delays_;
   std::deque<VirtualRobot> robots_;
   std::vector<Arrival> queue_;  ///< a heap, the next one first
   std::uint64_t next_order_ = 0;
