@@ -15,6 +15,7 @@ namespace {
 constexpr double kCheckPeriod_s = 0.1;
 constexpr std::size_t kPatience = 15;             // steps until a reading must have a verdict
 constexpr std::uint64_t kMostGrowth = 64 << 20U;  // bytes of heap, of the whole swarm
+constexpr double kOldest_s = 0.05;                // a pose when it is published
 constexpr std::size_t kMostComplaints = 4;        // they come again at every step
 
 ReplayOptions options_of(bool sealed) {
@@ -98,6 +99,11 @@ void Flight::fly_until(double true_s) {
 void Flight::add_pose(RobotId observer, const NeighborPose& pose) {
   const double now_s = swarm_.now_s();
   clients_.add(observer, pose, now_s);
+  const double true_s = swarm_.robot(observer).recording.robot.clock.true_s(
+      pose.stamp - swarm_.robot(observer).clock_shift);
+  if (now_s - true_s > kOldest_s)
+    complain(fmt::format("r{}: a pose of r{} is {:.3f} s old", observer.value, pose.neighbor.value,
+                         now_s - true_s));
   const auto truth = study_.truth.relative(observer, pose.neighbor,
                                            pose.stamp - swarm_.robot(observer).clock_shift);
   if (truth) traces_.at({observer, pose.neighbor}).add(pose, *truth, now_s);

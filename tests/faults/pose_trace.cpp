@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
+
+#include "estimator/swarm/neighbor_track.hpp"
 
 namespace crepes::faults {
 namespace {
 
-constexpr double kLongestGap_s = 0.1;  // between poses that follow each other
+constexpr double kLongestGap_s = 0.5;  // between poses that follow each other
+constexpr double kHonest_s = 0.1;      // of poses within 5 sigma end a run of others
 constexpr double kWindow_s = 0.3;
 
 /// Not a number if one is none.
@@ -16,9 +20,13 @@ double larger(double a, double b) { return a >= b || std::isnan(a) ? a : b; }
 }  // namespace
 
 void PoseTrace::add(const NeighborPose& pose, const Pose& truth, double true_s) {
-  Eigen::Matrix<double, 7, 1> numbers;
-  numbers << pose.T_B_N.pose.p, pose.T_B_N.pose.q.coeffs();
-  not_finite_ += numbers.allFinite() && pose.T_B_N.covariance.allFinite() ? 0 : 1;
+  const Matrix6d& P = pose.T_B_N.covariance;
+  Eigen::Matrix<double, 10, 1> numbers;
+  numbers << pose.T_B_N.pose.p, pose.T_B_N.pose.q.coeffs(), pose.v_B_N;
+  const bool is_finite = numbers.allFinite() && P.allFinite();
+  not_finite_ += is_finite ? 0 : 1;
+  const bool is_usable = P.llt().info() == Eigen::Success && is_certain(P);
+  unusable_ += is_finite && !is_usable ? 1 : 0;
   for (const double number : numbers)
     hash_ = hash_ * 1099511628211U ^ std::bit_cast<std::uint64_t>(number);
   const Vector6d error = pose_difference(pose.T_B_N.pose, truth);
@@ -35,20 +43,28 @@ void PoseTrace::add(const NeighborPose& pose, const Pose& truth, double true_s) 
 
 Beyond PoseTrace::beyond(const Span& span) const {
   Beyond beyond;
-  std::optional<double> since_s;
+  std::optional<double> since_s;   // of a run
+  std::optional<double> honest_s;  // since when poses are within 5 sigma again
   double latest_s = 0.0;
   for (const PoseError& e : errors_) {
     if (!span.contains(e.true_s)) continue;
     const bool is_beyond = !(e.mahalanobis2 <= kBeyond5Sigma);
-    const bool goes_on = is_beyond && since_s && e.true_s - latest_s < kLongestGap_s;
-    if (!goes_on) since_s = is_beyond ? std::optional(e.true_s) : std::nullopt;
+    if (e.true_s - latest_s > kLongestGap_s || (honest_s && e.true_s - *honest_s > kHonest_s))
+      since_s.reset();
+    if (is_beyond && !since_s) since_s = e.true_s;
+    honest_s = is_beyond ? std::nullopt : std::optional(honest_s.value_or(e.true_s));
     latest_s = e.true_s;
-    if (!since_s) continue;
+    if (!is_beyond) continue;
     beyond.longest_s = std::max(beyond.longest_s, e.true_s - *since_s);
     beyond.worst_m = std::max(beyond.worst_m, e.error_m);
     beyond.worst_rad = std::max(beyond.worst_rad, e.error_rad);
   }
   return beyond;
+}
+
+double PoseTrace::count(const Span& span) const {
+  return static_cast<double>(std::ranges::count_if(
+      errors_, [&](const PoseError& pose) { return span.contains(pose.true_s); }));
 }
 
 double PoseTrace::rmse(const Span& span, double PoseError::*error) const {

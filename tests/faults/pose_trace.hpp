@@ -43,10 +43,13 @@ class PoseTrace {
 
   [[nodiscard]] const std::vector<PoseError>& errors() const { return errors_; }
   [[nodiscard]] std::uint64_t not_finite() const { return not_finite_; }
+  /// Poses whose covariance is none, or says that the pose should not have been published.
+  [[nodiscard]] std::uint64_t unusable() const { return unusable_; }
   /// Of all poses, to the bit.
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
 
   [[nodiscard]] Beyond beyond(const Span& span) const;
+  [[nodiscard]] double count(const Span& span) const;
   /// Root mean square; 0 without poses.
   [[nodiscard]] double rmse_m(const Span& span) const;
   [[nodiscard]] double rmse_rad(const Span& span) const;
@@ -62,6 +65,7 @@ class PoseTrace {
 
   std::vector<PoseError> errors_;
   std::uint64_t not_finite_ = 0;
+  std::uint64_t unusable_ = 0;
   std::uint64_t hash_ = 0;
 };
 

@@ -12,7 +12,7 @@ namespace crepes::faults {
 enum class Promise : std::uint8_t {
   kRuns,      ///< no crash
   kProgram,   ///< what `Flight` checks at every step
-  kFinite,    ///< poses are numbers
+  kFinite,    ///< poses are numbers, with covariances that are some and small enough
   kHonest,    ///< seconds beyond 5 sigma
   kNoGhosts,  ///< dishonest poses of a robot that is gone
   kPresent,   ///< seconds without a pose after the recovery

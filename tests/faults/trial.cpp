@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <numbers>
 #include <sstream>
 
@@ -18,6 +19,8 @@ namespace {
 constexpr std::array<std::string_view, 3> kScenarioNames{"four", "occluded", "cluttered"};
 constexpr double kLongestBeyond_s = 0.5;
 constexpr double kLongestAbsence_s = 0.5;
+constexpr double kPosePeriod_s = 0.02;
+constexpr double kMostFewer_s = 0.8;  // poses than without faults, of 3 s
 constexpr double kGone_s = 2.0;
 constexpr double kDegrees = 180.0 / std::numbers::pi;  // a radian
 
@@ -78,6 +81,9 @@ class PairJudge {
   [[nodiscard]] std::vector<Broken> broken() {
     if (const auto count = found_.not_finite(); count > 0)
       add(Promise::kFinite, static_cast<double>(count), fmt::format("{} poses not finite", count));
+    if (const auto count = found_.unusable(); count > 0)
+      add(Promise::kFinite, static_cast<double>(count),
+          fmt::format("{} poses whose covariance is none, or says that they are of no use", count));
     judge_honesty();
     if (reference_.rmse_m(after_) > 0.0 && !is_lost(faults_, pair_)) judge_recovery();
     return std::move(broken_);
@@ -106,6 +112,10 @@ class PairJudge {
     if (absence_s > allowed_s)
       add(Promise::kPresent, absence_s,
           fmt::format("no pose for {:.2f} s after the recovery", absence_s));
+    const double fewer_s = (reference_.count(after_) - found_.count(after_)) * kPosePeriod_s;
+    if (absence_s <= allowed_s && fewer_s > kMostFewer_s)
+      add(Promise::kPresent, fewer_s,
+          fmt::format("poses of {:.2f} s are missing after the recovery", fewer_s));
     const double without_m = reference_.rmse_m(after_);
     const double rmse_m = found_.rmse_m(after_);
     if (rmse_m > allowed_rmse_m(without_m))
@@ -161,17 +171,32 @@ std::string to_text(const Verdict& verdict) {
   return text;
 }
 
+/// Streams read neither infinities nor what is not a number.
+bool read_number(std::istream& text, double& number) {
+  std::string word;
+  if (!(text >> word)) return false;
+  char* end = nullptr;
+  number = std::strtod(word.c_str(), &end);
+  return end == word.c_str() + word.size();
+}
+
 Verdict read_verdict(const ChildResult& child) {
   Verdict verdict;
   std::istringstream text(child.text);
-  text >> verdict.worst_m >> verdict.beyond_s >> verdict.recovery_s >> verdict.heap_growth >>
-      verdict.hash;
+  bool is_read = read_number(text, verdict.worst_m) && read_number(text, verdict.beyond_s) &&
+                 read_number(text, verdict.recovery_s) &&
+                 (text >> verdict.heap_growth >> verdict.hash);
   Broken one;
-  for (std::string name; text >> name >> one.size && std::getline(text >> std::ws, one.text);) {
+  for (std::string name; is_read && text >> name;) {
+    is_read = read_number(text, one.size) && std::getline(text >> std::ws, one.text);
     one.promise = promise_of(name).value_or(Promise::kRuns);
     verdict.broken.push_back(one);
   }
-  if (!child.crash.empty()) verdict.broken.push_back({Promise::kRuns, 1.0, child.crash});
+  if (!child.crash.empty()) {
+    verdict.broken.push_back({Promise::kRuns, 1.0, child.crash});
+  } else if (!is_read) {
+    verdict.broken.push_back({Promise::kRuns, 1.0, "its verdict cannot be read: " + child.text});
+  }
   return verdict;
 }
 

@@ -248,6 +248,20 @@ TEST(FaultTrial, ReportsBrokenPromises) {
     for (double t = from; t < to; t += 0.02) ghost.add(pose, Pose{}, t);
   }
 
+  // One of so many poses; off by 10 sigma for 1 s but for an honest one every `pause_s`.
+  const auto every = [](int nth, double sigma_m = 0.02, double pause_s = 0.0) {
+    PoseTrace trace;
+    NeighborPose pose;
+    pose.T_B_N.covariance = sigma_m * sigma_m * Matrix6d::Identity();
+    for (int i = 200; i < 700; i += nth) {
+      const double t = 0.02 * i;
+      const bool is_wrong = pause_s > 0.0 && t > 6.0 && t < 7.0 && std::fmod(t, pause_s) > 0.02;
+      pose.T_B_N.pose.p.x() = is_wrong ? 10.0 * sigma_m : 0.0;
+      trace.add(pose, Pose{}, t);
+    }
+    return trace;
+  };
+
   EXPECT_EQ(count(Kind::kLoss, trace_of(0.05, 0.02)), 0U);
   EXPECT_EQ(count(Kind::kLoss, not_finite), 1U);
   EXPECT_EQ(count(Kind::kLoss, trace_of(0.06, 0.008)), 1U);                // beyond 5 sigma
@@ -255,6 +269,10 @@ TEST(FaultTrial, ReportsBrokenPromises) {
   EXPECT_EQ(count(Kind::kImuStuck, trace_of(0.06, 0.008)), 1U);        // excused until it recovers
   EXPECT_EQ(count(Kind::kLoss, trace_of(0.08, 0.1)), 1U);              // error after the recovery
   EXPECT_EQ(count(Kind::kLoss, trace_of(0.02, 0.02, 4.0, 12.0)), 1U);  // no pose
+  EXPECT_EQ(count(Kind::kLoss, every(2)), 1U);                         // half of the poses
+  EXPECT_EQ(count(Kind::kLoss, every(1, 3.0)), 1U);                    // that nobody should use
+  EXPECT_EQ(count(Kind::kLoss, every(1, 0.02, 0.4)), 1U);  // beyond 5 sigma, with honest ones
+  EXPECT_EQ(count(Kind::kLoss, every(1)), 0U);
   EXPECT_EQ(count(Kind::kLoss, ghost), 0U);
   EXPECT_EQ(count(Kind::kReboot, ghost), 1U);
 }
