@@ -9,6 +9,7 @@
 #include "daemon/ctl/calibrate/board_sightings.hpp"
 #include "daemon/ctl/calibrate/camera_report.hpp"
 #include "estimator/calibration/camera/camera_start.hpp"
+#include "estimator/calibration/imu/vibration.hpp"
 #include "estimator/core/constants.hpp"
 
 namespace crepes {
@@ -75,14 +76,14 @@ Result<CalibrationReport> calibrate_camera(const CalibrateCameraOptions& options
   };
   progress(0.0);
 
-  const CameraBatchResult result =
-      calibrate_camera(recording->imu, found->sightings, names_of(*found, recording->config.swarm),
-                       {.width = camera.resolution[0],
-                        .height = camera.resolution[1],
-                        .lens = lens,
-                        .p_B_C = camera.T_cam_imu.inverse().p,
-                        .noise = recording->config.imu.noise,
-                        .on_progress = progress});
+  const CameraBatchResult result = calibrate_camera(
+      recording->imu, found->sightings, names_of(*found, recording->config.swarm),
+      {.width = camera.resolution[0],
+       .height = camera.resolution[1],
+       .lens = lens,
+       .p_B_C = camera.T_cam_imu.inverse().p,
+       .noise = noise_with_vibration(recording->config.imu.noise, recording->imu, 4),
+       .on_progress = progress});
   const auto reported =
       report_camera(result, {.words = "boards", .key = "boards", .count = found->boards.size()},
                     {.out = options.out,

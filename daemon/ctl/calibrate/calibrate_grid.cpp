@@ -17,6 +17,7 @@
 #include "drivers/dataset/robot_folder.hpp"
 #include "estimator/calibration/grid/grid_calibration.hpp"
 #include "estimator/calibration/grid/grid_camera.hpp"
+#include "estimator/calibration/imu/vibration.hpp"
 #include "estimator/core/constants.hpp"
 #include "estimator/vision/separate_lights.hpp"
 
@@ -191,7 +192,7 @@ Result<void> calibrate_film(const CalibrateGridOptions& options, const GridPictu
                                    .height = read.resolution[1],
                                    .lens = lens.lens.numbers,
                                    .p_B_C = body.p_B_C,
-                                   .noise = body.noise,
+                                   .noise = noise_with_vibration(body.noise, body.imu, 4),
                                    .on_progress = part_of(options, kShareOfLens, 1.0)});
   }
   if (lens.refusals.empty() && !found.refusals.empty()) {

@@ -6,17 +6,21 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "config/writing/config_writer.hpp"
+#include "daemon/ctl/calibrate/imu_fragment.hpp"
 #include "daemon/ctl/dataset/swarm_dataset.hpp"
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/dataset/robot_folder.hpp"
 #include "estimator/calibration/imu/allan_deviation.hpp"
 #include "estimator/calibration/imu/imu_calibration.hpp"
+#include "estimator/calibration/imu/stillness.hpp"
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 
 namespace crepes {
 namespace {
@@ -26,14 +30,8 @@ using Json = nlohmann::ordered_json;
 constexpr double kPercent = 100.0;
 constexpr double kLeastRest_s = 600.0;
 constexpr double kGoodRest_s = 3000.0;
-constexpr double kStep = 5.0;  // growth of the longest cluster's deviation that means: not at rest
-
-std::string triad_text(std::string_view name, const TriadEstimate& triad) {
-  const Eigen::Vector3d scale = triad.scale();
-  const Eigen::Matrix3d misalignment = triad.misalignment();
-  return fmt::format("  {}:\n    bias: {}\n    scale: {}\n    misalignment: {}\n", name,
-                     to_yaml(triad.bias), to_yaml(scale), to_yaml(misalignment));
-}
+constexpr double kMostMissing = 0.001;  // of the samples
+constexpr double kMaxRate_hz = 1000.0;  // that crepesd.yaml may have
 
 std::string noise_text(const ImuNoise& noise, std::string_view indent) {
   return fmt::format(
@@ -68,14 +66,14 @@ Json json_of(const TriadEstimate& triad) {
           {"residual_rms", triad.residual_rms}};
 }
 
-Json json_of(const ImuCalibration& found, const ImuNoise& noise) {
+Json json_of(const ImuCalibration& found, const ImuTriads& sensor, const ImuNoise& noise) {
   Json json = report_head(found.refusals, found.warnings);
   json["rests"] = found.search.rests.size();
   json["shaky"] = found.search.shaky;
   json["attitudes"] = found.attitudes;
   if (found.refusals.empty()) {
-    json["accelerometer"] = json_of(found.accelerometer);
-    json["gyroscope"] = json_of(found.gyroscope);
+    json["accelerometer"] = json_of(sensor.accelerometer);
+    json["gyroscope"] = json_of(sensor.gyroscope);
     json["accelerometer_noise_density"] = noise.accelerometer_noise_density;
     json["gyroscope_noise_density"] = noise.gyroscope_noise_density;
   }
@@ -96,13 +94,14 @@ std::vector<std::string> row_of(const std::string& name, const TriadEstimate& tr
           fixed(kPercent * M_sigma, 4)};
 }
 
-std::string text_of(const ImuCalibration& found, const std::filesystem::path& out) {
+std::string text_of(const ImuCalibration& found, const ImuTriads& sensor,
+                    const std::filesystem::path& out) {
   std::string text = fmt::format("{} rests in {} attitudes; gravity differs by {} m/s^2 RMS\n",
                                  found.search.rests.size(), found.attitudes,
                                  fixed(found.accelerometer.residual_rms, 4));
   text += text_table({{"", "bias x", "y", "z", "+-", "scale x %", "y", "z", "+- %"},
-                      row_of("accelerometer [m/s^2]", found.accelerometer, 1.0, 4),
-                      row_of("gyroscope [deg/s]", found.gyroscope, kDegPerRad, 3)});
+                      row_of("accelerometer [m/s^2]", sensor.accelerometer, 1.0, 4),
+                      row_of("gyroscope [deg/s]", sensor.gyroscope, kDegPerRad, 3)});
   return text + warning_lines(found.warnings) + fmt::format("written: {}\n", out.string());
 }
 
@@ -117,14 +116,16 @@ std::vector<double> axis_of(const std::vector<ImuSample>& imu, int axis) {
 /// Noise of one sensor: the largest of its three axes, as Kalibr's keys hold one number.
 struct AxesNoise {
   NoiseDensities noise;
-  bool is_moving = false;
+  std::optional<double> moved_s;  ///< when it first did
 };
 
 AxesNoise noise_of(const std::vector<ImuSample>& imu, double period_s, int first_axis) {
   AxesNoise worst;
   for (int axis = first_axis; axis < first_axis + 3; ++axis) {
-    const std::vector<AllanPoint> points = allan_deviation(axis_of(imu, axis), period_s);
-    const auto fit = fit_noise(points);
+    const std::vector<double> readings = axis_of(imu, axis);
+    if (const auto moved_s = first_motion_s(readings, period_s))
+      worst.moved_s = std::min(*moved_s, worst.moved_s.value_or(*moved_s));
+    const auto fit = fit_noise(allan_deviation(readings, period_s));
     if (!fit) continue;
     if (fit->white > worst.noise.white) {
       worst.noise.white = fit->white;
@@ -135,7 +136,6 @@ AxesNoise noise_of(const std::vector<ImuSample>& imu, double period_s, int first
       worst.noise.random_walk_sigma = fit->random_walk_sigma;
     }
     worst.noise.bias_stability = std::max(worst.noise.bias_stability, fit->bias_stability);
-    worst.is_moving = worst.is_moving || points.back().sigma > kStep * points.front().sigma;
   }
   return worst;
 }
@@ -177,29 +177,60 @@ double duration_of(const std::vector<ImuSample>& imu) {
   return imu.empty() ? 0.0 : to_seconds(imu.back().stamp - imu.front().stamp);
 }
 
+/// How a sensor sampled.
+struct Sampling {
+  double period_s = 0.0;   ///< where no sample is missing
+  double missing_s = 0.0;  ///< in gaps
+};
+
+Sampling sampling_of(const std::vector<ImuSample>& imu) {
+  constexpr double kGap = 2.5;  // periods
+  if (imu.size() < 2) return {};
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < imu.size(); ++i)
+    steps_s.push_back(to_seconds(imu[i].stamp - imu[i - 1].stamp));
+  std::vector<double> sorted_s = steps_s;
+  const double usual_s = upper_median(sorted_s);
+  Sampling sampling;
+  for (const double step_s : steps_s)
+    if (step_s > kGap * usual_s) sampling.missing_s += step_s - usual_s;
+  sampling.period_s = (duration_of(imu) - sampling.missing_s) / static_cast<double>(steps_s.size());
+  return sampling;
+}
+
 /// Noise densities and random walks from a long time at rest.
 Result<CalibrationReport> measure_noise(const CalibrateImuOptions& options,
-                                        const std::vector<ImuSample>& imu, ImuNoise noise) {
-  CalibrationReport report;
+                                        const std::vector<ImuSample>& imu, ImuNoise noise,
+                                        DatasetFaults faults) {
+  CalibrationReport report{.text = {}, .reasons = {}, .faults = std::move(faults)};
   const double duration_s = duration_of(imu);
   if (duration_s < kLeastRest_s) {
     report.reasons.push_back(
         fmt::format("{} s at rest do not show a random walk; record an hour, at least {} s",
                     fixed(duration_s, 0), fixed(kLeastRest_s, 0)));
   }
-  const double period_s = duration_s / std::max(1.0, static_cast<double>(imu.size()) - 1.0);
-  const AxesNoise gyro = noise_of(imu, period_s, 0);
+  const Sampling sampling = sampling_of(imu);
+  if (sampling.missing_s > kMostMissing * duration_s) {
+    report.reasons.push_back(
+        fmt::format("samples of {} s in all are missing: their noise is not that of a whole hour",
+                    fixed(sampling.missing_s, 1)));
+  }
+  const AxesNoise gyro = noise_of(imu, sampling.period_s, 0);
   if (options.on_progress) options.on_progress(0.6);
-  const AxesNoise accel = noise_of(imu, period_s, 3);
-  if (gyro.is_moving || accel.is_moving)
-    report.reasons.emplace_back("the robot moved: the deviation grows with time; lay it down");
+  const AxesNoise accel = noise_of(imu, sampling.period_s, 3);
+  if (const auto moved_s = gyro.moved_s ? gyro.moved_s : accel.moved_s) {
+    report.reasons.push_back(
+        fmt::format("the robot was moved {} s after the start: lay it down where nobody touches it",
+                    fixed(*moved_s, 0)));
+  }
   std::vector<std::string> warnings;
   if (duration_s < kGoodRest_s) warnings.emplace_back("an hour at rest is better");
   noise.accelerometer_noise_density = accel.noise.white;
   noise.gyroscope_noise_density = gyro.noise.white;
   noise.accelerometer_random_walk = accel.noise.random_walk;
   noise.gyroscope_random_walk = gyro.noise.random_walk;
-  noise.update_rate = 1.0 / period_s;
+  // A sensor of 1000 Hz may be a little fast.
+  if (sampling.period_s > 0.0) noise.update_rate = std::min(1.0 / sampling.period_s, kMaxRate_hz);
   if (report.reasons.empty()) {
     const auto written = write_files(options.out, "imu:\n" + noise_text(noise, "  "), noise);
     if (!written) return tl::unexpected(written.error());
@@ -221,23 +252,25 @@ Result<CalibrationReport> calibrate_imu(const CalibrateImuOptions& options) {
   if (!recording) return tl::unexpected(recording.error());
   if (options.on_progress) options.on_progress(0.2);
   ImuNoise noise = recording->config.imu.noise;
-  if (options.rest) return measure_noise(options, recording->imu, noise);
+  if (options.rest) return measure_noise(options, recording->imu, noise, std::move(faults));
 
   const ImuCalibration found =
       calibrate_imu(recording->imu, {.noise = noise, .gravity_mps2 = options.gravity_mps2});
   CalibrationReport report{.text = {}, .reasons = found.refusals, .faults = std::move(faults)};
   noise.accelerometer_noise_density = found.accel_noise_density;
   noise.gyroscope_noise_density = found.gyro_noise_density;
+  const ImuTriads sensor =
+      of_sensor({found.accelerometer, found.gyroscope}, recording->config.imu.device);
   if (found.refusals.empty()) {
-    const std::string fragment = "imu:\n" + triad_text("accelerometer", found.accelerometer) +
-                                 triad_text("gyroscope", found.gyroscope);
+    const std::string fragment = "imu:\n" + triad_text("accelerometer", sensor.accelerometer) +
+                                 triad_text("gyroscope", sensor.gyroscope);
     const auto written = write_files(options.out, fragment, noise);
     if (!written) return tl::unexpected(written.error());
   }
   if (options.json) {
-    report.text = json_line(json_of(found, noise));
+    report.text = json_line(json_of(found, sensor, noise));
   } else if (found.refusals.empty()) {
-    report.text = text_of(found, options.out);
+    report.text = text_of(found, sensor, options.out);
   }
   return report;
 }

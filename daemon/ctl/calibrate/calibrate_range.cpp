@@ -2,12 +2,14 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "config/writing/config_writer.hpp"
@@ -183,13 +185,37 @@ double remaining_bias(const RangeCalibration& found) {
   return std::hypot(worst, found.direction_sigma_m);
 }
 
-/// The delay of every module. Two robots that ranged with nobody else have half of their pair's
-/// bias each: only the sum matters. Empty where the pairs do not determine them.
+/// The delay of every module. Where pairs do not determine them, the least delays that give each
+/// measured pair its bias: two robots that ranged with nobody else have half of theirs each.
 std::vector<ModuleBias> delays_of(const RangeCalibration& found) {
-  if (!found.modules.empty() || found.pairs.size() != 1) return found.modules;
-  const PairBias& pair = found.pairs.front();
-  return {{pair.pair.a, 0.5 * pair.bias_m, pair.sigma_m},
-          {pair.pair.b, 0.5 * pair.bias_m, pair.sigma_m}};
+  if (!found.modules.empty()) return found.modules;
+  std::map<RobotId, Eigen::Index> columns;
+  for (const PairBias& pair : found.pairs)
+    for (const RobotId id : {pair.pair.a, pair.pair.b})
+      columns.emplace(id, static_cast<Eigen::Index>(columns.size()));
+  const auto rows = static_cast<Eigen::Index>(found.pairs.size());
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(rows, static_cast<Eigen::Index>(columns.size()));
+  Eigen::VectorXd biases_m(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const PairBias& pair = found.pairs[static_cast<std::size_t>(i)];
+    sums(i, columns.at(pair.pair.a)) = sums(i, columns.at(pair.pair.b)) = 1.0;
+    biases_m[i] = pair.bias_m;
+  }
+  const Eigen::VectorXd delays_m = sums.completeOrthogonalDecomposition().solve(biases_m);
+  std::vector<ModuleBias> delays;
+  for (const auto& [id, column] : columns) delays.push_back({.id = id, .bias_m = delays_m[column]});
+  return delays;
+}
+
+/// Whether the delays are right for all pairs of the swarm, not only for the measured ones.
+bool knows_every_pair(const RangeCalibration& found, const SwarmDataset& swarm) {
+  std::set<RobotId> members;
+  for (const RobotRecording& robot : swarm.robots)
+    for (const MemberConfig& member : robot.config.swarm.members) members.insert(member.id);
+  if (members.size() == 2) return !found.pairs.empty();
+  return std::ranges::all_of(members, [&](RobotId id) {
+    return std::ranges::find(found.modules, id, &ModuleBias::id) != found.modules.end();
+  });
 }
 
 /// By which a range changes as antennas turn: between rests, or in a module's turn.
@@ -200,30 +226,32 @@ double drift_of(const RangeCalibration& found) {
 }
 
 /// A fragment for `crepesd.d/` of every robot: delays, and the errors that are left.
-std::string members_text(const RangeCalibration& found) {
+std::string members_text(const RangeCalibration& found, bool knows_all) {
   constexpr double kLeastBias = 0.005;  // m; temperature moves an antenna delay by so much
   constexpr double kLeastNoise = 0.005;
   std::string text =
       "# Written by crepesctl calibrate range: copy it to crepesd.d/ on every robot.\n";
-  const std::vector<ModuleBias> delays = delays_of(found);
-  if (!delays.empty()) text += "swarm:\n  members:\n";
-  for (const ModuleBias& module : delays) {
+  text += "swarm:\n  members:\n";
+  for (const ModuleBias& module : delays_of(found)) {
     text += fmt::format("  - {{id: {}, range_delay_m: {}}}\n", module.id.value,
                         fixed(module.bias_m, 4));
   }
-  text +=
-      fmt::format("uwb:\n  noise_m: {}\n  bias_sigma_m: {}\n  bias_drift_m: {}\n",
-                  fixed(std::max(found.noise_m, kLeastNoise), 3),
-                  fixed(std::max(remaining_bias(found), kLeastBias), 3), fixed(drift_of(found), 3));
+  text += fmt::format("uwb:\n  noise_m: {}\n", fixed(std::max(found.noise_m, kLeastNoise), 3));
+  if (knows_all) {
+    text += fmt::format("  bias_sigma_m: {}\n  bias_drift_m: {}\n",
+                        fixed(std::max(remaining_bias(found), kLeastBias), 3),
+                        fixed(drift_of(found), 3));
+  }
   if (found.late_path_db)
     text += fmt::format("  late_path_db: {}\n", fixed(*found.late_path_db, 1));
   return text;
 }
 
 /// FILE, and the fragment beside it.
-Result<void> write_files(const RangeCalibration& found, const std::filesystem::path& out) {
+Result<void> write_files(const RangeCalibration& found, bool knows_all,
+                         const std::filesystem::path& out) {
   return write_text_file(out, file_text(found)).and_then([&] {
-    return write_text_file(beside(out, kMembersSuffix), members_text(found));
+    return write_text_file(beside(out, kMembersSuffix), members_text(found, knows_all));
   });
 }
 
@@ -269,7 +297,8 @@ std::string patterns_text(const RangeCalibration& found) {
          "The daemon takes no pattern off; it counts as uwb.bias_drift_m.\n";
 }
 
-std::string text_of(const RangeCalibration& found, const std::filesystem::path& out) {
+std::string text_of(const RangeCalibration& found, bool knows_all,
+                    const std::filesystem::path& out) {
   std::vector<std::vector<std::string>> segments{
       {"pair", "segment", "bias m", "noise m", "ranges", "late", "outliers"}};
   for (const SegmentBias& segment : found.segments)
@@ -285,7 +314,7 @@ std::string text_of(const RangeCalibration& found, const std::filesystem::path& 
     results.push_back({fmt::format("module {}", module.id.value), fixed(module.bias_m, 4),
                        fixed(module.sigma_m, 4)});
   return text_table(segments) + "\n" + text_table(results) + patterns_text(found) + "\n" +
-         members_text(found) + warning_lines(found.warnings) +
+         members_text(found, knows_all) + warning_lines(found.warnings) +
          fmt::format("written: {}\nwritten: {}, for crepesd.d/ of every robot\n", out.string(),
                      beside(out, kMembersSuffix).string());
 }
@@ -300,16 +329,23 @@ Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options) 
   const auto tape = tape_of(options, *swarm);
   if (!tape) return tl::unexpected(tape.error());
   if (options.on_progress) options.on_progress(0.7);
-  const RangeCalibration found =
+  RangeCalibration found =
       calibrate_ranges(taped_ranges(*swarm, ranges_of(*swarm), *tape), late_path_limits(*swarm));
+  const bool knows_all = knows_every_pair(found, *swarm);
+  if (!knows_all) {
+    found.warnings.emplace_back(
+        "delays of pairs that were not measured are not known, so uwb.bias_sigma_m and "
+        "bias_drift_m "
+        "stay as configured; measure all three distances of every robot with two others");
+  }
   if (found.refusals.empty())
-    if (const auto written = write_files(found, options.out); !written)
+    if (const auto written = write_files(found, knows_all, options.out); !written)
       return tl::unexpected(written.error());
   CalibrationReport report{.text = {}, .reasons = found.refusals, .faults = swarm->faults};
   if (options.json) {
     report.text = json_line(json_of(found));
   } else if (found.refusals.empty()) {
-    report.text = text_of(found, options.out);
+    report.text = text_of(found, knows_all, options.out);
   }
   return report;
 }

@@ -10,6 +10,7 @@
 
 #include "daemon/ctl/calibrate/board_sightings.hpp"
 #include "daemon/ctl/replay/swarm_replay.hpp"
+#include "estimator/calibration/imu/vibration.hpp"
 
 namespace crepes {
 namespace {
@@ -115,31 +116,6 @@ class ClockLine {
   double b_ = 0.0;
 };
 
-/// White noise with vibration, by second differences of the samples.
-double measured_density(const std::vector<ImuSample>& imu, double period_s,
-                        const Eigen::Vector3d ImuSample::*signal) {
-  std::vector<double> squares;
-  for (std::size_t i = 2; i < imu.size(); ++i) {
-    squares.push_back(
-        (imu[i].*signal - 2.0 * (imu[i - 1].*signal) + imu[i - 2].*signal).squaredNorm());
-  }
-  if (squares.empty()) return 0.0;
-  double sum = 0.0;
-  for (const double square : squares) sum += square / static_cast<double>(squares.size());
-  return std::sqrt(period_s * sum / 18.0);
-}
-
-ImuNoise noise_with_vibration(ImuNoise noise, const std::vector<ImuSample>& imu) {
-  if (imu.size() < 2) return noise;
-  const double period_s =
-      to_seconds(imu.back().stamp - imu.front().stamp) / static_cast<double>(imu.size() - 1);
-  noise.gyroscope_noise_density = std::max(noise.gyroscope_noise_density,
-                                           measured_density(imu, period_s, &ImuSample::gyro_radps));
-  noise.accelerometer_noise_density = std::max(
-      noise.accelerometer_noise_density, measured_density(imu, period_s, &ImuSample::accel_mps2));
-  return noise;
-}
-
 std::vector<RobotRange> direct_ranges(const RobotRecording& robot,
                                       const std::map<RobotId, std::size_t>& index_of,
                                       const ClockLine& clock) {
@@ -160,7 +136,7 @@ Result<RobotRecord> record_of(const RobotRecording& robot,
   RobotRecord record;
   record.imu = robot.imu;
   for (ImuSample& sample : record.imu) sample.stamp = clock.reference_time(sample.stamp);
-  record.noise = noise_with_vibration(robot.config.imu.noise, robot.imu);
+  record.noise = noise_with_vibration(robot.config.imu.noise, robot.imu, 2);
   record.range_noise = robot.config.uwb.noise;
   record.ranges = direct_ranges(robot, index_of, clock);
   const auto found = board_sightings(robot, robot.config.cameras.front().calibration, true);

@@ -11,6 +11,7 @@
 #include "config/writing/config_writer.hpp"
 #include "daemon/ctl/calibrate/calibration_report.hpp"
 #include "daemon/ctl/calibrate/camchain.hpp"
+#include "daemon/ctl/calibrate/imu_fragment.hpp"
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "estimator/calibration/imu/imu_calibration.hpp"
@@ -28,24 +29,33 @@ constexpr const char* kNotDetermined = "not determined";
 
 std::vector<double> swarm_list(const Eigen::VectorXd& v) { return {v.begin(), v.end()}; }
 
-TriadEstimate triad_of(const Eigen::Matrix3d& M, const Eigen::Vector3d& bias) {
+/// `sigma` is of M by rows; of an upper triangular one without the zeros.
+TriadEstimate triad_of(const Eigen::Matrix3d& M, const Eigen::VectorXd& sigma,
+                       const Eigen::Vector3d& bias) {
   TriadEstimate triad;
   triad.M = M;
   triad.bias = bias;
+  const bool is_triangular = sigma.size() == 6;
+  Eigen::Index next = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = is_triangular ? i : 0; j < 3; ++j) triad.M_sigma(i, j) = sigma[next++];
   return triad;
 }
 
-std::string triad_line(std::string_view name, const TriadEstimate& triad) {
-  const Eigen::Vector3d scale = triad.scale();
-  const Eigen::Matrix3d misalignment = triad.misalignment();
-  return fmt::format("  {}:\n    bias: {}\n    scale: {}\n    misalignment: {}\n", name,
-                     to_yaml(triad.bias), to_yaml(scale), to_yaml(misalignment));
+/// Of the sensor, in place of what was in force.
+ImuTriads triads_of(const CalibratedRobot& robot, const ImuDeviceConfig& in_force) {
+  const CameraConstants& c = robot.after.camera;
+  const auto gyro = robot.sigma.segment<9>(swarm_at::kGyroMatrix);
+  const auto accel = robot.sigma.segment<6>(swarm_at::kGyroMatrix + 9);
+  return of_sensor(
+      {triad_of(c.M_accel, accel, robot.accel_bias), triad_of(c.M_gyro, gyro, robot.gyro_bias)},
+      in_force);
 }
 
-std::string imu_part(const CalibratedRobot& robot) {
-  const CameraConstants& c = robot.after.camera;
-  return "imu:\n" + triad_line("accelerometer", triad_of(c.M_accel, robot.accel_bias)) +
-         triad_line("gyroscope", triad_of(c.M_gyro, robot.gyro_bias));
+std::string imu_part(const CalibratedRobot& robot, const ImuDeviceConfig& in_force) {
+  const ImuTriads sensor = triads_of(robot, in_force);
+  return "imu:\n" + triad_text("accelerometer", sensor.accelerometer) +
+         triad_text("gyroscope", sensor.gyroscope);
 }
 
 std::string ranges_part(const SwarmBatchResult& found, const SwarmDataset& dataset) {
@@ -140,12 +150,16 @@ Json triad_json(const TriadEstimate& triad) {
   Json json;
   json["bias"] = swarm_list(triad.bias);
   json["scale"] = swarm_list(triad.scale());
-  const Eigen::Matrix3d T = triad.misalignment();
-  json["misalignment"] = {swarm_list(T.row(0)), swarm_list(T.row(1)), swarm_list(T.row(2))};
+  const auto rows = [](const Eigen::Matrix3d& M) {
+    return Json{swarm_list(M.row(0)), swarm_list(M.row(1)), swarm_list(M.row(2))};
+  };
+  json["misalignment"] = rows(triad.misalignment());
+  json["matrix_sigma"] = rows(triad.M_sigma);
   return json;
 }
 
-Json robot_json(const CalibratedRobot& robot, const SwarmRobot& name) {
+Json robot_json(const CalibratedRobot& robot, const SwarmRobot& name,
+                const ImuDeviceConfig& in_force) {
   const RobotConstants& c = robot.after;
   const auto sigma3 = [&](int index) { return swarm_list(robot.sigma.segment<3>(index)); };
   Json json{{"id", name.id.value}, {"name", name.name}};
@@ -166,9 +180,9 @@ Json robot_json(const CalibratedRobot& robot, const SwarmRobot& name) {
   json["p_body_uwb_sigma"] = sigma3(swarm_at::kAntenna);
   json["range_delay_m"] = c.range_delay_m;
   json["range_delay_sigma_m"] = robot.sigma(swarm_at::kDelay);
-  json["accelerometer"] = triad_json(triad_of(c.camera.M_accel, robot.accel_bias));
-  json["gyroscope"] = triad_json(triad_of(c.camera.M_gyro, robot.gyro_bias));
-  json["imu_matrix_sigma"] = swarm_list(robot.sigma.segment<15>(swarm_at::kGyroMatrix));
+  const ImuTriads sensor = triads_of(robot, in_force);
+  json["accelerometer"] = triad_json(sensor.accelerometer);
+  json["gyroscope"] = triad_json(sensor.gyroscope);
   json["not_determined"] = Json::array();
   for (const std::vector<std::string>& row : rows_of(robot))
     if (row.back() == kNotDetermined) json["not_determined"].push_back(row.front());
@@ -187,7 +201,8 @@ std::string calibration_text(const SwarmBatchResult& found, const SwarmDataset& 
   const auto& resolution = dataset.robots[robot].config.cameras.front().calibration.resolution;
   return camchain_text(calibration_of(own.after.camera, resolution, std::nullopt), Mounting::kKnown,
                        "swarm") +
-         imu_part(own) + ranges_part(found, dataset) + members_part(found, dataset, false);
+         imu_part(own, dataset.robots[robot].config.imu.device) + ranges_part(found, dataset) +
+         members_part(found, dataset, false);
 }
 
 std::string fragment_text(const SwarmBatchResult& found, const SwarmDataset& dataset,
@@ -197,8 +212,8 @@ std::string fragment_text(const SwarmBatchResult& found, const SwarmDataset& dat
                      recording.robot.name) +
          camera_part(found.robots[robot].after.camera,
                      recording.config.cameras.front().calibration) +
-         imu_part(found.robots[robot]) + members_part(found, dataset, true) +
-         uwb_part(found, robot);
+         imu_part(found.robots[robot], recording.config.imu.device) +
+         members_part(found, dataset, true) + uwb_part(found, robot);
 }
 
 std::string swarm_text(const SwarmBatchResult& found, const SwarmDataset& dataset,
@@ -242,7 +257,8 @@ std::string swarm_json(const SwarmBatchResult& found, const SwarmDataset& datase
   json["range_outliers"] = found.range_outliers;
   json["robots"] = Json::array();
   for (std::size_t r = 0; r < found.robots.size(); ++r)
-    json["robots"].push_back(robot_json(found.robots[r], dataset.robots[r].robot));
+    json["robots"].push_back(
+        robot_json(found.robots[r], dataset.robots[r].robot, dataset.robots[r].config.imu.device));
   json["pairs"] = Json::array();
   for (std::size_t i = 0; i < found.robots.size(); ++i) {
     for (std::size_t j = i + 1; j < found.robots.size(); ++j) {

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -76,8 +77,13 @@ TapeSegment segment_of(const YAML::Node& node) {
   segment.to_s = number_of(item_of(node, "to_s"), "to_s", 0.0, kLongestRecording_s);
   if (!(segment.to_s > segment.from_s)) refuse(node, "to_s", "must be after from_s");
   for (const YAML::Node& pair : list_of(node, "pairs")) segment.pairs.push_back(pair_of(pair));
-  if (const YAML::Node turning = node["turning"]; turning)
+  if (const YAML::Node turning = node["turning"]; turning) {
     segment.turning = id_of(turning, "turning");
+    const bool is_there = std::ranges::any_of(segment.pairs, [&](const TapedPair& pair) {
+      return pair.pair.a == segment.turning || pair.pair.b == segment.turning;
+    });
+    if (!is_there) refuse(turning, "turning", "is a robot of none of the segment's pairs");
+  }
   return segment;
 }
 

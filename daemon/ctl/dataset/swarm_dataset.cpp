@@ -115,7 +115,19 @@ Result<std::vector<ImuSample>> read_imu(const fs::path& file, const Context& con
                }
                return true;
              })
-      .map(values_of<ImuSample>);
+      .map([&](std::vector<DatasetRow<ImuSample>>&& rows) {
+        // A sample is a mean since the one before.
+        std::vector<ImuSample> samples;
+        samples.reserve(rows.size());
+        for (const DatasetRow<ImuSample>& row : rows) {
+          if (!samples.empty() && samples.back().stamp == row.stamp) {
+            context.faults.add(file, row.line, "the stamp repeats");
+          } else {
+            samples.push_back(row.value);
+          }
+        }
+        return samples;
+      });
 }
 
 Result<std::vector<UwbRange>> read_ranges(const fs::path& file, const Context& context) {

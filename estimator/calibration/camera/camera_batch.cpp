@@ -16,15 +16,21 @@ namespace {
 namespace at = camera_constants;
 
 constexpr double kHeldOutEvery_s = 5.0;  // one second of five
+constexpr int kHeldOutPicture = 5;       // of a grid, which one picture shows well: one of five
 constexpr double kShareOfFit = 0.8;      // of the time; the rest is cross-validation
 
-/// 1 for sightings that enter the fit, 0 for those of held-out seconds.
-std::vector<double> fitted_mask(std::span<const BoardSighting> sightings) {
+/// 1 for sightings that enter the fit, 0 for those that are held out.
+std::vector<double> fitted_mask(std::span<const BoardSighting> sightings, BoardLayout layout) {
   std::vector<double> mask;
   mask.reserve(sightings.size());
-  for (const BoardSighting& sighting : sightings) {
-    const double t_s = to_seconds(sighting.stamp - sightings.front().stamp);
-    mask.push_back(std::fmod(t_s, kHeldOutEvery_s) < kHeldOutEvery_s - 1.0 ? 1.0 : 0.0);
+  int picture = 0;
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    const double t_s = to_seconds(sightings[i].stamp - sightings.front().stamp);
+    if (i > 0 && sightings[i].stamp != sightings[i - 1].stamp) ++picture;
+    const bool is_held_out = layout == BoardLayout::kRigid
+                                 ? picture % kHeldOutPicture == kHeldOutPicture - 1
+                                 : std::fmod(t_s, kHeldOutEvery_s) >= kHeldOutEvery_s - 1.0;
+    mask.push_back(is_held_out ? 0.0 : 1.0);
   }
   return mask;
 }
@@ -151,7 +157,7 @@ CameraBatchResult calibrate_camera_from(const CameraState& start, CameraProblem&
   result.rate_rms_radps = rate_rms(imu, result.gyro_bias);
   judge_camera(solution, sightings, names, settings, result);
   if (result.refusals.empty()) {
-    const std::vector<double> mask = fitted_mask(sightings);
+    const std::vector<double> mask = fitted_mask(sightings, start.constants.layout);
     result.held_out_px = held_out_rms(resolve_camera(problem, start, solution, mask), mask);
     judge_held_out(result);
   }

@@ -36,8 +36,9 @@ struct CameraBatchResult {
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   double lens_sigma_px = 0.0;  ///< RMS over the image circle, lens and rotation together
   double spot_sigma_px = 0.0;  ///< of a coordinate, from the residuals
-  double held_out_px = 0.0;    ///< the same for seconds that did not enter the fit
-  double outliers = 0.0;       ///< share of the sightings
+  double held_out_px =
+      0.0;                ///< the same for seconds, of a grid pictures, that did not enter the fit
+  double outliers = 0.0;  ///< share of the sightings
   Eigen::Vector3d rate_rms_radps = Eigen::Vector3d::Zero();  ///< about the body's axes
   Eigen::MatrixXd covariance;  ///< of the constants, in the order of `camera_constants`
   ResidualMap map;

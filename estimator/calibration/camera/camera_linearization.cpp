@@ -10,8 +10,9 @@ CameraLinearization::BoardColumns CameraLinearization::columns_of(const CameraCo
                                                                   std::size_t board) {
   if (constants.layout == BoardLayout::kFree)
     return {kShared + 3 * static_cast<Eigen::Index>(board), Eigen::Matrix3d::Identity()};
-  BoardColumns columns{kShared, Eigen::Matrix<double, 3, 6>::Zero()};
-  columns.J << -hat(constants.p_W[board] - constants.p_W.front()), Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d arm_W = constants.p_W[board] - constants.p_W.front();
+  BoardColumns columns{kShared, Eigen::Matrix<double, 3, kRigidUnknowns>::Zero()};
+  columns.J << -hat(arm_W), Eigen::Matrix3d::Identity(), arm_W;
   return columns;
 }
 
@@ -56,8 +57,10 @@ void CameraLinearization::sighting(std::size_t knot, std::size_t /*index*/, std:
   add_local(knot, weighted * row.J, weighted * row.r);
   const BoardColumns& columns = boards_[board];
   const Eigen::Index count = columns.J.cols();
-  const Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 6> J_board = row.J_board * columns.J;
-  const Eigen::Matrix<double, kLocal, Eigen::Dynamic, 0, kLocal, 6> cross = weighted * J_board;
+  const Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kRigidUnknowns> J_board =
+      row.J_board * columns.J;
+  const Eigen::Matrix<double, kLocal, Eigen::Dynamic, 0, kLocal, kRigidUnknowns> cross =
+      weighted * J_board;
   system_.to_constants(knot).middleCols(columns.begin, count) += cross.topRows<kState>();
   Eigen::MatrixXd& C = system_.constants();
   C.block(0, columns.begin, kShared, count) += cross.bottomRows<kShared>();

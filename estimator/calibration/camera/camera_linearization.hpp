@@ -39,7 +39,7 @@ class CameraLinearization {
   /// The unknowns that move a board, and the derivative of its place by them.
   struct BoardColumns {
     Eigen::Index begin = 0;  ///< among the constants
-    Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> J;
+    Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kRigidUnknowns> J;
   };
   [[nodiscard]] static BoardColumns columns_of(const CameraConstants& constants, std::size_t board);
   /// To the blocks of a knot and of the constants without boards.

@@ -127,6 +127,8 @@ void CameraProblem::visit_priors(const CameraState& state, const CameraState& pr
     for (int j = i; j < 3; ++j) add(index++, x.M_accel(i, j) - m.M_accel(i, j), priors_.imu_matrix);
   if (x.layout == BoardLayout::kRigid) {
     add3(at::kBoards + 3, x.p_W.front() - m.p_W.front(), priors_.board_m);
+    add(at::kBoards + kRigidUnknowns - 1, std::log(x.layout_scale / m.layout_scale),
+        priors_.layout_scale);
   } else {
     for (std::size_t b = 0; b < x.p_W.size(); ++b)
       add3(at::kBoards + 3 * static_cast<int>(b), x.p_W[b] - m.p_W[b], priors_.board_m);

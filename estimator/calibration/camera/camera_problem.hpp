@@ -29,6 +29,7 @@ struct CameraPriors {
   double gyro_bias_radps = 0.05;
   double accel_bias_mps2 = 0.3;
   double board_m = 10.0;
+  double layout_scale = 0.03;  ///< a pitch by ruler, or one mistaken for that of another target
 };
 
 /// A sighting's residual [px], and whether the lens could show it at all.

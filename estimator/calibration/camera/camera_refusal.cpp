@@ -48,6 +48,22 @@ void check_boards(const CameraSolution& solution, std::span<const BoardSighting>
   }
 }
 
+/// The inertial samples know the meter, too.
+void check_layout_scale(const CameraSolution& solution, CameraBatchResult& result) {
+  constexpr double kSigmas = 4.0;
+  constexpr double kLeast = 0.005;
+  const CameraConstants& constants = solution.state.constants;
+  if (constants.layout != BoardLayout::kRigid) return;
+  const int index = camera_constants::kBoards + kRigidUnknowns - 1;
+  const double sigma = std::sqrt(solution.covariance(index, index));
+  const double off = std::log(constants.layout_scale);
+  if (std::abs(off) < std::max(kLeast, kSigmas * sigma)) return;
+  result.warnings.push_back(fmt::format(
+      "the pitch of the grid is {} +- {} times what was said; the result allows for it; "
+      "measure it over all rows and all columns",
+      number_text(constants.layout_scale, 3), number_text(sigma, 3)));
+}
+
 void check_quarters(std::span<const BoardSighting> sightings, const CameraBatchSettings& settings,
                     CameraBatchResult& result) {
   constexpr std::array<std::string_view, 4> kQuarters{"upper left", "upper right", "lower left",
@@ -160,6 +176,7 @@ void judge_camera(const CameraSolution& solution, std::span<const BoardSighting>
         "the lens is known to {} px only: a second board and faster turns make it better",
         number_text(result.lens_sigma_px, 2)));
   }
+  check_layout_scale(solution, result);
   check_quarters(sightings, settings, result);
   check_rim(solution, sightings, settings, result);
 }
@@ -167,7 +184,7 @@ void judge_camera(const CameraSolution& solution, std::span<const BoardSighting>
 void judge_held_out(CameraBatchResult& result) {
   if (result.held_out_px > kHeldOutRatio * result.spot_sigma_px) {
     result.warnings.push_back(
-        fmt::format("held-out seconds fit worse ({} px) than the others ({} px)",
+        fmt::format("what was held out of the fit fits worse ({} px) than the rest ({} px)",
                     number_text(result.held_out_px, 2), number_text(result.spot_sigma_px, 2)));
   }
 }

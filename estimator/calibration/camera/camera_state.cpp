@@ -1,6 +1,7 @@
 #include "estimator/calibration/camera/camera_state.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "estimator/core/so3.hpp"
 
@@ -13,8 +14,10 @@ void move_boards(const Eigen::Ref<const Eigen::VectorXd>& d, CameraConstants& co
   if (constants.layout == BoardLayout::kRigid) {
     const Eigen::Vector3d center = constants.p_W.front();
     const Eigen::Quaterniond turn = so3_exp(d.head<3>());
+    const double growth = std::exp(d(kRigidUnknowns - 1));
     for (Eigen::Vector3d& p_W : constants.p_W)
-      p_W = center + turn * (p_W - center) + d.segment<3>(3);
+      p_W = center + growth * (turn * (p_W - center)) + d.segment<3>(3);
+    constants.layout_scale *= growth;
     return;
   }
   for (std::size_t b = 0; b < constants.p_W.size(); ++b)

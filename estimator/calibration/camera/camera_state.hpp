@@ -29,6 +29,9 @@ using LensVector = Eigen::Matrix<double, 6, 1>;
 /// Whether boards stand anywhere, or are the LEDs of one rigid grid.
 enum class BoardLayout : std::uint8_t { kFree, kRigid };
 
+/// See `board_unknowns`; the scale is the last.
+inline constexpr int kRigidUnknowns = 7;
+
 /// Everything that does not change during the recording.
 struct CameraConstants {
   LensVector lens = LensVector::Zero();  ///< xi, alpha, fx, fy, cx, cy
@@ -39,16 +42,16 @@ struct CameraConstants {
   Eigen::Matrix3d M_accel = Eigen::Matrix3d::Identity();  ///< upper triangular
   std::vector<Eigen::Vector3d> p_W;                       ///< the boards
   BoardLayout layout = BoardLayout::kFree;
+  double layout_scale = 1.0;  ///< of a rigid layout, over the size that was said
 
   /// Kalibr's T_cam_imu.
   [[nodiscard]] Pose T_C_B() const { return {-(q_C_B * p_B_C), q_C_B}; }
 };
 
-/// Free boards have three unknowns each. A rigid layout has six: a rotation about its first board
-/// (left, world axes), and that board's place.
+/// Free boards have three unknowns each. A rigid layout has seven: a rotation about its first board
+/// (left, world axes), that board's place, and the logarithm of its scale.
 [[nodiscard]] inline int board_unknowns(const CameraConstants& constants) {
-  constexpr int kRigidBody = 6;
-  return constants.layout == BoardLayout::kRigid ? kRigidBody
+  return constants.layout == BoardLayout::kRigid ? kRigidUnknowns
                                                  : 3 * static_cast<int>(constants.p_W.size());
 }
 

@@ -26,6 +26,7 @@ constexpr double kMostAccelM = 0.001;
 constexpr double kMostGyroM = 0.002;
 constexpr double kResidualRatio = 3.0;  // of what noise explains
 constexpr double kFirstRest_s = 10.0;
+constexpr double kMostScale = 1.5;
 
 /// The faces of the body that never looked up, in words.
 std::string faces_missing(const std::vector<Rest>& rests) {
@@ -110,6 +111,11 @@ void judge_fit(const ImuCalibrationSettings& settings, ImuCalibration& found) {
     found.refusals.push_back(fmt::format(
         "the attitudes do not determine the accelerometer (bias to {} m/s^2, one sigma){}",
         number_text(bias_sigma, 4), never_up(faces)));
+  const Eigen::Vector3d scale = found.accelerometer.scale();
+  if (scale.minCoeff() < 1.0 / kMostScale || scale.maxCoeff() > kMostScale)
+    found.refusals.push_back(fmt::format(
+        "the accelerometer would have to be scaled by {}: is its unit m/s^2, and gravity {}?",
+        number_text(scale.mean(), 2), number_text(settings.gravity_mps2, 4)));
   const double explained = explained_residual(settings, found);
   if (found.accelerometer.residual_rms > kResidualRatio * explained)
     found.refusals.push_back(fmt::format(

@@ -10,6 +10,7 @@
 
 #include "estimator/calibration/number_text.hpp"
 #include "estimator/calibration/range/robust_mean.hpp"
+#include "estimator/core/quantile.hpp"
 
 namespace crepes {
 namespace {
@@ -209,6 +210,24 @@ void fit_pairs(RangeCalibration& found) {
     found.pairs.push_back({pair, fit.x(column), std::sqrt(fit.covariance(column, column))});
 }
 
+/// A rest of a pair that is far from its others.
+void check_rests(RangeCalibration& found) {
+  constexpr std::size_t kLeastRests = 3;
+  constexpr double kMistake_m = 0.08;
+  std::map<RobotPair, std::vector<double>> biases_m;
+  for (const SegmentBias& segment : found.segments)
+    biases_m[segment.pair].push_back(segment.bias_m);
+  for (const SegmentBias& segment : found.segments) {
+    std::vector<double> all_m = biases_m[segment.pair];
+    if (all_m.size() < kLeastRests) continue;
+    const double off_m = segment.bias_m - upper_median(all_m);
+    if (std::abs(off_m) < kMistake_m) continue;
+    found.warnings.push_back(fmt::format(
+        "{}: {} m from the pair's other rests: a mistake on the tape, or something between the two",
+        place_of(segment), number_text(off_m, 3)));
+  }
+}
+
 void check_pairs(const std::vector<PairBias>& alone, RangeCalibration& found) {
   for (std::size_t i = 0; i < alone.size(); ++i) {
     const double difference = alone[i].bias_m - found.pairs[i].bias_m;
@@ -292,6 +311,7 @@ RangeCalibration calibrate_ranges(std::span<const TapedRanges> taped,
   if (taped.empty()) found.refusals.emplace_back("the tape names no pair");
   for (const TapedRanges& part : taped) add_segment(part, late_path_db, found);
   if (!found.refusals.empty()) return found;
+  check_rests(found);
   fit_pairs(found);
   fit_modules(found);
   describe_noise(taped, found);

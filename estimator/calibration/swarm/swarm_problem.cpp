@@ -118,7 +118,8 @@ void SwarmProblem::set_pair_noise() {
 std::optional<SwarmProblem::Place> SwarmProblem::place_of(std::size_t robot, double time_s) const {
   const std::vector<double>& times = imu_s_[robot];
   const std::vector<std::size_t>& first = first_sample_[robot];
-  if (time_s < times[first.front()] || time_s >= times[first.back()]) return std::nullopt;
+  const bool is_inside = time_s >= times[first.front()] && time_s < times[first.back()];
+  if (!is_inside) return std::nullopt;  // not a number, too
   const auto next = std::ranges::upper_bound(times, time_s);
   const auto sample = static_cast<std::size_t>(next - times.begin()) - 1;
   const auto knot = std::ranges::upper_bound(first, sample) - first.begin() - 1;

@@ -116,6 +116,21 @@ TEST_F(CalibrateRange, GivesEachOfTwoRobotsHalfOfTheirBias) {
   EXPECT_EQ(config.swarm.members[2].range_delay_m, 0.0);
 }
 
+TEST_F(CalibrateRange, LeavesTheSizeOfBiasesAloneWherePairsDoNotDetermineTheModules) {
+  write_swarm(3);
+  const double configured_m = this->config().uwb.noise.bias_sigma_m;
+
+  const auto report = run_with({"r1,r2=3.00", "1,3=5.00"});
+
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_NE(report->text.find("bias_sigma_m"), std::string::npos) << report->text;
+  const Config config = config_with_fragment();
+  const auto delay_m = [&](std::size_t i) { return config.swarm.members[i].range_delay_m; };
+  EXPECT_NEAR(delay_m(0) + delay_m(1), kDelays.at(1) + kDelays.at(2), 0.01);
+  EXPECT_NEAR(delay_m(0) + delay_m(2), kDelays.at(1) + kDelays.at(3), 0.01);
+  EXPECT_EQ(config.uwb.noise.bias_sigma_m, configured_m);
+}
+
 TEST_F(CalibrateRange, TakesDistancesFromTheCommandLineByNameOrId) {
   write_swarm(3);
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -59,6 +60,25 @@ TEST(GridCamera, FindsLensMountingAndTimeShift) {
   const Film film = filmed(1, kShape);
 
   expect_found(calibrated(film, kShape), film.recording);
+}
+
+bool warns_of_pitch(const CameraBatchResult& found) {
+  return std::ranges::any_of(found.warnings, [](const std::string& warning) {
+    return warning.find("pitch") != std::string::npos;
+  });
+}
+
+TEST(GridCamera, FindsThePitchThatIsNotAsSaid) {
+  constexpr GridShape kTrue{.rows = 5, .columns = 7, .pitch_m = 0.05};
+  constexpr GridShape kSaid{.rows = 5, .columns = 7, .pitch_m = 0.051};
+  const Film film = filmed(2, kTrue);
+
+  const CameraBatchResult misled = calibrated(film, kSaid);
+
+  expect_found(misled, film.recording);
+  EXPECT_NEAR(misled.constants.layout_scale, kTrue.pitch_m / kSaid.pitch_m, 0.003);
+  EXPECT_TRUE(warns_of_pitch(misled));
+  EXPECT_FALSE(warns_of_pitch(calibrated(film, kTrue)));
 }
 
 // Which corner of a square grid is the first, only the gyroscope knows after the grid was away.

@@ -101,22 +101,45 @@ TEST(Rests, AreFoundWithoutTheTurnsBetweenThem) {
   EXPECT_NEAR(search.gyro_sigma_radps, kNoise.gyroscope_noise_density * 10.0, 2e-4);
 }
 
-TEST(Allan, FindsWhiteNoiseAndRandomWalkOfAnHour) {
-  simulated::Dice dice(5);
-  constexpr double kWhite = 0.0004;
-  constexpr double kWalk = 0.0001;
+/// At 100 Hz.
+std::vector<double> at_rest(std::uint64_t seed, double white, double walk, int count) {
+  simulated::Dice dice(seed);
   std::vector<double> readings;
   double bias = 0.3;
-  for (int i = 0; i < 360000; ++i) {
-    bias += dice.normal(kWalk * 0.1);
-    readings.push_back(bias + dice.normal(kWhite * 10.0));
+  for (int i = 0; i < count; ++i) {
+    bias += dice.normal(walk * 0.1);
+    readings.push_back(bias + dice.normal(white * 10.0));
   }
+  return readings;
+}
 
-  const auto noise = fit_noise(allan_deviation(readings, 0.01));
+TEST(Allan, FindsWhiteNoiseAndRandomWalkOfAnHour) {
+  constexpr double kWhite = 0.0004;
+  constexpr double kWalk = 0.0001;
+
+  const auto noise = fit_noise(allan_deviation(at_rest(5, kWhite, kWalk, 360000), 0.01));
 
   ASSERT_TRUE(noise);
   EXPECT_NEAR(noise->white, kWhite, 0.03 * kWhite);
   EXPECT_NEAR(noise->random_walk, kWalk, 0.25 * kWalk);
+}
+
+TEST(Allan, KnowsHowFarItIsOff) {
+  constexpr double kWhite = 0.0004;
+  constexpr double kWalk = 0.0001;
+  constexpr int kSeeds = 40;
+  double white_z2 = 0.0;
+  double walk_z2 = 0.0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const auto noise = fit_noise(allan_deviation(at_rest(seed, kWhite, kWalk, 90000), 0.01));
+    ASSERT_TRUE(noise);
+    white_z2 += std::pow((noise->white - kWhite) / noise->white_sigma, 2) / kSeeds;
+    walk_z2 += std::pow((noise->random_walk - kWalk) / noise->random_walk_sigma, 2) / kSeeds;
+  }
+  for (const double z2 : {white_z2, walk_z2}) {
+    EXPECT_GT(z2, 0.4);
+    EXPECT_LT(z2, 2.0);
+  }
 }
 
 TEST(Allan, HasNothingToSayOfAFewReadings) {
