@@ -51,13 +51,14 @@ std::string calibration_text(const ImportedCalibration& calibration) {
   return text;
 }
 
-ImportedCalibration read_calibration(const ConfigNode& root, std::vector<ConfigFault>& faults) {
+ImportedCalibration read_calibration(const ConfigNode& root, std::vector<ConfigFault>& faults,
+                                     std::string_view only_camera) {
   ReadLog log(root);
   ImportedCalibration calibration;
   if (is_basalt(root)) {
     calibration = read_basalt(root, log);
   } else if (is_kalibr(root)) {
-    calibration = read_kalibr(root, log);
+    calibration = read_kalibr(root, only_camera, log);
   } else {
     log.fault("",
               "neither a camchain nor an imu.yaml of Kalibr (cam0, imu0, update_rate), nor a "

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "config/reading/config_reader.hpp"
@@ -17,15 +18,18 @@ struct ImportedCalibration {
 
 /// Kalibr's camchain.yaml, camchain-imucam.yaml and imu.yaml. Faults go to the log.
 [[nodiscard]] bool is_kalibr(const ConfigNode& root);
-[[nodiscard]] ImportedCalibration read_kalibr(const ConfigNode& root, ReadLog& log);
+/// With `only_camera`, the others may be of kinds that are not read.
+[[nodiscard]] ImportedCalibration read_kalibr(const ConfigNode& root, std::string_view only_camera,
+                                              ReadLog& log);
 
 /// Basalt's calibration.json. Faults go to the log.
 [[nodiscard]] bool is_basalt(const ConfigNode& root);
 [[nodiscard]] ImportedCalibration read_basalt(const ConfigNode& root, ReadLog& log);
 
-/// Detects the format and reads it.
+/// Detects the format and reads it; `only_camera` as above, empty: all.
 [[nodiscard]] ImportedCalibration read_calibration(const ConfigNode& root,
-                                                   std::vector<ConfigFault>& faults);
+                                                   std::vector<ConfigFault>& faults,
+                                                   std::string_view only_camera = {});
 
 /// The sections `cameras` and `imu` of crepesd.yaml. A section without content is left out.
 [[nodiscard]] std::string calibration_text(const ImportedCalibration& calibration);

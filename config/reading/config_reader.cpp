@@ -2,13 +2,13 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cstdint>
 #include <iterator>
 #include <limits>
 
 #include "config/reading/spelling.hpp"
+#include "config/schema/nearest_rotation.hpp"
 #include "drivers/base/number_text.hpp"
 
 namespace crepes {
@@ -143,8 +143,7 @@ std::string read_value(const ConfigNode& node, Pose& value) {
     return "the upper left 3x3 is not a rotation: R^T R is not I within 0.001";
   if (R.determinant() < 0) return "the upper left 3x3 mirrors: its determinant is -1";
 
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  value.q = Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * svd.matrixV().transpose()));
+  value.q = nearest_rotation(R);
   value.p = T.topRightCorner<3, 1>();
   return "";
 }

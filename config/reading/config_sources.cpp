@@ -36,7 +36,8 @@ std::vector<fs::path> fragments_of(const fs::path& path, ConfigFaults& faults) {
   if (!fs::exists(folder, error)) return files;
   fs::directory_iterator entry(folder, error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error))
-    if (entry->path().extension() == ".yaml") files.push_back(entry->path());
+    if (entry->path().extension() == ".yaml" && !entry->path().filename().string().starts_with('.'))
+      files.push_back(entry->path());  // a hidden one is an editor's
   if (error) faults.push_back({folder.string(), 0, "", error.message()});
   std::ranges::sort(files);
   return files;
@@ -77,7 +78,10 @@ ConfigNode parse_named(const ConfigNode& reference, const std::string& path, Con
     return ConfigNode{};
   };
   std::error_code error;
-  if (!fs::is_regular_file(file, error)) return refuse(" is not a file");
+  if (!fs::is_regular_file(file, error)) {
+    const bool is_hidden = error && error != std::errc::no_such_file_or_directory;
+    return refuse(is_hidden ? ": " + error.message() : " is not a file");
+  }
   const std::size_t faults_before = faults.size();
   ConfigNode root = parse_file(file, faults);
   if (faults.size() > faults_before) return {};
@@ -139,11 +143,11 @@ void move_to(const Place& place, ConfigNode& node) {
 /// A calibration as the sections `cameras` and `imu`. All values have the position of their camera.
 /// If the file is not a calibration, adds faults and returns a node without a value.
 ConfigNode parse_calibration(const ConfigNode& reference, const std::string& path,
-                             ConfigFaults& faults) {
+                             std::string_view only_camera, ConfigFaults& faults) {
   const ConfigNode root = parse_named(reference, path, faults);
   if (!root.is_mapping()) return {};
   const std::size_t faults_before = faults.size();
-  const ImportedCalibration calibration = read_calibration(root, faults);
+  const ImportedCalibration calibration = read_calibration(root, faults, only_camera);
   if (faults.size() > faults_before) return {};
   ConfigNode sections = parse_yaml(calibration_text(calibration), root.place.file, faults);
   for (std::size_t i = 0; i < calibration.cameras.size(); ++i)
@@ -152,11 +156,12 @@ ConfigNode parse_calibration(const ConfigNode& reference, const std::string& pat
   return sections;
 }
 
-/// The keys of the camera `name` in a calibration.
+/// The keys of the camera `name` in a calibration, of which the other cameras may be anything.
 ConfigNode calibrated_camera(const ConfigNode& reference, const std::string& path,
                              const std::string& name, ConfigFaults& faults) {
-  ConfigNode sections = parse_calibration(reference, path, faults);
-  if (!sections.is_mapping()) return {};
+  const std::size_t faults_before = faults.size();
+  ConfigNode sections = parse_calibration(reference, path, name, faults);
+  if (faults.size() > faults_before) return {};
   if (ConfigNode* const cameras = sections.find("cameras")) {
     for (ConfigNode& camera : cameras->items) {
       if (camera.extract("name").text == name) return std::move(camera);
@@ -170,6 +175,9 @@ ConfigNode calibrated_camera(const ConfigNode& reference, const std::string& pat
 void add_camera_calibration(ConfigNode& camera, const std::string& path, ConfigFaults& faults) {
   const auto reference = extract_text(&camera, path, "calibration", faults);
   const auto wanted = extract_text(&camera, path, "calibration_camera", faults);
+  if (!reference && wanted)
+    add_fault(wanted->place, path + ".calibration_camera", "has no effect without calibration",
+              faults);
   if (!reference) return;
   const ConfigNode* const named = camera.find("name");
   const std::string name = wanted ? wanted->text : named != nullptr ? named->text : "";
@@ -181,11 +189,26 @@ void add_imu_calibration(ConfigNode& root, ConfigFaults& faults) {
   const std::string path = "imu.calibration";
   const auto reference = extract_text(imu, "imu", "calibration", faults);
   if (!reference) return;
-  ConfigNode sections = parse_calibration(*reference, path, faults);
+  ConfigNode sections = parse_calibration(*reference, path, "", faults);
   const bool has_imu = sections.find("imu") != nullptr;
   if (sections.is_mapping() && !has_imu)
     add_fault(reference->place, path, "says nothing of an inertial sensor", faults);
   add_missing_keys(*imu, has_imu ? sections.extract("imu") : ConfigNode{});
+}
+
+/// The file that a value names, wherever this program was started: relative names start at the
+/// folder of the file that has them.
+fs::path beside(const ConfigNode& name) {
+  const fs::path file = fs::path(name.place.file).parent_path() / name.text;
+  std::error_code error;
+  fs::path absolute = fs::absolute(file, error);
+  return (error ? file : absolute).lexically_normal();
+}
+
+void place_folder(ConfigNode& camera) {
+  ConfigNode* const folder = camera.is_mapping() ? camera.find("folder") : nullptr;
+  if (folder != nullptr && folder->is_text() && !folder->text.empty())
+    folder->text = beside(*folder).string();
 }
 
 /// Keys stay in their files. Whether they can be read is checked before the daemon starts.
@@ -195,7 +218,7 @@ void place_key_file(ConfigNode& root, std::string_view key, Result<Key> (*read)(
   ConfigNode* const net = root.find("net");
   ConfigNode* const name = net == nullptr ? nullptr : net->find(key);
   if (name == nullptr || !name->is_text() || name->text.empty()) return;
-  const fs::path file = fs::path(name->place.file).parent_path() / name->text;
+  const fs::path file = beside(*name);
   if (const Result<Key> found = read(file); !found)
     return add_fault(name->place, fmt::format("net.{}", key), found.error().message, faults);
   name->text = file.string();
@@ -207,8 +230,10 @@ ConfigNode with_references(ConfigNode root, ConfigFaults& faults) {
   place_key_file(root, "key_file", read_mesh_key, faults);
   place_key_file(root, "robot_key_file", read_robot_key, faults);
   if (ConfigNode* const cameras = root.find("cameras"); cameras != nullptr && cameras->is_list()) {
-    for (std::size_t i = 0; i < cameras->items.size(); ++i)
+    for (std::size_t i = 0; i < cameras->items.size(); ++i) {
+      place_folder(cameras->items[i]);
       add_camera_calibration(cameras->items[i], fmt::format("cameras[{}]", i), faults);
+    }
   }
   return root;
 }
@@ -217,6 +242,8 @@ ConfigNode with_references(ConfigNode root, ConfigFaults& faults) {
 
 ConfigNode load_config_tree(const fs::path& path, ConfigFaults& faults) {
   ConfigNode root = parse_file(path, faults);
+  // Fragments alone lack almost everything, which is no fault of theirs.
+  if (root.kind == ConfigNode::Kind::kNothing && !faults.empty()) return root;
   for (const fs::path& fragment : fragments_of(path, faults)) {
     ConfigNode over = parse_file(fragment, faults);
     // A fragment whose lines are all commented out changes nothing.

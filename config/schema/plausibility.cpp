@@ -12,8 +12,9 @@ namespace {
 
 using Doubts = std::vector<RuleFault>;
 
-constexpr double kLongArm = 1.0;       // m; of a lever arm on a robot
-constexpr double kFewFrames = 2.0;     // of a slot
+constexpr double kLongArm = 1.0;    // m; of a lever arm on a robot
+constexpr double kFewFrames = 2.0;  // of a slot
+constexpr double kLongestSlot_ms = 70.0;
 constexpr double kMillisecond = 1e-3;  // s
 
 void doubt_members(const SwarmConfig& swarm, Doubts& doubts) {
@@ -54,10 +55,14 @@ void doubt_cameras(const Config& config, Doubts& doubts) {
     }
     const double frames = camera.calibration.rate_hz * config.swarm.slot_ms * kMillisecond;
     if (frames < kFewFrames) {
-      doubts.push_back({key + ".rate_hz",
-                        fmt::format("gives {:.1f} frames a slot; two or more can be read reliably: "
-                                    "swarm.slot_ms: {:.0f}, and the same on the boards",
-                                    frames, slot_of(camera.calibration.rate_hz))});
+      doubts.push_back(
+          {key + ".rate_hz",
+           slot_of(camera.calibration.rate_hz) > kLongestSlot_ms
+               ? fmt::format("is too slow to read codes: {:.0f} frames a second or more",
+                             std::ceil(kFewFrames / (kLongestSlot_ms * kMillisecond)))
+               : fmt::format("gives {:.1f} frames a slot; two or more can be read "
+                             "reliably: swarm.slot_ms: {:.0f}, and the same on the boards",
+                             frames, slot_of(camera.calibration.rate_hz))});
     }
     if (camera.device.driver == CameraDriver::kFolder &&
         !std::filesystem::is_directory(camera.device.folder, status))

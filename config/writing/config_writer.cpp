@@ -5,6 +5,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <utility>
+
+#include "config/schema/nearest_rotation.hpp"
 
 namespace crepes {
 namespace {
@@ -60,11 +63,21 @@ std::string to_yaml(const std::array<int, 2>& value) { return flow_list(value); 
 std::string to_yaml(const std::vector<double>& value) { return flow_list(value); }
 std::string to_yaml(const std::vector<std::string>& value) { return flow_list(value); }
 
-/// Rotations are rounded to 1e-14, so that 90 degree rotations appear as 0 and 1.
+/// Rotations are rounded to 1e-13, so that 90 degree rotations appear as 0 and 1, and so that what
+/// is read again is written as the same text.
 std::string to_yaml(const Pose& value) {
-  constexpr double kPerUnit = 1e14;
+  static constexpr double kPerUnit = 1e13;
+  constexpr int kRounds = 8;
+  const auto rounded = [](const Eigen::Matrix3d& R) -> Eigen::Matrix3d {
+    return ((R * kPerUnit).array().round() / kPerUnit + 0.0).matrix();
+  };
+  Eigen::Matrix3d R = rounded(value.R());
+  for (int round = 0; round < kRounds; ++round) {
+    const Eigen::Matrix3d again = rounded(nearest_rotation(R).toRotationMatrix());
+    if (again == std::exchange(R, again)) break;
+  }
   Eigen::Matrix<double, 3, 4> top;
-  top << ((value.R() * kPerUnit).array().round() / kPerUnit + 0.0).matrix(), value.p;
+  top << R, value.p;
   std::string text = "[";
   for (const auto& row : top.rowwise()) text += flow_list(row) + ", ";
   return text + "[0, 0, 0, 1]]";

@@ -55,15 +55,21 @@ Result<Json> config_status(const DaemonAddress& daemon) {
   });
 }
 
-/// Waits until a reload after `generation` is in force, or was refused.
-Result<void> await_reload(const DaemonAddress& daemon, int generation) {
+/// Waits until a reload after `before` is in force, or was refused. A fault that was there before
+/// is of an earlier reload until it has stayed for a while.
+Result<void> await_reload(const DaemonAddress& daemon, const Json& before) {
   constexpr Duration kReloadTime = 10s;
+  constexpr Duration kOldFault = 3s;
   const MonotonicClock clock;
-  for (const Timestamp end = clock.now() + kReloadTime; clock.now() < end; sleep_for(50ms)) {
+  const Timestamp begin = clock.now();
+  const int generation = before.value("generation", 0);
+  for (const Timestamp end = begin + kReloadTime; clock.now() < end; sleep_for(50ms)) {
     const Result<Json> status = config_status(daemon);
     if (!status) return tl::unexpected(status.error());
     if (status->value("generation", 0) > generation) return {};
-    if (const std::string fault = status->value("fault", ""); !fault.empty())
+    const std::string fault = status->value("fault", "");
+    const bool is_new = fault != before.value("fault", "") || clock.now() > begin + kOldFault;
+    if (!fault.empty() && is_new)
       return fail(ErrorCode::kConfig, "the daemon refused the reload: " + fault);
   }
   return fail(ErrorCode::kIo, "the daemon did not reload; was --config its file?");
@@ -74,7 +80,7 @@ Result<void> apply(const ExposureOptions& options, CameraLights& lights, const C
   if (!before) return tl::unexpected(before.error());
   const auto reload = [&] {
     return request_reload(options)
-        .and_then([&] { return await_reload(options.daemon, before->value("generation", 0)); })
+        .and_then([&] { return await_reload(options.daemon, *before); })
         .map_error([](Error error) {
           error.message += "; 90-exposure.yaml has the new values, for the daemon's next start";
           return error;

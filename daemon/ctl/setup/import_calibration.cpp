@@ -47,6 +47,7 @@ Json json_of(const CameraCalibration& camera) {
   json["T_cam_imu"] =
       Json::parse(to_yaml(camera.T_cam_imu));  // rows of numbers look the same in JSON
   json["timeshift_cam_imu"] = camera.timeshift_cam_imu;
+  if (!camera.calibrated) json["calibrated"] = false;
   return json;
 }
 

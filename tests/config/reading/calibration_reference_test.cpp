@@ -28,6 +28,11 @@ class CalibrationReference : public ConfigSources {
       fs::copy_file(file.path(), path(file.path().filename()));
   }
 
+  [[nodiscard]] std::string camchain_text() const {
+    std::ostringstream text;
+    text << std::ifstream(path("camchain-imucam.yaml")).rdbuf();
+    return text.str();
+  }
   void write_camera(const std::string& keys) const {
     write("crepesd.yaml", replaced(kBase, "cameras:", "uwb:", "cameras:\n  - name: cam0\n" + keys));
   }
@@ -81,10 +86,34 @@ TEST_F(CalibrationReference, ReportsWhatIsWrongWithItOnce) {
   EXPECT_EQ(faults(), "crepesd.yaml:9: imu.calibration: says nothing of an inertial sensor");
 }
 
+TEST_F(CalibrationReference, OtherCamerasMayBeOfKindsThatAreNotRead) {
+  std::string camchain = camchain_text();
+  camchain.replace(camchain.find("equidistant"), 11, "radtan");
+  write("camchain-imucam.yaml", camchain);
+
+  write_camera("    calibration: camchain-imucam.yaml\n");
+  EXPECT_EQ(load().cameras.size(), 1U);
+
+  write_camera("    calibration: camchain-imucam.yaml\n    calibration_camera: cam1\n");
+  EXPECT_NE(faults().find("radtan"), std::string::npos) << faults();
+}
+
+TEST_F(CalibrationReference, RefusesAnImuWithIntrinsicsOfItsOwn) {
+  std::ofstream(path("imu.yaml"), std::ios::app) << "model: scale-misalignment\n";
+  write_camera("    calibration: camchain-imucam.yaml\nimu: {calibration: imu.yaml}\n");
+  EXPECT_NE(faults().find("model: scale-misalignment"), std::string::npos) << faults();
+}
+
+TEST_F(CalibrationReference, RefusesTheNameOfACameraWithoutAFile) {
+  write("crepesd.yaml", replaced(kBase, "    T_cam_imu", "uwb:",
+                                 "    T_cam_imu: [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], "
+                                 "[0, 0, 0, 1]]\n    calibration_camera: cam1\n"));
+  EXPECT_EQ(faults(),
+            "crepesd.yaml:11: cameras[0].calibration_camera: has no effect without calibration");
+}
+
 TEST_F(CalibrationReference, NamesTheCalibrationForAValueThatDoesNotSuit) {
-  std::ostringstream text;
-  text << std::ifstream(path("camchain-imucam.yaml")).rdbuf();
-  std::string camchain = text.str();
+  std::string camchain = camchain_text();
   camchain.replace(camchain.find("[1280, 1024]"), 12, "[5280, 1024]");
   write("camchain-imucam.yaml", camchain);
   write_camera("    calibration: camchain-imucam.yaml\n");

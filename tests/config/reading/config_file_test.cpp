@@ -13,6 +13,7 @@
 #include "drivers/base/scratch_directory.hpp"
 #include "tests/support/config_texts.hpp"
 #include "tests/support/places.hpp"
+#include "tests/support/random_geometry.hpp"
 
 namespace crepes::config_file_test {
 namespace {
@@ -191,6 +192,16 @@ TEST(ConfigFile, WritesWhatItReadsBackUnchanged) {
 
   EXPECT_EQ(faults_of(written), "");
   EXPECT_EQ(write_config(check_config_text(written, "f").config), written);
+}
+
+TEST(ConfigFile, WritesEveryRotationAsItReadsIt) {
+  Config config = check_config_text(kGood, "f").config;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    test::RandomGeometry random(seed);
+    config.cameras.at(0).calibration.T_cam_imu.q = random.rotation();
+    const std::string written = write_config(config);
+    EXPECT_EQ(write_config(check_config_text(written, "f").config), written) << seed;
+  }
 }
 
 TEST(ConfigFile, WritesTextThatNeedsQuotes) {

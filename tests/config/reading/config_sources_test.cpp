@@ -40,6 +40,25 @@ TEST_F(ConfigSources, LaysFragmentsOverTheFileInTheOrderOfTheirNames) {
   EXPECT_EQ(config.log.level, LogLevel::kDebug);
 }
 
+TEST_F(ConfigSources, LeavesHiddenFilesAlone) {
+  write("crepesd.yaml", kBase);
+  write("crepesd.d/.10-noise.yaml", "uwb: {noise_m: nonsense}\n");
+  EXPECT_EQ(faults(), "");
+}
+
+TEST_F(ConfigSources, MissesNothingWhereAFileCannotBeParsed) {
+  write("crepesd.yaml", "robot: {id: 1\n");
+  write("crepesd.d/10-noise.yaml", "uwb: {noise_m: 0.1}\n");
+  EXPECT_EQ(faults().find('\n'), std::string::npos) << faults();
+  EXPECT_NE(faults().find("crepesd.yaml:"), std::string::npos);
+}
+
+TEST_F(ConfigSources, FindsAFolderOfPicturesBesideItsFile) {
+  write("crepesd.yaml", kBase);
+  write("crepesd.d/10-film.yaml", "cameras: [{name: cam0, driver: folder, folder: ../film}]\n");
+  EXPECT_EQ(load().cameras.at(0).device.folder, path("film").string());
+}
+
 TEST_F(ConfigSources, RefusesAFragmentThatIsNoFileAtOnce) {
   write("crepesd.yaml", kBase);
   write("crepesd.d/10-noise.yaml", "uwb: {noise_m: 0.1}\n");
