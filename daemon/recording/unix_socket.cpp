@@ -40,7 +40,9 @@ bool is_socket(const std::string& path) {
 
 }  // namespace
 
-Result<UniqueFd> connect_unix(const std::string& path) { return open_with(path, 0, ::connect); }
+Result<UniqueFd> connect_unix(const std::string& path, int flags) {
+  return open_with(path, flags, ::connect);
+}
 
 Result<UniqueFd> listen_unix(const std::string& path) {
   Result<UniqueFd> socket = open_with(path, SOCK_NONBLOCK, ::bind);

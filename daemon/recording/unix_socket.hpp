@@ -11,6 +11,6 @@ namespace crepes {
 /// Listens without blocking. The owner and the group of this process may connect. Replaces a socket
 /// file that no process listens on, and no other file.
 [[nodiscard]] Result<UniqueFd> listen_unix(const std::string& path);
-[[nodiscard]] Result<UniqueFd> connect_unix(const std::string& path);
+[[nodiscard]] Result<UniqueFd> connect_unix(const std::string& path, int flags = 0);
 
 }  // namespace crepes

@@ -57,7 +57,7 @@ Json head_json(const SystemStatus& status) {
   Json json{{"class", "STATUS"},
             {"self", status.self.value},
             {"name", truncated_utf8(status.name, kMaxName)}};
-  put(json, "uptime_s", status.uptime_s, 6);
+  put(json, "uptime_s", status.uptime_s, 9);
   return json;
 }
 

@@ -237,6 +237,33 @@ class Live(PageTest):
         self.daemon.broken.clear()
         wait_for("uwb: works again")
 
+    def test_a_status_about_a_part_changes_nothing_else(self):
+        page = self.open(self.viewer)
+        told = page.value("""(() => {
+            const store = new crepes.store.constructor(true);
+            const status = (t, truncated, neighbors, more) => store.addStatus({ self: 1, name: 'r1', uptime_s: t, timestamp: t, truncated, neighbors, more });
+            const bad = { peer: 2, name: 'r2', state: 'none', reason: 'not_seen', faults: ['its clock is 20 ms off'] };
+            const { faults, ...cut } = bad;
+            status(1, false, [cut]);
+            for (let t = 2; t < 12; t += 2) {
+              status(t, false, [bad]);
+              status(t + 1, true, [], [2]);
+              status(t + 1.5, true, [cut], []);
+            }
+            const events = store.events.map(({ text }) => text);
+            const [kept] = store.status.neighbors.map(({ reason, faults }) => `${reason} ${faults}`);
+            status(20, false, [{ peer: 2, name: 'r2', state: 'direct' }]);
+            return [events, kept, JSON.stringify(store.status.neighbors[0].faults ?? null)];
+        })()""")
+        self.assertEqual(told, [["r2: its clock is 20 ms off"], "not_seen its clock is 20 ms off", "null"])
+
+    def test_the_rates_of_links_are_those_of_the_counts(self):
+        page = self.open(self.viewer)
+        page.wait("crepes.store.neighbors.get('3')?.rates?.bearing", "a rate")
+        rates = page.value("""new Promise((done) => { const seen = []; const look = setInterval(() => {
+            seen.push(crepes.store.neighbors.get('3').rates.bearing); if (seen.length === 20) { clearInterval(look); done(seen); } }, 200); })""")
+        self.assertLess(max(rates) - min(rates), 0.1 * max(rates))
+
     def test_what_comes_and_goes_shifts_nothing(self):
         page = self.open(self.viewer, width=1440, height=900)
         page.wait("document.querySelectorAll('#sensors .tile').length === 3 && document.querySelectorAll('#links tbody tr').length === 4")
@@ -484,6 +511,17 @@ class Replay(PageTest):
         pixel = page.value("crepes.scene.robots[0].pixel")
         page.click(box[0] + pixel[0], box[1] + pixel[1])
         page.wait("document.getElementById('robot').selectedOptions[0].text === 'r2' && crepes.scene.robots[0]?.name === 'r1'", "the other's view")
+
+    def test_robots_may_be_chosen_faster_than_their_poses_come(self):
+        page = self.open(self.viewer)
+        last = "[crepes.store.range()[1], ...crepes.store.neighbors.values()].map((each) => each.rows?.at(-1) ?? each)"
+        slowly = page.value(last)
+        page.value("""(() => { const list = document.getElementById('robot');
+            for (const robot of [1, 0, 1, 0, 1, 0]) { list.value = robot; list.dispatchEvent(new Event('change', { bubbles: true })); } })()""")
+        page.wait("crepes.store.neighbors.size > 0", "the last choice")
+        page.value("new Promise((done) => setTimeout(done, 1000))")
+        self.assertEqual(page.value("[...crepes.store.neighbors.keys()]"), ["r2"])
+        self.assertEqual(page.value(last), slowly)
 
     def test_what_is_shown_can_be_saved(self):
         page = self.open(self.viewer)

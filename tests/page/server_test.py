@@ -178,6 +178,23 @@ class Server(unittest.TestCase):
             resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
         wait(lambda: status_of(get(self.viewer, "/robots")) == 200, "service after the flood")
 
+    def test_a_burst_that_asks_and_stays_is_forgotten(self):
+        burst = []
+        try:
+            for _ in range(200):
+                try:
+                    connection = socket.create_connection(("127.0.0.1", self.viewer.port), 2)
+                    connection.sendall(f"GET /robots HTTP/1.1\r\nHost: 127.0.0.1:{self.viewer.port}\r\n\r\n".encode())
+                    burst.append(connection)
+                except OSError:
+                    pass
+            time.sleep(6)  # longer than the server waits for a request
+            for _ in range(5):
+                self.assertEqual(status_of(get(self.viewer, "/robots")), 200)
+        finally:
+            for connection in burst:
+                connection.close()
+
     @unittest.skipIf("CREPES_SANITIZED" in os.environ, "a sanitizer keeps memory that was freed")
     def test_a_reader_that_does_not_read_costs_no_memory(self):
         def memory_kb():

@@ -154,7 +154,7 @@ std::string help_text(const ScreenFormat& format) {
   x y z          the neighbor in this robot's body: ahead, left, up, meters
   roll pitch yaw its attitude against this robot's, degrees
   +-m, +-deg     one sigma of position and attitude, in the worst direction
-  ms             age of the pose when it was published
+  ms             since the newest measurement in the pose
   Hz             poses per second
 )";
 }

@@ -58,7 +58,7 @@ std::map<std::uint8_t, std::string> CameraFeed::exchange(Timestamp now,
 void CameraFeed::connect(Timestamp now) {
   if (socket_.empty()) reason_ = kElsewhere;
   if (daemon_ || socket_.empty() || now < retry_at_) return;
-  auto socket = connect_unix(socket_);
+  auto socket = connect_unix(socket_, SOCK_NONBLOCK);  // a daemon that hangs accepts nobody
   if (!socket) {
     return hang_up(socket.error().message + ": is crepesd running, with recording.socket set?",
                    now);
@@ -77,10 +77,11 @@ void CameraFeed::hang_up(std::string reason, Timestamp now) {
 
 /// The camera whose turn it is, if no answer is pending.
 void CameraFeed::request_picture(Timestamp now, const std::vector<std::uint8_t>& wanted) {
-  if (asked_) {
-    if (now - asked_->at > kPatience) reason_ = "the camera delivers no pictures: see Health";
-    return;
+  if (asked_ && now - asked_->at > kPatience) {
+    reason_ = "the camera delivers no pictures: see Health";
+    asked_.reset();  // others have their turn
   }
+  if (asked_ && std::ranges::count(wanted, asked_->camera) > 0) return;
   const std::uint8_t next = *std::ranges::min_element(
       wanted, {}, [this](std::uint8_t camera) { return last_asked_[camera]; });
   if (now - last_asked_[next] < kPicturePeriod) return;

@@ -152,6 +152,10 @@ struct HttpServer::State {
   void close_overdue();
   /// A connection that asks for nothing makes room for one that may; false if all are in use.
   bool make_room();
+  /// The library may still ask about it in the same turn; it is not to be kept by a reply.
+  [[nodiscard]] bool is_closing(lws* connection) const {
+    return std::ranges::count(closing, connection) > 0;
+  }
   /// These return nonzero where the library must close the connection.
   int begin_reply(lws* connection, std::string path);
   int send_deferred(lws* connection);
@@ -188,7 +192,8 @@ bool HttpServer::State::make_room() {
 int HttpServer::State::begin_reply(lws* connection, std::string path) {
   HttpRequest request = request_of(connection, std::move(path));
   HttpReply reply = answer(request);
-  const bool announces_body = lws_hdr_total_length(connection, WSI_TOKEN_HTTP_CONTENT_LENGTH) > 0;
+  const bool announces_body =
+      request.is_post && lws_hdr_total_length(connection, WSI_TOKEN_HTTP_CONTENT_LENGTH) > 0;
   if (!announces_body) return send_reply(connection, std::move(reply), std::move(request));
   deferred[connection] = std::move(reply);
   return 0;
@@ -261,15 +266,16 @@ int HttpServer::State::on_event(lws* connection, lws_callback_reasons reason, vo
         --state->connections;
       return 0;
     case LWS_CALLBACK_HTTP:
+      if (state->is_closing(connection)) return -1;
       return state->begin_reply(connection, std::string(static_cast<const char*>(in), length));
     case LWS_CALLBACK_HTTP_BODY_COMPLETION:
-      return state->send_deferred(connection);
+      return state->is_closing(connection) ? -1 : state->send_deferred(connection);
     case LWS_CALLBACK_HTTP_BODY:
       return length == 0 ? 0 : -1;
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
       return -1;
     case LWS_CALLBACK_HTTP_WRITEABLE:
-      return state->continue_reply(connection);
+      return state->is_closing(connection) ? -1 : state->continue_reply(connection);
     default:
       return 0;
   }

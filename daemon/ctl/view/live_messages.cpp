@@ -65,7 +65,8 @@ void LiveMessages::add_status(const client::Status& status, const std::string& t
   if (!json.is_object()) return;
   const std::string kind = kind_of(json);
   const std::string event = stream_event("status", dump(json));
-  statuses_[kind] = event;
+  std::erase_if(statuses_, [&](const StatusEvent& each) { return each.kind == kind; });
+  statuses_.push_back({kind, event});
   new_statuses_ += event;
   robot_ = ViewedRobot{RobotId{status.self}, status.name};
   if (kind != "all") return;
@@ -93,7 +94,7 @@ std::string LiveMessages::drain(Timestamp now) {
 
 std::string LiveMessages::greeting(Timestamp now) const {
   std::string events = link_event(is_silent(now));
-  for (const auto& [kind, event] : statuses_) events += event;
+  for (const StatusEvent& each : statuses_) events += each.event;
   return events;
 }
 

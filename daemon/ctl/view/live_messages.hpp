@@ -40,6 +40,11 @@ class LiveMessages {
   [[nodiscard]] const std::vector<RobotId>& neighbors() const { return neighbors_; }
 
  private:
+  struct StatusEvent {
+    std::string kind;
+    std::string event;
+  };
+
   void add_status(const client::Status& status, const std::string& text);
   [[nodiscard]] bool is_silent(Timestamp now) const;
   [[nodiscard]] std::string link_event(bool is_silent) const;
@@ -47,8 +52,8 @@ class LiveMessages {
   DaemonAddress daemon_;
   std::map<RobotId, NeighborPose> new_poses_;
   PoseHistory poses_;
-  std::string new_statuses_;                     ///< as events
-  std::map<std::string, std::string> statuses_;  ///< the newest of each kind, as events
+  std::string new_statuses_;           ///< as events
+  std::vector<StatusEvent> statuses_;  ///< the newest of each kind, the oldest first
   std::optional<Timestamp> last_message_;
   std::optional<bool> reported_silent_;
   std::optional<ViewedRobot> robot_;

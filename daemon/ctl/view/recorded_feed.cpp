@@ -17,9 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kRowPeriod_s = 0.04;    // what an eye needs
-constexpr double kTruthPeriod_s = 0.05;  // interpolated between
-constexpr std::size_t kMaxRows = 20000;  // of a pair; a longer replay is thinned further
+constexpr double kRowPeriod_s = 0.04;     // what an eye needs
+constexpr double kTruthPeriod_s = 0.025;  // interpolated between
+constexpr std::size_t kMaxRows = 20000;   // of a pair; a longer replay is thinned further
 constexpr std::size_t kMaxRecords = 4000;
 
 /// What the observer saw of one neighbor.

@@ -16,7 +16,7 @@ std::string pose_row(double t_s, const NeighborPose& pose) {
     return {};
   const PoseSigma sigma = sigma_of(P);
   return fmt::format(
-      "[{:.3f},{},{:.4f},{:.4f},{:.4f},{:.5f},{:.5f},{:.5f},{:.5f},{:.3g},{:.3g},{:.3g},{:.3g},"
+      "[{:.4f},{},{:.4f},{:.4f},{:.4f},{:.5f},{:.5f},{:.5f},{:.5f},{:.3g},{:.3g},{:.3g},{:.3g},"
       "{:.3g},{:.3g},{:.4g},{:.4g},{:.3f},{}]",
       t_s, static_cast<int>(pose.mode), p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), P(0, 0),
       P(0, 1), P(0, 2), P(1, 1), P(1, 2), P(2, 2), sigma.position_m, sigma.rotation_rad, pose.age_s,
@@ -25,7 +25,7 @@ std::string pose_row(double t_s, const NeighborPose& pose) {
 
 std::string truth_row(double t_s, const Pose& T_B_N) {
   const auto& [p, q] = T_B_N;
-  return fmt::format("[{:.3f},{:.4f},{:.4f},{:.4f},{:.5f},{:.5f},{:.5f},{:.5f}]", t_s, p.x(), p.y(),
+  return fmt::format("[{:.4f},{:.4f},{:.4f},{:.4f},{:.5f},{:.5f},{:.5f},{:.5f}]", t_s, p.x(), p.y(),
                      p.z(), q.w(), q.x(), q.y(), q.z());
 }
 

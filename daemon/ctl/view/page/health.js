@@ -79,19 +79,23 @@ export class Rates {
   }
 
   /** Called after each STATUS; `seconds` is the wall's time. Adds rows to the store for charts and sparklines. */
-  addStatus(store, seconds) {
-    for (const neighbor of store.status.neighbors || []) {
+  addStatus(store, status, seconds) {
+    for (const neighbor of status.neighbors || []) {
+      if (!neighbor.measurements) continue;
       const key = String(neighbor.peer);
       const last = this.last.get(key);
-      if (last && seconds - last.seconds < 0.9) continue;
-      const now = { seconds, counts: structuredClone(neighbor.measurements || {}), gated: allOf(neighbor, "gated") };
-      const known = store.neighbor(key, neighbor.name);
-      const t = store.newest?.t;
-      if (last && t !== undefined) {
-        known.gated = [...(known.gated || []).slice(-400), [t, Math.max(0, (now.gated - last.gated) / (seconds - last.seconds))]];
-        known.rates = Object.fromEntries(Object.keys(now.counts).map((kind) => [kind, (verdicts(neighbor, kind, "fused") - (last.counts[kind]?.fused || 0)) / (seconds - last.seconds)]));
-      }
+      const passed = last ? status.uptime_s - last.uptime_s : Infinity;
+      if (passed >= 0 && passed < 0.9) continue;
+      const now = { uptime_s: status.uptime_s, counts: neighbor.measurements, gated: allOf(neighbor, "gated") };
       this.last.set(key, now);
+      // A daemon that starts anew counts from zero.
+      const more = (kind) => verdicts(neighbor, kind, "fused") - (last?.counts[kind]?.fused || 0);
+      const kinds = Object.keys(now.counts);
+      if (!last || passed < 0 || now.gated < last.gated || kinds.some((kind) => more(kind) < 0)) continue;
+      const known = store.neighbor(key, neighbor.name);
+      known.rates = Object.fromEntries(kinds.map((kind) => [kind, more(kind) / passed]));
+      const t = store.newest?.t;
+      if (t !== undefined) known.gated = [...(known.gated || []).slice(-400), [t, (now.gated - last.gated) / passed]];
     }
     for (const sensor of store.status.sensors || []) {
       const rows = (store.sensorRates ||= new Map()).get(sensor.name) || [];

@@ -69,7 +69,7 @@ function onEvent(name, data) {
   if (name === "link") store.setLink(data);
   if (name === "status") {
     store.addStatus(data);
-    rates.addStatus(store, wall());
+    rates.addStatus(store, data, wall());
   }
   if (name !== "frame") showLink();
 }
@@ -98,7 +98,13 @@ async function show(index) {
     });
     return;
   }
-  const replay = await load(`/replay?robot=${robot}`);
+  // Somebody may choose another robot before the answer comes.
+  const mine = store;
+  const replay = await load(`/replay?robot=${index}`).catch((error) => {
+    mine.setLink({ ok: false, reason: error.message });
+  });
+  if (store !== mine) return;
+  if (!replay) return showLink();
   store.addReplay(replay);
   charts.build();
   byId("cameras-label").hidden = store.cameras.length === 0;
@@ -308,7 +314,7 @@ const KEYS = {
 
 function listenToPage() {
   addEventListener("keydown", (event) => {
-    const isTyping = event.target.matches("select, input, button, dialog *") && (event.key === " " || event.key.length > 1);
+    const isTyping = event.target.matches("select") || (event.target.matches("input, button, dialog *") && (event.key === " " || event.key.length > 1));
     if (isTyping || event.ctrlKey || event.metaKey || event.altKey || byId("help-dialog").open || !KEYS[event.key]) return;
     event.preventDefault();
     KEYS[event.key]();

@@ -105,12 +105,14 @@ export class Scene {
     };
   }
 
+  /** Where the neighbor was at the instant of the pose that is drawn. */
   ghostOf(neighbor, t) {
-    const row = this.store.truthAt(neighbor, t);
-    return row && {
+    const { row } = this.store.poseAt(neighbor, t);
+    const truth = poseBetween(neighbor.truth, row ? row[T] : t, 1);
+    return truth && {
       key: neighbor.key,
-      position: times(this.level, row.slice(1, 4)),
-      rotation: product(this.level, rotationOf(row.slice(4, 8))),
+      position: times(this.level, truth.p),
+      rotation: product(this.level, rotationOf(truth.q)),
     };
   }
 

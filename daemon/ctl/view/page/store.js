@@ -154,7 +154,11 @@ export class Store {
     Object.assign(this.status, rest);
     const merge = (name, entries) => {
       const known = new Map((this.status[name] || []).map((each) => [each.peer, each]));
-      for (const each of entries) known.set(each.peer, Object.assign(known.get(each.peer) || {}, { faults: undefined, reason: undefined }, each));
+      for (const each of entries) {
+        // Who is only named keeps what is known; of a STATUS that was cut, so do faults.
+        const gone = { ...(each.state && { reason: undefined }), ...(each.state && !status.truncated && { faults: undefined }) };
+        known.set(each.peer, Object.assign(known.get(each.peer) || {}, gone, each));
+      }
       this.status[name] = [...known.values()].sort((a, b) => a.peer - b.peer);
     };
     merge("neighbors", neighbors.concat(more.map((peer) => ({ peer }))));
@@ -256,11 +260,6 @@ export class Store {
   poseAt(neighbor, t) {
     const last = neighbor.rows[indexAt(neighbor.rows, t)] || null;
     return { row: last && t - last[T] <= STALE_SECONDS ? last : null, last };
-  }
-
-  truthAt(neighbor, t) {
-    const row = neighbor.truth[indexAt(neighbor.truth, t)];
-    return row && t - row[T] <= STALE_SECONDS ? row : null;
   }
 
   /** The vector against gravity in the body at `t`; null where it is not known. */
