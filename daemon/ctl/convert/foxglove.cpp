@@ -158,8 +158,9 @@ std::string annotations_json(std::int64_t time_ns, const std::vector<Spot>& spot
   Json circles = Json::array();
   for (const Spot& spot : spots) {
     const double diameter = 2.0 * std::sqrt(spot.area_px2 / std::numbers::pi) + 4.0;
+    // Foxglove's origin is the corner of the first pixel, ours its center.
     circles.push_back({{"timestamp", time_json(time_ns)},
-                       {"position", {{"x", spot.u_px}, {"y", spot.v_px}}},
+                       {"position", {{"x", spot.u_px + 0.5}, {"y", spot.v_px + 0.5}}},
                        {"diameter", diameter},
                        {"thickness", 1.0},
                        {"fill_color", nothing},

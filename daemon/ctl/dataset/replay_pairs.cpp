@@ -28,8 +28,10 @@ std::vector<PairName> pairs_in(const fs::path& results) {
   for (const auto& dir : fs::directory_iterator(results, status)) {
     if (!dir.is_directory(status)) continue;
     for (const auto& file : fs::directory_iterator(dir.path(), status)) {
-      const fs::path stem = file.path().stem();
-      if (file.path().extension() == ".csv" && !stem.has_extension())
+      const fs::path stem = file.path().stem();  // a robot's name may have dots
+      const bool is_record =
+          stem.extension() == ".innovations" || stem.extension() == ".calibration";
+      if (file.path().extension() == ".csv" && !is_record)
         pairs.push_back({dir.path().filename().string(), stem.string()});
     }
   }

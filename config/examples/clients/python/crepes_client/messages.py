@@ -140,7 +140,7 @@ def parse(datagram: bytes) -> Message | Cookie | None:
         content = json.loads(datagram)
         read = _READERS.get(content["class"])
         return read(content) if read else None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         return None
 
 
@@ -174,7 +174,7 @@ def _pose(content: dict[str, Any]) -> Pose:
 
 def _sensor(content: dict[str, Any]) -> Sensor:
     return Sensor(str(content["name"]), bool(content["ok"]), content.get("rate_hz"), content.get("message"),
-                  content.get("faults", {}), content.get("counts", {}))
+                  content.get("faults", {}), content.get("counts", {}), bool(content.get("calibrated", True)))
 
 
 def _neighbor(content: dict[str, Any]) -> Neighbor:
