@@ -28,6 +28,7 @@ class BoundedFifo {
                                  [t](const Reading& reading) { return reading.stamp >= t; }));
   }
 
+  /// Drops values wherever they are.
   template <class Predicate>
   void erase_if(Predicate is_unwanted) {
     std::erase_if(readings_, is_unwanted);

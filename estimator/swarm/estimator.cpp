@@ -123,6 +123,7 @@ struct Estimator::State {
   [[nodiscard]] const ImuHistory* imu_of(RobotId robot) const;
   [[nodiscard]] GraphProblem graph_problem(const std::vector<NeighborEstimate>& own) const;
   [[nodiscard]] std::optional<TeamInterval> team_interval(Timestamp now);
+  [[nodiscard]] Bearing with_stamp_error(Bearing bearing) const;
   [[nodiscard]] ExpectedBoard expected_board(const NeighborPose& pose) const;
 
   RobotId id;
@@ -226,14 +227,26 @@ Outputs Estimator::State::handle(const SpotFrame& frame) {
   std::erase_if(outputs.bearings,
                 [&](const Bearing& bearing) { return !neighbors.contains(bearing.neighbor); });
   // What was named because a pose expects it there says nothing about the pose until it is read.
-  for (const Bearing& bearing : tracker.confirmed())
-    if (neighbors.contains(bearing.neighbor)) neighbors.at(bearing.neighbor).add(bearing);
-  for (const Bearing& bearing : outputs.bearings) {
+  for (const Bearing& bearing : tracker.confirmed()) {
+    if (neighbors.contains(bearing.neighbor))
+      neighbors.at(bearing.neighbor).add(with_stamp_error(bearing));
+  }
+  for (Bearing& bearing : outputs.bearings) {
+    bearing = with_stamp_error(bearing);
     if (bearing.how != Naming::kRead) continue;
     neighbors.at(bearing.neighbor).add(bearing);
     composer.add(bearing);
   }
   return outputs;
+}
+
+/// A stamp that is off by dt turns the direction by w dt.
+Bearing Estimator::State::with_stamp_error(Bearing bearing) const {
+  constexpr Duration kNear = std::chrono::milliseconds{10};
+  if (self.imu.empty()) return bearing;
+  const double w = self.imu.mean(bearing.stamp - kNear, bearing.stamp).gyro_radps.norm();
+  bearing.sigma_rad = std::hypot(bearing.sigma_rad, 1e-3 * vision.stamp_sigma_ms * w);
+  return bearing;
 }
 
 ExpectedBoard Estimator::State::expected_board(const NeighborPose& pose) const {

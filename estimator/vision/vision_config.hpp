@@ -21,6 +21,7 @@ struct VisionConfig {
   double max_area_px2 = 20000.0;
   int max_spots = 256;
   double bearing_sigma_px = 0.2;
+  double stamp_sigma_ms = 0.5;
   double gate_px = 8.0;
   double track_timeout_ms = 150.0;
   double max_wrong_id = 5e-7;
@@ -42,6 +43,9 @@ struct VisionConfig {
             "maximum number of spots per frame; the brightest are kept");
     v.field("bearing_sigma_px", bearing_sigma_px, Bounds{0.01, 10},
             "least sigma of a spot's center; one that jitters has more");
+    v.field("stamp_sigma_ms", stamp_sigma_ms, Bounds{0, 20},
+            "stamps of pictures and of inertial samples disagree by so much, one sigma; it adds "
+            "to directions as the robot turns");
     v.field("gate_px", gate_px, Bounds{1, 100},
             "a spot farther from a track's prediction does not belong to the track");
     v.field("track_timeout_ms", track_timeout_ms, Bounds{10, 5000},

@@ -120,6 +120,7 @@ class SealedSwarm : public LiveDaemon {
     const Watched after = watch(seconds{2});
     std::printf("%s: %zu poses, at most %.3f m off; then %zu, %.3f m; without faults %.3f m\n",
                 fault, during.poses, during.worst_m, after.poses, after.worst_m, calm_.worst_m);
+    EXPECT_GT(during.poses, 0U) << fault;
     EXPECT_LT(during.worst_m, calm_.worst_m + 0.1) << fault;
     EXPECT_LT(after.worst_m, calm_.worst_m + 0.1) << fault;
     EXPECT_TRUE(after.is_direct) << fault;

@@ -21,19 +21,19 @@ std::string rows_of(const Measurements& measurements) {
 std::string truth_text(const Swarm& swarm, RobotId robot) {
   constexpr double kStep = 0.01;  // s
   std::string text = "# t, p_W (3), q_WB (4), v_W (3)\n";
-  std::optional<Pose> last;
   for (int i = 0;; ++i) {
     const auto T_W_B = swarm.truth.pose(robot, i * kStep);
     if (!T_W_B) return text;
     const auto& [p, q] = *T_W_B;
-    const Eigen::Vector3d v =
-        last ? Eigen::Vector3d((p - last->p) / kStep) : Eigen::Vector3d::Zero();
+    const auto before = swarm.truth.pose(robot, (i - 1) * kStep);
+    const auto after = swarm.truth.pose(robot, (i + 1) * kStep);
+    const double apart_s = kStep * ((before ? 1 : 0) + (after ? 1 : 0));
+    const Eigen::Vector3d v = ((after ? after->p : p) - (before ? before->p : p)) / apart_s;
     append_number(text, i * kStep);
     for (const double value :
          {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), v.x(), v.y(), v.z()})
       append_number(text += ',', value);
     text += '\n';
-    last = T_W_B;
   }
 }
 

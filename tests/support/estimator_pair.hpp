@@ -53,6 +53,7 @@ class EstimatorPair {
     NeighborPose pose;
     Vector6d error = Vector6d::Zero();
     double nees = 0.0;
+    double speed_error_mps = 0.0;
   };
 
   using Alter = std::function<void(EstimatorSettings&)>;
@@ -299,9 +300,10 @@ class EstimatorPair {
     if (outputs.report)
       in_flight_to_peer_.push_back({now_, own_link_.compose(*outputs.report, own_time(now_))});
     for (const NeighborPose& pose : outputs.poses) {
-      const Pose truth = pair_.truth(pose.stamp - own_clock_).motion.T_B_N;
-      const Vector6d error = pose_difference(pose.T_B_N.pose, truth);
-      found_.push_back({now_, pose, error, error.dot(pose.T_B_N.covariance.llt().solve(error))});
+      const auto truth = pair_.truth(pose.stamp - own_clock_).motion;
+      const Vector6d error = pose_difference(pose.T_B_N.pose, truth.T_B_N);
+      found_.push_back({now_, pose, error, error.dot(pose.T_B_N.covariance.llt().solve(error)),
+                        (pose.v_B_N - truth.v_B_N).norm()});
     }
   }
 

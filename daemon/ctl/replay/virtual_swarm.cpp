@@ -89,15 +89,19 @@ void VirtualSwarm::schedule_recording(std::size_t index) {
     schedule_at(range.stamp, index, Event(range), delays.uwb_s);
   for (std::size_t k = 0; k < recording.cameras.size(); ++k) {
     CameraRecording& camera = recording.cameras[k];
+    // A stamp may lie before the exposure, by the shift between both clocks.
+    const double shift_s = k < recording.config.cameras.size()
+                               ? recording.config.cameras[k].calibration.timeshift_cam_imu
+                               : 0.0;
+    const double delay_s = delays.camera_s + std::max(0.0, shift_s);
     for (SpotFrame& frame : camera.spots) {
       const Timestamp stamp = frame.stamp;
-      schedule_at(stamp, index, Event(std::move(frame)), delays.camera_s);
+      schedule_at(stamp, index, Event(std::move(frame)), delay_s);
     }
     // If a camera has both, the spots are the smaller input.
     if (!std::exchange(camera.spots, {}).empty()) continue;
     for (const RecordedImage& image : camera.images) {
-      schedule_at(image.stamp, index, PendingImage{static_cast<std::uint8_t>(k), image},
-                  delays.camera_s);
+      schedule_at(image.stamp, index, PendingImage{static_cast<std::uint8_t>(k), image}, delay_s);
     }
   }
   if (recording.imu.empty()) return;

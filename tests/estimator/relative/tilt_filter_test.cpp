@@ -60,6 +60,19 @@ TEST(TiltFilter, CarriesTheAttitudeWhereAMultirotorsAccelerometerAlwaysShowsItsO
   EXPECT_LT(squared, squared_by_force / 4.0);
 }
 
+// It may lean by 30 degrees where its accelerometer shows its own axis.
+TEST(TiltFilter, KnowsLittleOfARobotThatStartsInAFastTurn) {
+  const auto sigma_of = [](double rate_radps) {
+    TiltFilter filter{ImuNoise{}};
+    for (int i = 0; i < 30; ++i)
+      filter.add({Timestamp{i * 10ms}, {0.0, 0.0, rate_radps}, {0.0, 0.0, kGravityMps2}});
+    return filter.tilt()->sigma_rad;
+  };
+  EXPECT_LT(sigma_of(0.0), radians(8.0));
+  EXPECT_GT(sigma_of(4.0), radians(20.0));
+  EXPECT_LT(sigma_of(100.0 / 2.0), radians(30.0));
+}
+
 TEST(TiltFilter, SaysNothingBeforeTheFirstSamplesAreAveraged) {
   TiltFilter filter{ImuNoise{}};
   EXPECT_FALSE(filter.tilt());

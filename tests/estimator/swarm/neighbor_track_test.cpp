@@ -73,6 +73,14 @@ TEST_F(RestingTrack, IsContradictedByBearingsInARowAfterAGapUntilOneFits) {
   EXPECT_FALSE(track_.is_contradicted());  // a mirror image in our camera
 }
 
+TEST_F(RestingTrack, IsContradictedByBearingsThatStopToFitWithoutAGap) {
+  ASSERT_EQ(fuse_at(0, bearing({})).verdict, Verdict::kFused);
+  for (int ms = 10; ms <= 400; ms += 10) {
+    ASSERT_EQ(fuse_at(ms, bearing({}, 1.0)).verdict, Verdict::kGated);
+    EXPECT_EQ(track_.is_contradicted(), ms >= 250) << ms;
+  }
+}
+
 TEST_F(RestingTrack, IsContradictedByRangesInARowUntilOneFits) {
   ASSERT_EQ(fuse_at(0, range({}, kDistance)).verdict, Verdict::kFused);
   for (const int ms : {10, 20}) ASSERT_EQ(fuse_at(ms, range({}, 7.0)).verdict, Verdict::kGated);
