@@ -35,9 +35,10 @@ std::vector<fs::path> fragments_of(const fs::path& path, ConfigFaults& faults) {
   std::error_code error;
   if (!fs::exists(folder, error)) return files;
   fs::directory_iterator entry(folder, error);
-  for (; !error && entry != fs::directory_iterator(); entry.increment(error))
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
     if (entry->path().extension() == ".yaml" && !entry->path().filename().string().starts_with('.'))
       files.push_back(entry->path());  // a hidden one is an editor's
+  }
   if (error) faults.push_back({folder.string(), 0, "", error.message()});
   std::ranges::sort(files);
   return files;
@@ -175,9 +176,10 @@ ConfigNode calibrated_camera(const ConfigNode& reference, const std::string& pat
 void add_camera_calibration(ConfigNode& camera, const std::string& path, ConfigFaults& faults) {
   const auto reference = extract_text(&camera, path, "calibration", faults);
   const auto wanted = extract_text(&camera, path, "calibration_camera", faults);
-  if (!reference && wanted)
+  if (!reference && wanted) {
     add_fault(wanted->place, path + ".calibration_camera", "has no effect without calibration",
               faults);
+  }
   if (!reference) return;
   const ConfigNode* const named = camera.find("name");
   const std::string name = wanted ? wanted->text : named != nullptr ? named->text : "";

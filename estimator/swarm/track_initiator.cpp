@@ -105,9 +105,10 @@ void TrackInitiator::initialize(std::span<const Measurement> group, const ImuHis
                                 OutcomeLog& outcomes) {
   const Timestamp stamp = group.front().stamp;
   if (!hypotheses.has_budget_for(group.size(), stamp)) {
-    for (const Measurement& measurement : group)
+    for (const Measurement& measurement : group) {
       outcomes.add(stamp, measurement.kind, {.verdict = Verdict::kSkipped},
                    reading_of(measurement));
+    }
     return;
   }
   hypotheses.advance_to(stamp, imu_B, imu_N);

@@ -168,9 +168,10 @@ LatePathLimits late_path_limits(const SwarmDataset& swarm) {
 std::string file_text(const RangeCalibration& found) {
   std::string text = "# Written by crepesctl calibrate range: measured = distance + bias\n";
   text += "ranges:\n  pairs:\n";
-  for (const PairBias& pair : found.pairs)
+  for (const PairBias& pair : found.pairs) {
     text += fmt::format("  - {{ids: [{}, {}], bias_m: {}}}\n", pair.pair.a.value, pair.pair.b.value,
                         to_yaml(pair.bias_m));
+  }
   text += found.modules.empty() ? "  modules: []\n" : "  modules:\n";
   for (const ModuleBias& module : found.modules)
     text += fmt::format("  - {{id: {}, bias_m: {}}}\n", module.id.value, to_yaml(module.bias_m));
@@ -190,9 +191,10 @@ double remaining_bias(const RangeCalibration& found) {
 std::vector<ModuleBias> delays_of(const RangeCalibration& found) {
   if (!found.modules.empty()) return found.modules;
   std::map<RobotId, Eigen::Index> columns;
-  for (const PairBias& pair : found.pairs)
+  for (const PairBias& pair : found.pairs) {
     for (const RobotId id : {pair.pair.a, pair.pair.b})
       columns.emplace(id, static_cast<Eigen::Index>(columns.size()));
+  }
   const auto rows = static_cast<Eigen::Index>(found.pairs.size());
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(rows, static_cast<Eigen::Index>(columns.size()));
   Eigen::VectorXd biases_m(rows);
@@ -203,6 +205,7 @@ std::vector<ModuleBias> delays_of(const RangeCalibration& found) {
   }
   const Eigen::VectorXd delays_m = sums.completeOrthogonalDecomposition().solve(biases_m);
   std::vector<ModuleBias> delays;
+  delays.reserve(columns.size());
   for (const auto& [id, column] : columns) delays.push_back({.id = id, .bias_m = delays_m[column]});
   return delays;
 }
@@ -259,21 +262,24 @@ Json json_of(const RangeCalibration& found) {
   Json json = report_head(found.refusals, found.warnings);
   if (!found.refusals.empty()) return json;
   json["pairs"] = Json::array();
-  for (const PairBias& pair : found.pairs)
+  for (const PairBias& pair : found.pairs) {
     json["pairs"].push_back({{"ids", {pair.pair.a.value, pair.pair.b.value}},
                              {"bias_m", pair.bias_m},
                              {"sigma_m", pair.sigma_m}});
+  }
   json["modules"] = Json::array();
-  for (const ModuleBias& module : found.modules)
+  for (const ModuleBias& module : found.modules) {
     json["modules"].push_back(
         {{"id", module.id.value}, {"bias_m", module.bias_m}, {"sigma_m", module.sigma_m}});
+  }
   json["patterns"] = Json::array();
-  for (const ModulePattern& module : found.patterns)
+  for (const ModulePattern& module : found.patterns) {
     json["patterns"].push_back({{"id", module.id.value},
                                 {"ids", {module.pair.a.value, module.pair.b.value}},
                                 {"rms_m", module.pattern.rms_m},
                                 {"mean_sigma_m", module.pattern.mean_sigma_m},
                                 {"deviation_m", module.pattern.deviation_m}});
+  }
   json["noise_m"] = found.noise_m;
   json["direction_sigma_m"] = found.direction_sigma_m;
   if (found.late_path_db) json["late_path_db"] = *found.late_path_db;
@@ -301,18 +307,21 @@ std::string text_of(const RangeCalibration& found, bool knows_all,
                     const std::filesystem::path& out) {
   std::vector<std::vector<std::string>> segments{
       {"pair", "segment", "bias m", "noise m", "ranges", "late", "outliers"}};
-  for (const SegmentBias& segment : found.segments)
+  for (const SegmentBias& segment : found.segments) {
     segments.push_back({fmt::format("{},{}", segment.pair.a.value, segment.pair.b.value),
                         std::to_string(segment.segment + 1), fixed(segment.bias_m, 4),
                         fixed(segment.scatter_m, 3), std::to_string(segment.used),
                         std::to_string(segment.late), std::to_string(segment.outliers)});
+  }
   std::vector<std::vector<std::string>> results{{"", "bias m", "+-"}};
-  for (const PairBias& pair : found.pairs)
+  for (const PairBias& pair : found.pairs) {
     results.push_back({fmt::format("pair {},{}", pair.pair.a.value, pair.pair.b.value),
                        fixed(pair.bias_m, 4), fixed(pair.sigma_m, 4)});
-  for (const ModuleBias& module : found.modules)
+  }
+  for (const ModuleBias& module : found.modules) {
     results.push_back({fmt::format("module {}", module.id.value), fixed(module.bias_m, 4),
                        fixed(module.sigma_m, 4)});
+  }
   return text_table(segments) + "\n" + text_table(results) + patterns_text(found) + "\n" +
          members_text(found, knows_all) + warning_lines(found.warnings) +
          fmt::format("written: {}\nwritten: {}, for crepesd.d/ of every robot\n", out.string(),
@@ -338,9 +347,10 @@ Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options) 
         "bias_drift_m "
         "stay as configured; measure all three distances of every robot with two others");
   }
-  if (found.refusals.empty())
+  if (found.refusals.empty()) {
     if (const auto written = write_files(found, knows_all, options.out); !written)
       return tl::unexpected(written.error());
+  }
   CalibrationReport report{.text = {}, .reasons = found.refusals, .faults = swarm->faults};
   if (options.json) {
     report.text = json_line(json_of(found));

@@ -256,9 +256,10 @@ std::string swarm_json(const SwarmBatchResult& found, const SwarmDataset& datase
   json["range_sigma_m"] = found.range_sigma_m;
   json["range_outliers"] = found.range_outliers;
   json["robots"] = Json::array();
-  for (std::size_t r = 0; r < found.robots.size(); ++r)
+  for (std::size_t r = 0; r < found.robots.size(); ++r) {
     json["robots"].push_back(
         robot_json(found.robots[r], dataset.robots[r].robot, dataset.robots[r].config.imu.device));
+  }
   json["pairs"] = Json::array();
   for (std::size_t i = 0; i < found.robots.size(); ++i) {
     for (std::size_t j = i + 1; j < found.robots.size(); ++j) {

@@ -177,8 +177,9 @@ Result<void> VirtualSwarm::thaw(RobotId id, double true_s) {
 }
 
 void VirtualSwarm::send(double arrives_s, RobotId to, VirtualDatagram datagram) {
-  for (std::size_t i = 0; i < robots_.size(); ++i)
-    if (robots_[i].id() == to) schedule(arrives_s, i, std::move(datagram));
+  for (std::size_t i = 0; i < robots_.size(); ++i) {
+    if (robots_[i].id() == to) return schedule(arrives_s, i, std::move(datagram));
+  }
 }
 
 Result<void> VirtualSwarm::deliver_next() {
@@ -314,14 +315,16 @@ void VirtualSwarm::broadcast(const Arrival& arrival, const std::vector<std::uint
   for (std::size_t i = 0; i < robots_.size(); ++i) {
     if (i == arrival.robot) continue;
     std::vector<Delivery> deliveries;
-    if (const auto delay_s = delays_s.find(robots_[i].id()); delay_s != delays_s.end())
+    if (const auto delay_s = delays_s.find(robots_[i].id()); delay_s != delays_s.end()) {
       deliveries.push_back(
           {arrival.true_s + delay_s->second, datagram, replay_address(robot.id())});
+    }
     if (sinks_.on_delivery)
       sinks_.on_delivery(robot.id(), robots_[i].id(), arrival.true_s, deliveries);
-    for (Delivery& delivery : deliveries)
+    for (Delivery& delivery : deliveries) {
       schedule(std::max(arrival.true_s, delivery.arrives_s), i,
                VirtualDatagram{std::move(delivery.bytes), delivery.from});
+    }
   }
 }
 

@@ -57,9 +57,10 @@ std::string never_up(const std::string& faces) {
 
 double explained_residual(const ImuCalibrationSettings& settings, const ImuCalibration& found) {
   double sum = 0.0;
-  for (const Rest& rest : found.search.rests)
+  for (const Rest& rest : found.search.rests) {
     sum += std::pow(found.accel_noise_density, 2) / rest.duration_s() +
            std::pow(settings.noise.accelerometer_random_walk, 2) * found.search.rests.back().end_s;
+  }
   return std::sqrt(sum / static_cast<double>(found.search.rests.size()));
 }
 
@@ -89,11 +90,12 @@ std::vector<std::string> refusals_before_fit(const ImuCalibration& found) {
     return reasons;
   }
   const auto pauses = static_cast<double>(search.shaky) + static_cast<double>(search.rests.size());
-  if (static_cast<double>(search.shaky) > kMostShaky * pauses)
+  if (static_cast<double>(search.shaky) > kMostShaky * pauses) {
     reasons.push_back(fmt::format(
         "shaky: in {} of {} pauses the robot was held, not laid down ({} deg/s of trembling); rest "
         "it against something each time",
         search.shaky, number_text(pauses, 0), number_text(search.shake_radps * kDegPerRad, 2)));
+  }
   if (found.attitudes < kLeastAttitudes) {
     reasons.push_back(fmt::format(
         "only {} attitudes at rest; at least {} are needed, 40 are good: {} are missing{}",
@@ -107,36 +109,42 @@ void judge_fit(const ImuCalibrationSettings& settings, ImuCalibration& found) {
   const std::string faces = faces_missing(found.search.rests);
   const double bias_sigma = found.accelerometer.bias_sigma.maxCoeff();
   if (found.refusals.empty() &&
-      (bias_sigma > kMostAccelBias || found.accelerometer.M_sigma.maxCoeff() > kMostAccelM))
+      (bias_sigma > kMostAccelBias || found.accelerometer.M_sigma.maxCoeff() > kMostAccelM)) {
     found.refusals.push_back(fmt::format(
         "the attitudes do not determine the accelerometer (bias to {} m/s^2, one sigma){}",
         number_text(bias_sigma, 4), never_up(faces)));
+  }
   const Eigen::Vector3d scale = found.accelerometer.scale();
-  if (scale.minCoeff() < 1.0 / kMostScale || scale.maxCoeff() > kMostScale)
+  if (scale.minCoeff() < 1.0 / kMostScale || scale.maxCoeff() > kMostScale) {
     found.refusals.push_back(fmt::format(
         "the accelerometer would have to be scaled by {}: is its unit m/s^2, and gravity {}?",
         number_text(scale.mean(), 2), number_text(settings.gravity_mps2, 4)));
+  }
   const double explained = explained_residual(settings, found);
-  if (found.accelerometer.residual_rms > kResidualRatio * explained)
+  if (found.accelerometer.residual_rms > kResidualRatio * explained) {
     found.refusals.push_back(fmt::format(
         "gravity at the rests differs by {} m/s^2 RMS from {}, where noise explains {}: the robot "
         "was not at rest, or the sensor is not linear",
         number_text(found.accelerometer.residual_rms, 4), number_text(settings.gravity_mps2, 4),
         number_text(explained, 4)));
-  if (found.refusals.empty() && found.gyroscope.M_sigma.maxCoeff() > kMostGyroM)
+  }
+  if (found.refusals.empty() && found.gyroscope.M_sigma.maxCoeff() > kMostGyroM) {
     found.refusals.push_back(fmt::format(
         "the turns do not determine the gyroscope's scale and axes (to {} %, one sigma): turn by "
         "more than 90 degrees about every axis",
         number_text(100.0 * found.gyroscope.M_sigma.maxCoeff(), 2)));
-  if (found.attitudes < kGoodAttitudes)
+  }
+  if (found.attitudes < kGoodAttitudes) {
     found.warnings.push_back(
         fmt::format("{} attitudes; {} to 50 make it better", found.attitudes, kGoodAttitudes));
-  if (found.search.shaky > 0 && found.refusals.empty())
+  }
+  if (found.search.shaky > 0 && found.refusals.empty()) {
     found.warnings.push_back(
         fmt::format("{} pauses were too shaky and are not used", found.search.shaky));
+  }
   if (!faces.empty()) found.warnings.push_back(fmt::format("never up: {}", faces));
   if (found.search.rests.front().duration_s() < kFirstRest_s)
-    found.warnings.push_back("the recording should begin with half a minute at rest");
+    found.warnings.emplace_back("the recording should begin with half a minute at rest");
 }
 
 }  // namespace crepes

@@ -80,11 +80,12 @@ void check_rest(const SegmentBias& segment, const std::vector<double>& errors,
   const RobustMean second = robust_mean({half, errors.end()});
   const double change = std::abs(first.value - second.value);
   const double sigma = std::hypot(first.sigma(), second.sigma());
-  if (change > kMoved_m && change > kMovedSigmas * sigma)
+  if (change > kMoved_m && change > kMovedSigmas * sigma) {
     found.refusals.push_back(fmt::format(
         "{}: the distance changed by {} m within the segment: the robots were not at rest; correct "
         "from_s and to_s",
         place_of(segment), number_text(change, 2)));
+  }
 }
 
 /// The mean over all directions of a module that turned.
@@ -121,10 +122,11 @@ void add_segment(const TapedRanges& taped, const LatePathLimits& late_path_db,
   if (!taped.headings_rad.empty()) return add_turn(taped, direct, found);
   SegmentBias segment = bias_of(taped, errors);
   check_rest(segment, errors, found);
-  if (std::abs(segment.bias_m) > kMost_m)
+  if (std::abs(segment.bias_m) > kMost_m) {
     found.refusals.push_back(
         fmt::format("{}: measured and taped distance differ by {} m: a mistake on the tape?",
                     place_of(segment), number_text(segment.bias_m, 2)));
+  }
   found.segments.push_back(segment);
 }
 
@@ -180,7 +182,7 @@ double direction_sigma(const Design& design) {
   const double prior = kDirectionSigma_m * kDirectionSigma_m;
   const LinearFit fit = least_squares(design.A, design.y, design.variance.array() + prior);
   if (fit.rank < design.A.cols()) return kDirectionSigma_m;
-  const double freedom = static_cast<double>(design.A.rows() - design.A.cols());
+  const auto freedom = static_cast<double>(design.A.rows() - design.A.cols());
   const double excess =
       std::max(0.0, fit.residuals.squaredNorm() - freedom * design.variance.mean());
   return std::sqrt((excess + kDirectionWeight * prior) / (freedom + kDirectionWeight));
@@ -231,11 +233,12 @@ void check_rests(RangeCalibration& found) {
 void check_pairs(const std::vector<PairBias>& alone, RangeCalibration& found) {
   for (std::size_t i = 0; i < alone.size(); ++i) {
     const double difference = alone[i].bias_m - found.pairs[i].bias_m;
-    if (std::abs(difference) > kDisagree * alone[i].sigma_m)
+    if (std::abs(difference) > kDisagree * alone[i].sigma_m) {
       found.warnings.push_back(fmt::format(
           "ids {}: {} m from the sum of its modules: a mistake on the tape, or something between "
           "the two",
           name_of(alone[i].pair), number_text(difference, 3)));
+    }
   }
 }
 
@@ -246,9 +249,10 @@ void fit_modules(RangeCalibration& found) {
     keys.insert(keys.end(), {segment.pair.a, segment.pair.b});
   const auto columns = columns_of(keys);
   Design design = design_of(found.segments, columns.size());
-  for (std::size_t i = 0; i < found.segments.size(); ++i)
+  for (std::size_t i = 0; i < found.segments.size(); ++i) {
     for (const RobotId id : {found.segments[i].pair.a, found.segments[i].pair.b})
       design.A(static_cast<Eigen::Index>(i), columns.at(id)) = 1.0;
+  }
   const LinearFit fit = least_squares(
       design.A, design.y, design.variance.array() + std::pow(found.direction_sigma_m, 2));
   if (fit.rank < design.A.cols()) {
@@ -274,8 +278,8 @@ void fit_modules(RangeCalibration& found) {
 /// are outliers.
 void describe_noise(std::span<const TapedRanges> taped, RangeCalibration& found) {
   constexpr double kOutlierSigmas = 5.0;
-  constexpr int kLeast_db = 3;
-  constexpr int kMost_db = 20;
+  constexpr int kLeastDb = 3;
+  constexpr int kMostDb = 20;
   double sum = 0.0;
   double count = 0.0;
   for (const SegmentBias& segment : found.segments) {
@@ -283,7 +287,7 @@ void describe_noise(std::span<const TapedRanges> taped, RangeCalibration& found)
     count += static_cast<double>(segment.used);
   }
   found.noise_m = std::sqrt(sum / count);
-  for (int db = kLeast_db; db <= kMost_db && !found.late_path_db; ++db) {
+  for (int db = kLeastDb; db <= kMostDb && !found.late_path_db; ++db) {
     std::size_t bad = 0;
     std::size_t all = 0;
     for (const TapedRanges& part : taped) {
@@ -315,10 +319,11 @@ RangeCalibration calibrate_ranges(std::span<const TapedRanges> taped,
   fit_pairs(found);
   fit_modules(found);
   describe_noise(taped, found);
-  if (found.segments.size() == found.pairs.size())
+  if (found.segments.size() == found.pairs.size()) {
     found.warnings.emplace_back(
         "each pair rested once: its bias holds for those directions alone, to 1.5 cm; repeat at "
         "other distances and turned");
+  }
   return found;
 }
 

@@ -17,7 +17,7 @@ namespace crepes {
 struct RobotPair {
   RobotId a{};
   RobotId b{};
-  auto operator<=>(const RobotPair&) const = default;
+  auto operator<=>(const RobotPair&) const = default;  // NOLINT(modernize-use-nullptr)
 };
 
 /// The ranges of a pair during one rest, whoever measured them, in time order.
