@@ -68,7 +68,8 @@ class NeighborTrack {
   /// because the filter follows a mirror image. Bearings of the other direction may still fit.
   [[nodiscard]] bool is_diverged() const;
   /// True if the latest readings contradict the pose: some ranges in a row or all of a second were
-  /// gated, or some bearings, after a gap or for kDivergenceTime, while none of either side was used.
+  /// gated, or some bearings, after a gap or for kDivergenceTime, while none of either side was
+  /// used.
   [[nodiscard]] bool is_contradicted() const;
 
  private:
