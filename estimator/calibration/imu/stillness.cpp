@@ -39,6 +39,7 @@ std::optional<double> first_motion_s(std::span<const double> readings, double pe
   }
   std::vector<double> sorted = off;
   const double sigma = kSigmaOfMedian * upper_median(sorted);
+  if (sigma == 0.0) return std::nullopt;  // a sensor too coarse to show its noise
   const auto moved =
       std::ranges::find_if(off, [sigma](double each) { return each > kSigmas * sigma; });
   if (moved == off.end()) return std::nullopt;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator/calibration/imu/allan_deviation.hpp"
+#include "estimator/calibration/imu/stillness.hpp"
 #include "tests/support/calibration_recording.hpp"
 
 namespace crepes::imu_calibration_test {
@@ -140,6 +141,18 @@ TEST(Allan, KnowsHowFarItIsOff) {
     EXPECT_GT(z2, 0.4);
     EXPECT_LT(z2, 2.0);
   }
+}
+
+TEST(Stillness, TellsATiltFromAWanderingBias) {
+  std::vector<double> readings = at_rest(3, 0.0018, 0.0002, 60000);
+  EXPECT_FALSE(first_motion_s(readings, 0.01));
+
+  for (std::size_t i = 30000; i < readings.size(); ++i) readings[i] += 9.81 * 0.005;  // 0.3 deg
+
+  const auto moved_s = first_motion_s(readings, 0.01);
+  ASSERT_TRUE(moved_s);
+  EXPECT_NEAR(*moved_s, 300.0, 31.0);
+  EXPECT_FALSE(first_motion_s(std::vector<double>(60000, 9.81), 0.01));
 }
 
 TEST(Allan, HasNothingToSayOfAFewReadings) {
