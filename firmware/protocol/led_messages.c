@@ -40,10 +40,8 @@ enum led_fault led_settings_fault(const struct led_settings* settings) {
 }
 
 struct led_settings led_settings_unset(void) {
-  const struct led_settings unset = {.slots = 1,
-                                     .lit_ticks = 1,
-                                     .dark_ticks = 1,
-                                     .brightness = {100, 100, 100, 100, 100, 100}};
+  const struct led_settings unset = {
+      .slots = 1, .lit_ticks = 1, .dark_ticks = 1, .brightness = {100, 100, 100, 100, 100, 100}};
   return unset;
 }
 
