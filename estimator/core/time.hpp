@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <limits>
 
 namespace crepes {
 
@@ -29,6 +30,10 @@ struct PeerClock {
 
 using Timestamp = MonoClock::time_point;
 using PeerTimestamp = PeerClock::time_point;
+
+/// Long before any stamp, yet safe to subtract from one. Clocks may be negative: zero is no such
+/// time.
+inline constexpr Timestamp kNever{Duration{std::numeric_limits<std::int64_t>::min() / 4}};
 
 /// As a floating point number [s].
 [[nodiscard]] constexpr double to_seconds(Duration d) {

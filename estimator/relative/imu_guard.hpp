@@ -104,7 +104,7 @@ class ImuGuard {
   InnovationScale gyro_;
   InnovationScale accel_;
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  ///< smoothed specific force, body axes
-  Timestamp since_{};         ///< the first of the samples whose forces agree
+  Timestamp since_ = kNever;  ///< the first of the samples whose forces agree
   bool has_refused_ = false;  ///< since the last sample that was believed
   bool has_jumped_ = false;   ///< the held samples must be plausible to be believed
   bool gyro_has_jumped_ = false;

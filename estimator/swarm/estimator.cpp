@@ -53,6 +53,27 @@ bool connects_three_robots(const GraphProblem& problem) {
   return robots.size() > 2;
 }
 
+/// The same robots without their names, which no filter uses.
+SwarmConfig unnamed(SwarmConfig swarm) {
+  for (MemberConfig& member : swarm.members) member.name.clear();
+  return swarm;
+}
+
+/// What clients have received of a neighbor, whatever filters it had.
+struct PublishedPoses {
+  Timestamp newest = kNever;
+  std::uint32_t resets = 0;         ///< of all its filters
+  std::uint32_t resets_before = 0;  ///< of those before the present one
+
+  /// Counts the resets from the first filter on. False if a pose of this instant was published: the
+  /// robot's IMU may be slower than its ticks.
+  [[nodiscard]] bool admit(NeighborPose& pose) {
+    pose.reset_counter += resets_before;
+    resets = pose.reset_counter;
+    return pose.stamp > std::exchange(newest, std::max(newest, pose.stamp));
+  }
+};
+
 Duration period_of(double rate_hz) { return from_seconds(1.0 / rate_hz); }
 
 void append(const Records& more, Records& all) {
@@ -132,6 +153,7 @@ struct Estimator::State {
   std::vector<BlinkTracker> trackers;
   std::vector<bool> is_calibrated;  ///< one for each tracker
   std::map<RobotId, Neighbor> neighbors;
+  std::map<RobotId, PublishedPoses> published;
   GraphProblemBuilder graph_builder;
   TeamIntake team_intake;
   ReportComposer composer;
@@ -165,19 +187,21 @@ void Estimator::State::add_new_members() {
 void Estimator::State::reconfigure(const EstimatorSettings& settings) {
   CREPES_EXPECT(settings.self == id && settings.cameras.size() == trackers.size(),
                 "robot and cameras stay the same");
-  const SwarmConfig before = std::exchange(swarm, settings.swarm);
+  const SwarmConfig before = unnamed(std::exchange(swarm, settings.swarm));
+  const SwarmConfig now = unnamed(swarm);
   filters = filter_settings(settings.filters, settings.imu, settings.range);
-  const bool own_is_same = member_of(before, id) == member_of(swarm, id);
+  const bool own_is_same = member_of(before, id) == member_of(now, id);
   std::erase_if(neighbors, [&](const auto& entry) {
-    const auto& now = swarm.members;
-    return !own_is_same ||
-           std::find(now.begin(), now.end(), member_of(before, entry.first)) == now.end();
+    const RobotId robot = entry.first;
+    if (own_is_same && std::ranges::count(now.members, member_of(before, robot)) > 0) return false;
+    published[robot].resets_before = published[robot].resets;
+    return true;
   });
   for (auto& [robot, neighbor] : neighbors) neighbor.reconfigure(filters);
   add_new_members();
 
   tilt_filter.set_noise(settings.imu);
-  if (!(swarm == before && settings.vision == vision)) trackers = make_trackers(settings);
+  if (!(now == before && settings.vision == vision)) trackers = make_trackers(settings);
   vision = settings.vision;
   graph_enabled = settings.solves_graph;
   uses_team_filter = settings.uses_team_filter;
@@ -354,7 +378,7 @@ Outputs Estimator::State::handle(const Tick& tick) {
     if (auto pose = neighbor.output().published()) {
       if (const auto tilt = self.tilt_at(pose->stamp)) pose->up_B = tilt->up_B;
       expected.push_back(expected_board(*pose));
-      outputs.poses.push_back(std::move(*pose));
+      if (published[robot].admit(*pose)) outputs.poses.push_back(std::move(*pose));
     }
   }
   if (report_timer.is_due(tick.stamp)) {
@@ -404,6 +428,7 @@ EstimatorStatus Estimator::status() const {
       const auto found = decodes.find(robot);
       if (found != decodes.end()) one.id_decodes += found->second;
     }
+    one.name = member_of(state_->swarm, robot).name;
     one.faults = state_->team_log.faults_of(robot);
     status.neighbors.push_back(std::move(one));
   }

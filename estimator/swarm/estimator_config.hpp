@@ -31,7 +31,8 @@ struct EstimatorConfig {
              "tight: fuses every measurement by itself; paper: fuses raw poses");
     v.field("lag_ms", lag_ms, Bounds{5, 500},
             "the least time to wait for late measurements; the longest is 500; poses do not wait");
-    v.field("output_rate_hz", output_rate_hz, Bounds{1, 200}, "poses per second");
+    v.field("output_rate_hz", output_rate_hz, Bounds{4, 200},
+            "poses per second, and the most reports per second to the peers");
     v.field("camera_misalignment_deg", camera_misalignment_deg, Bounds{0, 10},
             "error of T_cam_imu's rotation, one sigma");
     v.field("gate_probability", gate_probability, Bounds{0.9, 0.9999999},

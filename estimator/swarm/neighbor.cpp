@@ -18,7 +18,6 @@ PairMounting mounting_of(const MemberConfig& self, const MemberConfig& neighbor)
 Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
                    const FilterSettings& settings)
     : id_(neighbor.id),
-      name_(neighbor.name),
       self_id_(self.id),
       mounting_(mounting_of(self, neighbor)),
       recent_(settings.recent),
@@ -154,7 +153,6 @@ NoPoseReason Neighbor::reason(Timestamp now, const RobotState& self) const {
 NeighborStatus Neighbor::status() const {
   NeighborStatus status;
   status.neighbor = id_;
-  status.name = name_;
   status.reason = reason_;
   status.pose = publisher_.published();
   intake_.outcomes().write_to(status);

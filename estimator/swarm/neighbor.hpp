@@ -60,7 +60,6 @@ class Neighbor {
   [[nodiscard]] NoPoseReason reason(Timestamp now, const RobotState& self) const;
 
   RobotId id_;
-  std::string name_;
   RobotId self_id_;
   PairMounting mounting_;
   Duration recent_;

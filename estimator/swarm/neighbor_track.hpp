@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <variant>
@@ -15,9 +14,6 @@
 #include "estimator/swarm/measurement.hpp"
 
 namespace crepes {
-
-/// Long before any stamp, yet safe to subtract from one.
-inline constexpr Timestamp kNever{Duration{std::numeric_limits<std::int64_t>::min() / 4}};
 
 /// A filter that gated all sightings of one kind for so long has diverged.
 inline constexpr Duration kDivergenceTime = std::chrono::milliseconds{250};

@@ -24,10 +24,10 @@ class PeerView {
   void choose_peer(const TeamInterval& interval, const TeamBelief& own);
   void forget();
 
-  Timestamp lit_{};       ///< when this robot was last seen or saw anybody
-  Timestamp peer_lit_{};  ///< likewise the peer
-  RobotId peer_{};        ///< whose frame it is; RobotId{} if there is none
-  RobotId former_{};      ///< one that turned out to have a fault
+  Timestamp lit_ = kNever;       ///< when this robot was last seen or saw anybody
+  Timestamp peer_lit_ = kNever;  ///< likewise the peer
+  RobotId peer_{};               ///< whose frame it is; RobotId{} if there is none
+  RobotId former_{};             ///< one that turned out to have a fault
   TeamFilter filter_;
 };
 

@@ -23,12 +23,14 @@ struct Rejected {
   std::uint64_t huge = 0;     ///< larger than max_area_px2: the sun, windows
   std::uint64_t faint = 0;    ///< crests of a bright background
   std::uint64_t surplus = 0;  ///< more than max_spots
+  std::uint64_t cut = 0;      ///< by the border of the picture: half a board shows its own middle
 
   Rejected& operator+=(const Rejected& other) {
     hot += other.hot;
     huge += other.huge;
     faint += other.faint;
     surplus += other.surplus;
+    cut += other.cut;
     return *this;
   }
 };

@@ -48,7 +48,7 @@ Exposure judge(const Detection& found, bool is_noise) {
       found.saturated_share >= kTooMuchSaturated)
     return Exposure::kBright;
   const Rejected& r = found.rejected;
-  const bool is_empty = found.spots.empty() && r.hot + r.huge + r.faint + r.surplus == 0;
+  const bool is_empty = found.spots.empty() && r.hot + r.huge + r.faint + r.surplus + r.cut == 0;
   return is_empty ? Exposure::kDark : Exposure::kGood;
 }
 
@@ -92,7 +92,7 @@ Detection SpotDetector::detect(const GrayImage& image) {
     hot_pixels_.add_frame(image, found.faint_threshold);
     found.hot_pixels = hot_pixels_.known();
     is_noise = !search_levels(image, sample, found);
-    select(found.rejected);
+    select(image, found.rejected);
   }
   found.spots = spots_;
   found.exposure = judge(found, is_noise);
@@ -275,7 +275,12 @@ void SpotDetector::take_ring(const GrayImage& image, int threshold, const Ring& 
 }
 
 /// Candidates that are spots, brightest first.
-void SpotDetector::select(Rejected& rejected) {
+void SpotDetector::select(const GrayImage& image, Rejected& rejected) {
+  rejected.cut += std::erase_if(candidates_, [&](const SpotCandidate& candidate) {
+    const PixelBox& box = candidate.box;
+    return box.u_min <= 0 || box.v_min <= 0 || box.u_max >= image.width - 1 ||
+           box.v_max >= image.height - 1;
+  });
   const auto all = candidates_.size();
   std::erase_if(candidates_, [&](const SpotCandidate& candidate) {
     return candidate.spot.area_px2 < config_.min_area_px2;

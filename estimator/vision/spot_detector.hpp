@@ -51,7 +51,7 @@ class SpotDetector {
   void take_ring(const GrayImage& image, int threshold, const Ring& ring);
   void take_arcs(const GrayImage& image, int threshold, const JoinedArcs& arcs);
   [[nodiscard]] Blob take_blobs(std::span<const std::uint32_t> blobs, const RingView& view);
-  void select(Rejected& rejected);
+  void select(const GrayImage& image, Rejected& rejected);
 
   VisionConfig config_;
   BlobFinder finder_;

@@ -74,7 +74,7 @@ std::vector<DemoRobot> robots_of(const Crowd& crowd, int seed) {
     robots[i].config.robot.id = id_of(i);
     robots[i].config.swarm = swarm;
     robots[i].config.uwb.noise.max_range_m = crowd.sight_m;
-    robots[i].clock = {1000 + 50 * noise.uniform(0), 15 * noise.gaussian(1)};
+    robots[i].clock = {crowd.clocks_s + 50 * noise.uniform(0), 15 * noise.gaussian(1)};
   }
   return robots;
 }

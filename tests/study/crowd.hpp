@@ -17,6 +17,7 @@ struct Crowd {
   double meeting_s = 0.0;   ///< which is then; afterwards they part again. 0: never
   double sight_m = 40.0;    ///< of cameras and UWB modules
   double spread_m = 1.0;    ///< of the heights about which robots fly
+  double clocks_s = 1000.0;  ///< what their clocks show at the beginning, about
   Darkness dark{};
 };
 

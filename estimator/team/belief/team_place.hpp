@@ -15,7 +15,7 @@ struct TeamPlace {
   Eigen::Vector3d v_S_N = Eigen::Vector3d::Zero();
   Covariance covariance = Covariance::Zero();  ///< of [p, v, theta]
   Timestamp last_sighting{};                   ///< the earliest along the chain
-  Timestamp last_fix{};                        ///< by ranges alone
+  Timestamp last_fix = kNever;                 ///< by ranges alone
 
   /// Of a robot in the belief.
   [[nodiscard]] static TeamPlace of(const TeamBelief& belief, RobotId id);

@@ -60,8 +60,8 @@ struct TeamRobot {
   int motion_index = -1;  ///< none for this robot
   int bias_index = 0;
   std::vector<TeamCamera> cameras{};
-  Timestamp last_sighting{};
-  Timestamp last_fix{};  ///< in the dark, by the ranges of robots that are seen
+  Timestamp last_sighting = kNever;
+  Timestamp last_fix = kNever;  ///< in the dark, by the ranges of robots that are seen
   Timestamp since{};
   /// Measurements between a robot on probation and trusted robots correct the former only.
   bool is_trusted = false;

@@ -58,7 +58,7 @@ class TeamTrust {
 
  private:
   struct Losses {
-    Timestamp last{};
+    Timestamp last = kNever;
     int count = 0;
   };
   struct GyroDoubt {
@@ -68,11 +68,12 @@ class TeamTrust {
     std::optional<Timestamp> unconfirmed;
     std::optional<Timestamp> confirmed;  ///< when its cameras first agreed with it after that
     double rate_radps = 0.0;             ///< how wrong the gyroscope was then
-    Timestamp single{};                  ///< when it was last contradicted by a single robot
+    Timestamp single = kNever;           ///< when it was last contradicted by a single robot
     Losses as_trusted;                   ///< when it was found although the robot was trusted
   };
   struct Verdict {
-    Timestamp shown{};  ///< when its camera was last found turned; after a while it may be repaired
+    /// When its camera was last found turned; after a while it may be repaired.
+    Timestamp shown = kNever;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
     int count = 0;  ///< how often its cameras were found turned
     bool is_refused = false;

@@ -8,11 +8,11 @@ void BlinkEvidence::forget() {
   score.clear();
   last_lit.reset();
   assigned.reset();
-  assigned_since = {};
+  assigned_since = kNever;
   doubt = 0.0;
   obstructed_doubt = 0.0;
-  undoubted_at = {};
-  compared_at = {};
+  undoubted_at = kNever;
+  compared_at = kNever;
   is_foreign = false;
   dark_runs = 0.0;
   is_obstructed = false;

@@ -26,15 +26,15 @@ struct BlinkEvidence {
   std::vector<std::int16_t> score;      ///< log likelihood of every code in every phase
   std::optional<Timestamp> last_lit;
   std::optional<CodeMatch> assigned;  ///< the decision; empty while undecided
-  Timestamp assigned_since{};         ///< over the times that it was hidden, too
+  Timestamp assigned_since = kNever;  ///< over the times that it was hidden, too
   double doubt = 0.0;  ///< log odds that another board has blinked here since; at least zero
   /// The same if something hides the light in half of the frames, as a propeller does.
   double obstructed_doubt = 0.0;
-  Timestamp undoubted_at{};    ///< when `doubt` was zero last
-  Timestamp compared_at{};     ///< when other codes were compared last, ours and foreign ones
-  bool is_foreign = false;     ///< its code is no board's of ours, but like one
-  double dark_runs = 0.0;      ///< how often it went dark of late, with fading memory
-  bool is_obstructed = false;  ///< more often than any board: a propeller is in front of it
+  Timestamp undoubted_at = kNever;  ///< when `doubt` was zero last
+  Timestamp compared_at = kNever;   ///< when other codes were compared last, ours and foreign ones
+  bool is_foreign = false;          ///< its code is no board's of ours, but like one
+  double dark_runs = 0.0;           ///< how often it went dark of late, with fading memory
+  bool is_obstructed = false;       ///< more often than any board: a propeller is in front of it
   /// After IdDecoder::resume(), `score` contains the earlier sightings, normalized so that the mean
   /// likelihood of all sources is 1. This is the log likelihood of a two-state Markov chain
   /// relative to that mean.

@@ -13,8 +13,9 @@ namespace {
 constexpr double kMinFlipRate = 0.02;  // with less, a single frame would count too much
 constexpr double kMaxFlipRate = 0.3;
 
-// Lamps on the mains flash twice a cycle. A camera can hardly distinguish finer steps of duty.
-constexpr std::array kLampRatesHz{100.0, 120.0};
+// Lamps on the mains flash once or twice a cycle. A camera can hardly distinguish finer steps of
+// duty.
+constexpr std::array kLampRatesHz{50.0, 60.0, 100.0, 120.0};
 constexpr std::array kLampDuties{0.1, 0.25, 0.4, 0.55, 0.7, 0.85};
 
 void add_scaled(std::span<std::int16_t> sum, const std::int16_t* weight, int sign) {

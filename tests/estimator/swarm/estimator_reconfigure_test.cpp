@@ -86,14 +86,33 @@ TEST(EstimatorReconfigure, ForgetsANeighborWhoseMountingHasChanged) {
   EstimatorPair pair(5);
   pair.run_for(4s);
   ASSERT_NE(pair.latest(), nullptr);
+  const std::uint32_t resets = pair.latest()->pose.reset_counter;
 
-  pair.reconfigure([](EstimatorSettings& settings) { settings.swarm.members[1].name = "renamed"; });
+  pair.reconfigure(
+      [](EstimatorSettings& settings) { settings.swarm.members[1].p_body_led.x() += 0.01; });
   pair.run_for(20ms);
 
   EXPECT_EQ(pair.latest(), nullptr);
-  EXPECT_EQ(pair.status().name, "renamed");
   pair.run_for(3s);
-  EXPECT_NE(pair.latest(), nullptr);
+  ASSERT_NE(pair.latest(), nullptr);
+  EXPECT_GT(pair.latest()->pose.reset_counter, resets);
+}
+
+TEST(EstimatorReconfigure, GoesOnUnderOtherNames) {
+  EstimatorPair pair(6);
+  pair.run_for(4s);
+  ASSERT_NE(pair.latest(), nullptr);
+  const std::size_t poses = pair.found().size();
+  const std::uint32_t resets = pair.latest()->pose.reset_counter;
+
+  pair.reconfigure([](EstimatorSettings& settings) {
+    for (MemberConfig& member : settings.swarm.members) member.name += "-renamed";
+  });
+  pair.run_for(1s);
+
+  EXPECT_EQ(pair.found().size(), poses + 50);
+  EXPECT_EQ(pair.latest()->pose.reset_counter, resets);
+  EXPECT_NE(pair.status().name.find("-renamed"), std::string::npos);
 }
 
 }  // namespace

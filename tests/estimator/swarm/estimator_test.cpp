@@ -212,6 +212,21 @@ TEST(Estimator, RefusesATickThatDoesNotAdvance) {
   EXPECT_EQ(estimator.status().refused_samples, 2U);
 }
 
+TEST(Estimator, PublishesNoInstantTwiceWhereTicksAreFasterThanItsImu) {
+  std::vector<Event> events;
+  for (const Event& event : two_seconds()) {
+    events.push_back(event);
+    if (const auto* tick = std::get_if<Tick>(&event)) events.emplace_back(Tick{tick->stamp + 5ms});
+  }
+  Estimator estimator(two_robots());
+
+  const std::vector<NeighborPose> poses = poses_of(estimator, events);
+
+  ASSERT_GT(poses.size(), 100U);
+  EXPECT_EQ(std::ranges::adjacent_find(poses, std::ranges::greater_equal{}, &NeighborPose::stamp),
+            poses.end());
+}
+
 /// Readings that mean nothing, to be strewn among good ones.
 std::vector<Event> nonsense(Timestamp stamp) {
   const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -92,6 +92,20 @@ TEST_F(IdDecoderStatistics, TakesNoneOfHundredsOfLampsForARobot) {
   }
 }
 
+// They go dark more often than any board, as if a propeller were in front of one.
+TEST_F(IdDecoderStatistics, TakesNoLampThatFlashesOnceACycleForARobot) {
+  const IdDecoder decoder(library(), VisionConfig{}, 200.0);
+  for (int i = 0; i < 100; ++i) {
+    for (const double hz : {50.0, 60.0}) {
+      Watcher watcher(decoder, {.rate_hz = 200.0, .flip_rate = i % 2 == 0 ? 0.003 : 0.02},
+                      random_());
+      const Light lamp =
+          test::mains_lamp(hz * uniform(0.998, 1.002), uniform(0.3, 0.6), uniform(0.0, 1.0));
+      ASSERT_FALSE(watcher.decide(lamp, 10s).id.has_value()) << hz;
+    }
+  }
+}
+
 // Of 19,723 changes one in a thousand took longer than 1.3 patterns, and none two (tests/bench).
 TEST_F(IdDecoderStatistics, TakesTheIdBackSoonWhenTheTrackChangesHands) {
   std::vector<double> periods;

@@ -138,6 +138,24 @@ TEST(SpotDetector, MeasuresHowLongASpotIs) {
   EXPECT_LT(round.elongation, 1.1);
 }
 
+TEST(SpotDetector, GivesNoCenterOfABoardThatTheBorderCuts) {
+  const CameraModel camera = small_fisheye();
+  for (const double range : {2.0, 5.0}) {
+    for (const double v : {-1.0, 0.0, 1.5}) {
+      RingScene scene(camera, {}, 5);
+      scene.add_ring(facing_board(camera, {160.0, v}, range));
+      const Eigen::Vector2d whole = scene.add_ring(facing_board(camera, {160.0, 60.0}, range));
+      SpotDetector detector{VisionConfig{}};
+
+      const Detection found = detector.detect(scene.read());
+
+      ASSERT_EQ(found.spots.size(), 1U) << range << " m, " << v;
+      EXPECT_LT(off(found.spots[0], whole), 0.35);
+      EXPECT_GE(found.rejected.cut, 1U);
+    }
+  }
+}
+
 TEST(SpotDetector, KeepsTheBrightestSpotsAndCountsTheOthers) {
   RingScene scene(small_fisheye(), {}, 3);
   for (int i = 0; i < 40; ++i)
