@@ -17,6 +17,11 @@ bool Endpoint::is_ipv4() const {
   return std::equal(kMappedPrefix.begin(), kMappedPrefix.end(), address.begin());
 }
 
+bool Endpoint::is_any() const {
+  const auto begin = address.begin() + (is_ipv4() ? kMappedPrefix.size() : 0);
+  return std::all_of(begin, address.end(), [](std::uint8_t byte) { return byte == 0; });
+}
+
 bool Endpoint::is_loopback() const {
   return is_ipv4() ? address[12] == 127 : address == kLoopback6;
 }

@@ -19,6 +19,8 @@ struct Endpoint {
   auto operator<=>(const Endpoint&) const = default;
 
   [[nodiscard]] bool is_ipv4() const;
+  /// 0.0.0.0 or ::, all addresses of a machine.
+  [[nodiscard]] bool is_any() const;
   /// From this machine: 127.0.0.0/8 or ::1.
   [[nodiscard]] bool is_loopback() const;
   /// False for broadcast and multicast addresses and for port 0. The broadcast address of a

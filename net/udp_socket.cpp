@@ -113,7 +113,100 @@ std::optional<in_addr_t> broadcast_of(const ifaddrs& entry) {
   return given == 0 || given == own ? of_network : given;
 }
 
-Result<Endpoint> broadcast_address(const std::string& interface, std::uint16_t port) {
+/// What recvmsg and sendmsg say of a datagram beside its bytes: room for one address.
+struct Ancillary {
+  alignas(cmsghdr) std::array<std::uint8_t, CMSG_SPACE(sizeof(in6_pktinfo))> bytes{};
+};
+
+/// This machine's address that a datagram was sent to, or by which its network is reached. Empty
+/// unless the socket was asked for it.
+std::optional<Endpoint> destination_of(msghdr& message, std::uint16_t port) {
+  for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr;
+       part = CMSG_NXTHDR(&message, part)) {
+    if (part->cmsg_level == IPPROTO_IP && part->cmsg_type == IP_PKTINFO) {
+      in_pktinfo info{};
+      std::memcpy(&info, CMSG_DATA(part), sizeof(info));
+      return Endpoint::ipv4(std::bit_cast<std::array<std::uint8_t, 4>>(info.ipi_spec_dst.s_addr),
+                            port);
+    }
+    if (part->cmsg_level == IPPROTO_IPV6 && part->cmsg_type == IPV6_PKTINFO) {
+      in6_pktinfo info{};
+      std::memcpy(&info, CMSG_DATA(part), sizeof(info));
+      if (IN6_IS_ADDR_MULTICAST(&info.ipi6_addr)) return std::nullopt;
+      Endpoint endpoint;
+      std::memcpy(endpoint.address.data(), &info.ipi6_addr, endpoint.address.size());
+      if (IN6_IS_ADDR_LINKLOCAL(&info.ipi6_addr)) endpoint.scope = info.ipi6_ifindex;
+      endpoint.port = port;
+      return endpoint;
+    }
+  }
+  return std::nullopt;
+}
+
+template <class Info>
+void append_source(msghdr& message, Ancillary& room, int level, int type, const Info& info) {
+  message.msg_control = room.bytes.data();
+  message.msg_controllen = CMSG_SPACE(sizeof(info));
+  cmsghdr* const part = CMSG_FIRSTHDR(&message);
+  part->cmsg_level = level;
+  part->cmsg_type = type;
+  part->cmsg_len = CMSG_LEN(sizeof(info));
+  std::memcpy(CMSG_DATA(part), &info, sizeof(info));
+}
+
+/// Makes a datagram leave from this address.
+void set_source(msghdr& message, Ancillary& room, const Endpoint& from) {
+  if (from.is_ipv4()) {
+    in_pktinfo info{};
+    info.ipi_spec_dst = to_ipv4(from).sin_addr;
+    append_source(message, room, IPPROTO_IP, IP_PKTINFO, info);
+  } else {
+    in6_pktinfo info{};
+    info.ipi6_addr = to_ipv6(from).sin6_addr;
+    info.ipi6_ifindex = from.scope;
+    append_source(message, room, IPPROTO_IPV6, IPV6_PKTINFO, info);
+  }
+}
+
+int set_option(int fd, int level, int option) {
+  const int on = 1;
+  return ::setsockopt(fd, level, option, &on, sizeof(on));
+}
+
+}  // namespace
+
+Result<UdpSocket> UdpSocket::open(const Endpoint& address, std::string name, bool broadcast) {
+  const int family = address.is_ipv4() ? AF_INET : AF_INET6;
+  UdpSocket socket(UniqueFd(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)),
+                   std::move(name));
+  if (!socket.fd_) return fail_errno(socket.name_, errno);
+  // As large as the kernel allows, twice its default: it holds a burst while the thread is busy.
+  constexpr int kBuffer = 1 << 20;
+  (void)::setsockopt(socket.fd_.get(), SOL_SOCKET, SO_RCVBUF, &kBuffer, sizeof(kBuffer));
+  // Without its interface, nothing may leave by a gateway, unnoticed.
+  const bool ready =
+      (!broadcast || (set_option(socket.fd_.get(), SOL_SOCKET, SO_REUSEADDR) == 0 &&
+                      set_option(socket.fd_.get(), SOL_SOCKET, SO_BROADCAST) == 0 &&
+                      set_option(socket.fd_.get(), SOL_SOCKET, SO_DONTROUTE) == 0)) &&
+      (family == AF_INET || set_option(socket.fd_.get(), IPPROTO_IPV6, IPV6_V6ONLY) == 0) &&
+      (!address.is_any() ||
+       (family == AF_INET ? set_option(socket.fd_.get(), IPPROTO_IP, IP_PKTINFO)
+                          : set_option(socket.fd_.get(), IPPROTO_IPV6, IPV6_RECVPKTINFO)) == 0) &&
+      with_sockaddr(address, [&](const sockaddr* to, socklen_t length) {
+        return ::bind(socket.fd_.get(), to, length) == 0;
+      });
+  if (!ready) return fail_errno(socket.name_, errno);
+
+  sockaddr_storage bound{};
+  socklen_t length = sizeof(bound);
+  if (::getsockname(socket.fd_.get(), static_cast<sockaddr*>(static_cast<void*>(&bound)),
+                    &length) != 0)
+    return fail_errno(socket.name_, errno);
+  socket.local_ = to_endpoint(bound);
+  return socket;
+}
+
+Result<Endpoint> UdpSocket::broadcast_address(const std::string& interface, std::uint16_t port) {
   ifaddrs* list = nullptr;
   if (::getifaddrs(&list) != 0) return fail_errno("interfaces", errno);
   const std::unique_ptr<ifaddrs, FreeInterfaces> owner(list);
@@ -142,41 +235,6 @@ Result<Endpoint> broadcast_address(const std::string& interface, std::uint16_t p
       fmt::format("{}: interface has no IPv4 address; give it one, see `ip address`", interface));
 }
 
-int set_option(int fd, int level, int option) {
-  const int on = 1;
-  return ::setsockopt(fd, level, option, &on, sizeof(on));
-}
-
-}  // namespace
-
-Result<UdpSocket> UdpSocket::open(const Endpoint& address, std::string name, bool broadcast) {
-  const int family = address.is_ipv4() ? AF_INET : AF_INET6;
-  UdpSocket socket(UniqueFd(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)),
-                   std::move(name));
-  if (!socket.fd_) return fail_errno(socket.name_, errno);
-  // As large as the kernel allows, twice its default: it holds a burst while the thread is busy.
-  constexpr int kBuffer = 1 << 20;
-  (void)::setsockopt(socket.fd_.get(), SOL_SOCKET, SO_RCVBUF, &kBuffer, sizeof(kBuffer));
-  // Without its interface, nothing may leave by a gateway, unnoticed.
-  const bool ready =
-      (!broadcast || (set_option(socket.fd_.get(), SOL_SOCKET, SO_REUSEADDR) == 0 &&
-                      set_option(socket.fd_.get(), SOL_SOCKET, SO_BROADCAST) == 0 &&
-                      set_option(socket.fd_.get(), SOL_SOCKET, SO_DONTROUTE) == 0)) &&
-      (family == AF_INET || set_option(socket.fd_.get(), IPPROTO_IPV6, IPV6_V6ONLY) == 0) &&
-      with_sockaddr(address, [&](const sockaddr* to, socklen_t length) {
-        return ::bind(socket.fd_.get(), to, length) == 0;
-      });
-  if (!ready) return fail_errno(socket.name_, errno);
-
-  sockaddr_storage bound{};
-  socklen_t length = sizeof(bound);
-  if (::getsockname(socket.fd_.get(), static_cast<sockaddr*>(static_cast<void*>(&bound)),
-                    &length) != 0)
-    return fail_errno(socket.name_, errno);
-  socket.local_ = to_endpoint(bound);
-  return socket;
-}
-
 Result<UdpSocket> UdpSocket::open_broadcast(const std::string& interface, std::uint16_t port) {
   // A socket bound to the broadcast address receives nothing else. If the system allows it, also
   // nothing that comes to that address by another interface.
@@ -201,10 +259,22 @@ Result<void> UdpSocket::broadcast(std::span<const std::uint8_t> bytes) {
   return send_to(bytes, local_);
 }
 
-Result<void> UdpSocket::send_to(std::span<const std::uint8_t> bytes, const Endpoint& to) {
+Result<void> UdpSocket::send_to(std::span<const std::uint8_t> bytes, const Endpoint& to,
+                                const std::optional<Endpoint>& from) {
   CREPES_EXPECT(fd_, "the socket was moved away");
   const ssize_t sent = with_sockaddr(to, [&](const sockaddr* address, socklen_t length) {
-    return ::sendto(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, address, length);
+    if (!from)
+      return ::sendto(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL, address, length);
+    // The structures of sendmsg are not const; it changes nothing.
+    iovec content{const_cast<std::uint8_t*>(bytes.data()), bytes.size()};
+    msghdr message{};
+    message.msg_name = const_cast<sockaddr*>(address);
+    message.msg_namelen = length;
+    message.msg_iov = &content;
+    message.msg_iovlen = 1;
+    Ancillary room;
+    set_source(message, room, *from);
+    return ::sendmsg(fd_.get(), &message, MSG_NOSIGNAL);
   });
   if (sent >= 0) return {};
   const int error = errno;
@@ -225,15 +295,23 @@ Result<std::optional<Datagram>> UdpSocket::receive(std::chrono::milliseconds tim
   Datagram datagram;
   datagram.bytes.resize(kMaxDatagram);
   sockaddr_storage from{};
-  socklen_t length = sizeof(from);
-  const ssize_t received = ::recvfrom(fd_.get(), datagram.bytes.data(), datagram.bytes.size(), 0,
-                                      static_cast<sockaddr*>(static_cast<void*>(&from)), &length);
+  iovec content{datagram.bytes.data(), datagram.bytes.size()};
+  Ancillary room;
+  msghdr message{};
+  message.msg_name = &from;
+  message.msg_namelen = sizeof(from);
+  message.msg_iov = &content;
+  message.msg_iovlen = 1;
+  message.msg_control = room.bytes.data();
+  message.msg_controllen = room.bytes.size();
+  const ssize_t received = ::recvmsg(fd_.get(), &message, 0);
   if (received < 0) {
     if (errno == EAGAIN || errno == EINTR) return std::nullopt;
     return fail_errno(fmt::format("{}: receive", name_), errno);
   }
   datagram.bytes.resize(static_cast<std::size_t>(received));
   datagram.from = to_endpoint(from);
+  datagram.to = destination_of(message, local_.port);
   return datagram;
 }
 

@@ -20,6 +20,8 @@ struct Datagram {
   /// Truncated at UdpSocket::kMaxDatagram bytes.
   std::vector<std::uint8_t> bytes;
   Endpoint from;
+  /// This machine's address that it was sent to, if the socket serves all.
+  std::optional<Endpoint> to{};
 };
 
 class UdpSocket {
@@ -33,14 +35,20 @@ class UdpSocket {
   [[nodiscard]] static Result<UdpSocket> open_broadcast(const std::string& interface,
                                                         std::uint16_t port);
 
+  /// Where such a socket sends now; its interface may get another address.
+  [[nodiscard]] static Result<Endpoint> broadcast_address(const std::string& interface,
+                                                          std::uint16_t port);
+
   /// A socket bound to one numeric IPv4 or IPv6 address; port 0 lets the system choose.
   [[nodiscard]] static Result<UdpSocket> bind(const std::string& address, std::uint16_t port);
 
   /// Sends to all hosts on the interface; only for sockets of open_broadcast. kBusy: the interface
   /// is congested and the datagram is lost. After other errors, open the socket again.
   [[nodiscard]] Result<void> broadcast(std::span<const std::uint8_t> bytes);
-  /// Never blocks. kBusy: the system cannot send now.
-  [[nodiscard]] Result<void> send_to(std::span<const std::uint8_t> bytes, const Endpoint& to);
+  /// Never blocks. kBusy: the system cannot send now. `from`: the one of this machine's addresses
+  /// that the receiver sees; if empty, the system chooses.
+  [[nodiscard]] Result<void> send_to(std::span<const std::uint8_t> bytes, const Endpoint& to,
+                                     const std::optional<Endpoint>& from = {});
   /// The next datagram, or nothing within `timeout`.
   [[nodiscard]] Result<std::optional<Datagram>> receive(std::chrono::milliseconds timeout);
 

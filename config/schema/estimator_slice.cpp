@@ -1,5 +1,7 @@
 #include "config/schema/estimator_slice.hpp"
 
+#include "config/schema/mesh_slice.hpp"
+
 namespace crepes {
 
 EstimatorSettings estimator_settings(const Config& config) {
@@ -10,7 +12,7 @@ EstimatorSettings estimator_settings(const Config& config) {
                              .range = config.uwb.noise,
                              .vision = config.vision,
                              .filters = config.estimator,
-                             .report_rate_hz = config.net.report_rate_hz,
+                             .report_rate_hz = report_rate_hz(config),
                              .solves_graph = config.graph.enabled,
                              .graph_rate_hz = config.graph.rate_hz,
                              .uses_team_filter = config.graph.method == TeamMethod::kTeamFilter,

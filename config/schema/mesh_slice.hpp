@@ -7,6 +7,9 @@
 
 namespace crepes {
 
+/// Reports leave at ticks, so there are at most as many.
+[[nodiscard]] double report_rate_hz(const Config& config);
+
 /// Inertial samples are rounded to half of their noise, which adds 2 % to its variance. Without a
 /// salt.
 [[nodiscard]] SendSettings send_settings(const Config& config);

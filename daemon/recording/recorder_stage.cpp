@@ -67,10 +67,14 @@ class Recorder {
 
  private:
   void listen() {
-    if (listener_ || context_.clock.now() < retry_at_) return;
+    if (context_.clock.now() < retry_at_) return;
     retry_at_ = context_.clock.now() + kRetry;
+    std::error_code status;
+    if (listener_ && std::filesystem::is_socket(config_.recording.socket, status)) return;
     Result<UniqueFd> listener = listen_unix(config_.recording.socket);
     if (listener) {
+      if (listener_)
+        log_message(LogLevel::kWarning, "recording: its socket was removed; there is another now");
       listener_ = std::move(*listener);
     } else if (listener.error().message != fault_) {
       fault_ = listener.error().message;

@@ -21,6 +21,7 @@ class Signals {
     sigemptyset(&signals_);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals_, signal);
     ::pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    std::signal(SIGPIPE, SIG_IGN);  // who reads the log may go
   }
 
   /// The signal that arrived; kNone after `longest` without one. Does not wait if it is negative.

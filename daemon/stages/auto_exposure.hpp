@@ -48,7 +48,7 @@ class AutoExposure {
   double exposure_us_ = 0.0;
   std::map<RobotId, double> peaks_;  ///< the largest of each board in the window
   std::optional<Timestamp> window_end_;
-  Timestamp next_trial_{};            ///< of the longest exposure
+  Timestamp next_trial_ = kNever;     ///< of the longest exposure
   std::optional<double> resumed_us_;  ///< during a trial: the exposure before it
 };
 

@@ -26,6 +26,16 @@ UdpSocket* MeshSocket::get(Timestamp now) {
   return &*socket_;
 }
 
+void MeshSocket::follow_address(Timestamp now) {
+  if (!socket_) return;
+  const Result<Endpoint> address = UdpSocket::broadcast_address(config_.interface, port());
+  if (!address) return close_for_retry(address.error(), now);
+  if (*address == socket_->local()) return;
+  log_message(LogLevel::kWarning, fmt::format("mesh: {}: another address; datagrams go to {} now",
+                                              config_.interface, address->to_string()));
+  socket_.reset();
+}
+
 void MeshSocket::end_fault() {
   if (fault_.empty()) return;
   log_message(LogLevel::kInfo, "mesh: works again");
@@ -36,8 +46,7 @@ void MeshSocket::end_fault() {
 Result<UdpSocket> MeshSocket::open() {
   const Result<std::string> keys = read_keys();
   if (!keys) return tl::unexpected(keys.error());
-  auto socket =
-      UdpSocket::open_broadcast(config_.interface, static_cast<std::uint16_t>(config_.port));
+  auto socket = UdpSocket::open_broadcast(config_.interface, port());
   if (!socket || *keys == logged_keys_) return socket;
   log_message(LogLevel::kInfo, "mesh: " + *keys);
   if (keys_may_be_swapped())
@@ -80,6 +89,9 @@ void KeyMismatchMonitor::update(const PeerLink& link) {
   constexpr const char* kOtherSigner =
       "no datagram that comes is signed by its sender: swarm.members[].public_key is not the same "
       "on all robots, or net.robot_key_file of the others is another";
+  constexpr const char* kOtherVersion =
+      "no datagram that comes is of this version: install the same version of crepesd on all "
+      "robots";
   const MeshCounters& totals = link.counters();
   const auto since = [](std::uint64_t& last, std::uint64_t total) {
     return total - std::exchange(last, total);
@@ -87,9 +99,11 @@ void KeyMismatchMonitor::update(const PeerLink& link) {
   const std::uint64_t received = since(received_, totals[MeshCounter::kReceived]);
   const std::uint64_t unopened = since(unopened_, totals.seal_refusals());
   const std::uint64_t wrong = since(unsigned_, totals.signature_refusals());
+  const std::uint64_t other = since(other_version_, totals.version_refusals());
   const char* const fault = received == 0          ? ""
                             : unopened == received ? kOtherKey
                             : wrong == received    ? kOtherSigner
+                            : other == received    ? kOtherVersion
                                                    : "";
   const std::string before = std::exchange(fault_, fault);
   if (!fault_.empty() && before.empty()) log_message(LogLevel::kWarning, "mesh: " + fault_);

@@ -33,6 +33,9 @@ class MeshSocket {
   [[nodiscard]] UdpSocket* get(Timestamp now);
   /// Closes the socket after an error and schedules the next attempt.
   void close_for_retry(const Error& error, Timestamp now);
+  /// Opens the socket anew if its interface has got another address, which no error shows: what is
+  /// sent to the old one is lost. Once a second is enough.
+  void follow_address(Timestamp now);
   /// Call it after a successful broadcast.
   void end_fault();
 
@@ -49,6 +52,7 @@ class MeshSocket {
  private:
   static constexpr Duration kFirstRetry = std::chrono::milliseconds{100};
 
+  [[nodiscard]] std::uint16_t port() const { return static_cast<std::uint16_t>(config_.port); }
   [[nodiscard]] Result<UdpSocket> open();
   /// Returns what the log says of the keys; empty without any.
   [[nodiscard]] Result<std::string> read_keys();
@@ -58,7 +62,7 @@ class MeshSocket {
   std::optional<PacketSigner> signer_;
   std::optional<UdpSocket> socket_;
   std::string fault_;
-  Timestamp retry_at_{};
+  Timestamp retry_at_ = kNever;
   Duration retry_ = kFirstRetry;
   bool failed_in_use_ = false;  ///< the current fault is one of an open socket
   std::string logged_keys_;
@@ -76,6 +80,7 @@ class KeyMismatchMonitor {
   std::uint64_t received_ = 0;
   std::uint64_t unopened_ = 0;
   std::uint64_t unsigned_ = 0;
+  std::uint64_t other_version_ = 0;
   std::string fault_;
 };
 

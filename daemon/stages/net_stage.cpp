@@ -107,6 +107,7 @@ class NetLoop {
   void every_second() {
     next_second_ = clock_.now() + std::chrono::seconds{1};
     key_monitor_.update(link_);
+    mesh_.follow_address(clock_.now());
     server_->open_missing();
     const AirTotals before = std::exchange(air_totals_, link_.air_totals(clock_.now()));
     air_ = air_share(before, air_totals_, settings_.send.broadcasts);
@@ -226,6 +227,7 @@ class NetLoop {
     status.network = link_.counters().totals();
     status.network.emplace_back("reports_unsent", unsent_);
     for (auto& counter : server_->counters()) status.network.push_back(std::move(counter));
+    name_unknown_clocks(status);
     return status;
   }
 
@@ -245,7 +247,7 @@ class NetLoop {
   EstimatorStatus estimator_;
   std::map<std::string, SensorStatus> sensors_;
   std::string systemd_status_;
-  Timestamp next_second_{};  ///< when the next second begins
+  Timestamp next_second_ = kNever;  ///< when the next second begins
 };
 
 }  // namespace

@@ -52,10 +52,13 @@ SubscriptionServer::SubscriptionServer(RobotId self, const std::map<RobotId, std
 
 void SubscriptionServer::reconfigure(const std::map<RobotId, std::string>& names,
                                      const SubscriptionConfig& config) {
-  names_ = names;
   service_.reconfigure(config);
-  pushes_.clear();
-  for (const PushConfig& push : config.push) pushes_.emplace_back(push, self_, names_);
+  if (config.push != push_configs_ || names != names_) {
+    pushes_.clear();
+    for (const PushConfig& push : config.push) pushes_.emplace_back(push, self_, names);
+  }
+  push_configs_ = config.push;
+  names_ = names;
   open_missing();
 }
 
@@ -113,8 +116,9 @@ void SubscriptionServer::serve(Timestamp now) {
       // client.
       if (!request || !*request) break;
       const Datagram& datagram = **request;
-      if (const auto answer = service_.answer(datagram.from, text_of(datagram), now, socket))
-        send(sockets_[socket], *answer, datagram.from);
+      const std::size_t way = index_of({socket, datagram.to});
+      if (const auto answer = service_.answer(datagram.from, text_of(datagram), now, way))
+        send(way, *answer, datagram.from);
     }
   }
 }
@@ -122,8 +126,8 @@ void SubscriptionServer::serve(Timestamp now) {
 void SubscriptionServer::publish(const std::vector<NeighborPose>& poses, Timestamp now) {
   for (const NeighborPose& pose : poses) {
     for (const PoseDelivery& delivery : service_.deliveries(pose.neighbor, pose.stamp, now)) {
-      send(sockets_[delivery.socket],
-           pose_json(delivery.sequence, self_, names_[pose.neighbor], pose), delivery.client);
+      send(delivery.socket, pose_json(delivery.sequence, self_, names_[pose.neighbor], pose),
+           delivery.client);
       ++poses_;
     }
   }
@@ -131,7 +135,7 @@ void SubscriptionServer::publish(const std::vector<NeighborPose>& poses, Timesta
     auto& socket = push.target().is_ipv4() ? push_ipv4_ : push_ipv6_;
     if (!socket) continue;
     for (const std::string& json : push.datagrams(poses)) {
-      send(*socket, json, push.target());
+      if (!socket->send_to(bytes_of(json), push.target())) ++unsent_;
       ++pushed_;
     }
   }
@@ -151,8 +155,20 @@ std::vector<std::pair<std::string, std::uint64_t>> SubscriptionServer::counters(
   return totals;
 }
 
-void SubscriptionServer::send(UdpSocket& socket, const std::string& json, const Endpoint& to) {
-  if (!socket.send_to(bytes_of(json), to)) ++unsent_;
+/// A machine has few addresses, but all of 127.0.0.0/8 are its own: the answer to one beyond comes
+/// from whichever the system chooses.
+std::size_t SubscriptionServer::index_of(const Way& way) {
+  constexpr std::size_t kMost = 64;
+  const auto found = std::ranges::find(ways_, way);
+  if (found == ways_.end() && way.own && ways_.size() >= kMost) return index_of({way.socket});
+  if (found == ways_.end()) return ways_.push_back(way), ways_.size() - 1;
+  return static_cast<std::size_t>(found - ways_.begin());
+}
+
+/// A client hears only the address that it asked.
+void SubscriptionServer::send(std::size_t way, const std::string& json, const Endpoint& to) {
+  const auto& [socket, own] = ways_.at(way);
+  if (!sockets_[socket].send_to(bytes_of(json), to, own)) ++unsent_;
 }
 
 }  // namespace crepes

@@ -45,7 +45,15 @@ class SubscriptionServer {
   // Both return what failed.
   [[nodiscard]] std::string open_listen();
   [[nodiscard]] std::string open_push();
-  void send(UdpSocket& socket, const std::string& json, const Endpoint& to);
+  /// How a request came. Subscribers refer to it by its index.
+  struct Way {
+    std::size_t socket = 0;
+    std::optional<Endpoint> own{};  ///< which of this machine's addresses, if the socket serves all
+
+    [[nodiscard]] bool operator==(const Way&) const = default;
+  };
+  [[nodiscard]] std::size_t index_of(const Way& way);
+  void send(std::size_t way, const std::string& json, const Endpoint& to);
 
   RobotId self_;
   std::map<RobotId, std::string> names_;
@@ -53,6 +61,8 @@ class SubscriptionServer {
   std::uint16_t port_;
   std::vector<std::string> unserved_;  ///< addresses of `listen` without a socket
   std::vector<UdpSocket> sockets_;
+  std::vector<Way> ways_;
+  std::vector<PushConfig> push_configs_;
   std::vector<PosePush> pushes_;
   std::optional<UdpSocket> push_ipv4_;
   std::optional<UdpSocket> push_ipv6_;

@@ -129,7 +129,8 @@ SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::ui
                                  {"hot", rejected.hot},
                                  {"huge", rejected.huge},
                                  {"faint", rejected.faint},
-                                 {"surplus", rejected.surplus}}};
+                                 {"surplus", rejected.surplus},
+                                 {"cut", rejected.cut}}};
   levels.append_since_last_call(totals.counts);
   append_exposure(exposure, totals.counts);
   return totals;

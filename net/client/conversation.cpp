@@ -63,7 +63,18 @@ void Conversation::ask(const Requests& requests) {
     periodic_.push_back({poll_request(poll), Seconds(poll.period_s), Time{}});
 }
 
-bool Conversation::is_silent(Time now) const { return !heard_ || now - *heard_ > kSilence; }
+/// Polls that are rarer than the silence are answered as rarely.
+bool Conversation::is_silent(Time now) const {
+  constexpr double kLate = 1.5;
+  Seconds patience(kSilence);
+  if (!periodic_.empty()) {
+    const auto often =
+        std::min_element(periodic_.begin(), periodic_.end(),
+                         [](const Periodic& a, const Periodic& b) { return a.period < b.period; });
+    patience = std::max(patience, kLate * often->period);
+  }
+  return !heard_ || now - *heard_ > patience;
+}
 
 std::vector<std::string> Conversation::due(Time now) {
   std::vector<std::string> datagrams;

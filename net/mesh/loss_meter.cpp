@@ -21,11 +21,13 @@ void LossMeter::update_forwarded(std::uint64_t missing, std::uint32_t sequence,
 }
 
 void LossMeter::add(std::int64_t lost) {
-  constexpr double kMemory = 0.98;  // two seconds of 25 datagrams each
+  constexpr double kMemory = 0.98;      // two seconds of 25 datagrams each
+  constexpr double kLongestGap = 50.0;  // so that a long absence is soon forgotten
   lost_ += lost;
   received_weight_ = kMemory * received_weight_ + 1;
   // One that arrives late is no longer lost.
-  lost_weight_ = std::max(0.0, kMemory * lost_weight_ + static_cast<double>(lost));
+  const double gap = std::min(static_cast<double>(lost), kLongestGap);
+  lost_weight_ = std::max(0.0, kMemory * lost_weight_ + gap);
   share_ = lost_weight_ / (lost_weight_ + received_weight_);
 }
 

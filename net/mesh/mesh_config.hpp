@@ -24,8 +24,9 @@ struct NetConfig {
   void visit(Visitor& v) {
     v.field("interface", interface, "mesh interface to broadcast on; lo reaches this machine only");
     v.field("port", port, Bounds{1, 65535}, "UDP port of peer traffic");
-    v.field("report_rate_hz", report_rate_hz, Bounds{1, 200},
-            "reports per second, and datagrams as long as the air suffices");
+    v.field("report_rate_hz", report_rate_hz, Bounds{4, 200},
+            "reports per second, and datagrams as long as the air suffices; at most "
+            "estimator.output_rate_hz");
     v.field("airtime_of_all", airtime_of_all, Bounds{0.01, 1.0},
             "share of the channel's time that all robots that hear each other may take together; "
             "each takes an equal part, and never more than 9.5 kB/s and 0.1 kB/s a neighbor");

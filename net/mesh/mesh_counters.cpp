@@ -79,8 +79,12 @@ MeshCounter counter_of(UnsealError error) {
 
 std::uint64_t MeshCounters::seal_refusals() const {
   const MeshCounters& totals = *this;
-  return totals[kRefusedSealBroken] + totals[kRefusedSealMissing] + totals[kRefusedSealUnexpected] +
-         totals[kRefusedSealVersion];
+  return totals[kRefusedSealBroken] + totals[kRefusedSealMissing] + totals[kRefusedSealUnexpected];
+}
+
+std::uint64_t MeshCounters::version_refusals() const {
+  const MeshCounters& totals = *this;
+  return totals[kRefusedSealVersion] + totals[kRefusedOtherVersion];
 }
 
 std::uint64_t MeshCounters::signature_refusals() const {

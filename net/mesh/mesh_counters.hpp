@@ -82,6 +82,8 @@ class MeshCounters {
   }
   /// Datagrams that were refused because of their seal or for want of one.
   [[nodiscard]] std::uint64_t seal_refusals() const;
+  /// The same because they are of another version of this project.
+  [[nodiscard]] std::uint64_t version_refusals() const;
   /// The same for their signature.
   [[nodiscard]] std::uint64_t signature_refusals() const;
   /// By name; counters at zero are left out.

@@ -42,7 +42,7 @@ class SignatureLimiter {
     RobotId sender{};
     std::array<std::uint8_t, 16> address{};
     TokenBucket bucket{kSourceRate};
-    Timestamp last_accepted{};
+    Timestamp last_accepted = kNever;
   };
 
   [[nodiscard]] std::vector<Source>::iterator find(const Endpoint& from, RobotId sender);

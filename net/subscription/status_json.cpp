@@ -251,8 +251,8 @@ std::string fitted(Json status) {
   using Cut = void (*)(Json&);
   constexpr std::array<Cut, 16> kCuts{
       [](Json& s) { erase_in_each(s, "sensors", "counts"); },
-      [](Json& s) { erase_in_each(s, "neighbors", "measured"); },
       [](Json& s) { erase_in_each(s, "neighbors", "measurements"); },
+      [](Json& s) { erase_in_each(s, "neighbors", "measured"); },
       [](Json& s) { s.erase("network"); },
       [](Json& s) { s.erase("mesh"); },
       [](Json& s) {

@@ -55,4 +55,8 @@ struct SystemStatus {
   std::vector<std::pair<std::string, std::uint64_t>> network;  ///< datagrams and refusals by reason
 };
 
+/// The estimator receives reports of a robot once its clock is known. Where datagrams arrive and
+/// the clock is unknown, that is the reason, and not that the robot was never heard.
+void name_unknown_clocks(SystemStatus& status);
+
 }  // namespace crepes

@@ -154,6 +154,72 @@ TEST_F(Record, HasTheClocksInCaseItIsKilled) {
   EXPECT_EQ(recorded->end_reason, "ended");
 }
 
+TEST_F(Record, CanBeReplayedThoughASensorWasSilent) {
+  Config config = recorded_config(1);
+  config.uwb.noise.max_range_m = 1.0;  // nobody is so near
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+
+  const auto recorded = record(options(config, 1.0));
+
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  const auto dataset = load_swarm(options(config, 0).dir);
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  EXPECT_TRUE(dataset->robots.at(0).ranges.empty());
+  EXPECT_GT(dataset->robots.at(0).imu.size(), 50U);
+}
+
+TEST_F(Record, NamesItsFolderThoughTheRobotGetsAnotherName) {
+  const Config config = recorded_config(1);
+  Runtime runtime(config, machine_);
+  await_socket(config);
+  RecordOptions wanted = options(config, to_seconds(kPatience));
+  int configurations = 0;
+  wanted.on_config = [&](const Config&) { ++configurations; };
+  wanted.on_rows = [&](const std::string&, std::string_view) {
+    if (configurations != 1) return;
+    Config renamed = config;
+    renamed.swarm.members.at(0).name = "renamed";
+    (void)runtime.reconfigure(renamed);
+  };
+  wanted.is_enough = [&] { return configurations > 1; };
+
+  const auto recorded = record(wanted);
+
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  const auto dataset = load_swarm(wanted.dir);
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  EXPECT_EQ(dataset->robots.at(0).robot.name, "renamed");
+}
+
+TEST_F(Record, FailsIfItsFolderIsRemoved) {
+  const Config config = recorded_config(1);
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+  RecordOptions wanted = options(config, to_seconds(kPatience));
+  bool is_removed = false;
+  wanted.on_progress = [&](const RecordProgress& progress) {
+    if (progress.rows > 100 && !std::exchange(is_removed, true)) fs::remove_all(wanted.dir);
+  };
+
+  const auto recorded = record(wanted);
+
+  ASSERT_FALSE(recorded);
+  EXPECT_NE(recorded.error().message.find("was removed"), std::string::npos);
+  EXPECT_FALSE(fs::exists(wanted.dir / "swarm.yaml"));
+}
+
+TEST_F(Record, ListensAgainWhereItsSocketWas) {
+  const Config config = recorded_config(1);
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+  fs::remove(config.recording.socket);
+
+  await_socket(config);
+
+  EXPECT_TRUE(connect_unix(config.recording.socket));
+}
+
 TEST_F(Record, WritesPicturesThatTheDataSetReaderFinds) {
   const Config config = recorded_config(1);
   const Runtime runtime(config, machine_);

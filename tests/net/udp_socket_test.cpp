@@ -146,6 +146,26 @@ TEST(UdpSocket, ReachesTheNetworkOfItsInterfaceAndNothingElse) {
   if (!is_permitted) GTEST_SKIP() << "needs root and ip(8) for a network of its own";
 }
 
+TEST(UdpSocket, AnswersFromTheAddressThatWasAsked) {
+  for (const auto& [all, asked] : {std::pair("0.0.0.0", "127.0.0.7"), std::pair("::", "::1"),
+                                   std::pair("127.0.0.8", "127.0.0.8")}) {
+    auto server = UdpSocket::bind(all, 0);
+    auto client = UdpSocket::bind(all[0] == ':' ? "::1" : "127.0.0.1", 0);
+    if (!server && all[0] == ':') continue;  // a machine without IPv6
+    ASSERT_TRUE(server && client);
+    const Endpoint at = Endpoint::parse(asked, server->local().port).value();
+    ASSERT_TRUE(client->send_to(kBytes, at));
+    const auto request = server->receive(milliseconds{1000});
+    ASSERT_TRUE(request && *request);
+
+    ASSERT_TRUE(server->send_to(kBytes, (*request)->from, (*request)->to));
+
+    const auto answer = client->receive(milliseconds{1000});
+    ASSERT_TRUE(answer && *answer);
+    EXPECT_EQ((*answer)->from.to_string(), at.to_string()) << all;
+  }
+}
+
 // On a link of its own that passes a kilobyte a second.
 TEST(UdpSocket, DistinguishesACongestedLinkFromABrokenOne) {
   bool is_permitted = false;

@@ -1,8 +1,12 @@
 #include "daemon/stages/mesh_socket.hpp"
 
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <chrono>
+#include <cstdlib>
+#include <thread>
+#include <vector>
 
 #include "config/keys/mesh_key.hpp"
 #include "daemon/service/logging.hpp"
@@ -59,6 +63,57 @@ TEST(MeshSocket, IsWellOnceOpenThoughNothingIsSent) {
   EXPECT_NE(mesh.get(Timestamp{milliseconds{100}}), nullptr);
 
   EXPECT_EQ(mesh.fault(), "");
+}
+
+// As where DHCP answers after the robot gave itself an address.
+TEST(MeshSocket, FollowsItsInterfaceToAnotherAddress) {
+  const auto run = [](const char* command) {
+    return std::system(command);  // NOLINT(concurrency-mt-unsafe)
+  };
+  const LogSession log(LogLevel::kError);
+  bool is_permitted = false;
+  std::thread([&] {
+    is_permitted = ::unshare(CLONE_NEWNET) == 0 &&
+                   run("ip link add mesh0 type veth peer mesh1 && ip link set mesh0 up && "
+                       "ip address add 169.254.5.6/16 dev mesh0") == 0;
+    if (!is_permitted) return;
+    NetConfig config;
+    config.interface = "mesh0";
+    MeshSocket mesh(config);
+    Timestamp now{};
+    ASSERT_NE(mesh.get(now), nullptr);
+    mesh.follow_address(now);
+    EXPECT_GE(mesh.descriptor(), 0) << "the same address";
+    ASSERT_EQ(run("ip address delete 169.254.5.6/16 dev mesh0 && "
+                  "ip address add 192.168.7.1/24 dev mesh0"),
+              0);
+
+    mesh.follow_address(now);
+
+    ASSERT_NE(mesh.get(now), nullptr);
+    EXPECT_EQ(mesh.get(now)->local().to_string(), "192.168.7.255:47474");
+    EXPECT_EQ(mesh.fault(), "");
+    ASSERT_EQ(run("ip address delete 192.168.7.1/24 dev mesh0"), 0);
+    mesh.follow_address(now);
+    EXPECT_NE(mesh.fault().find("no IPv4 address"), std::string::npos) << mesh.fault();
+  }).join();
+  if (!is_permitted) GTEST_SKIP() << "needs root and ip(8) for a network of its own";
+}
+
+TEST(KeyMismatchMonitor, NamesAnotherVersion) {
+  const LogSession log(LogLevel::kError);
+  PeerLink other(RobotId{2}, {RobotId{1}});
+  PeerLink link(RobotId{1}, {RobotId{2}});
+  Report report;
+  report.sender = RobotId{2};
+  std::vector<std::uint8_t> datagram = other.compose(report, Timestamp{}, {}, {});
+  ++datagram.at(3);  // the version
+  KeyMismatchMonitor monitor;
+  (void)link.receive(datagram, Timestamp{}, {}, Endpoint::ipv4({10, 0, 0, 2}, 47474));
+
+  monitor.update(link);
+
+  EXPECT_NE(monitor.fault().find("version"), std::string::npos);
 }
 
 }  // namespace

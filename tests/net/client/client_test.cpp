@@ -198,6 +198,19 @@ TEST(Conversation, RepeatsEachPollInItsOwnPeriod) {
   EXPECT_FALSE(conversation.farewell());
 }
 
+TEST(Conversation, RepeatsARarePollOnceWhereNothingElseIsHeard) {
+  Conversation conversation({.watch = false, .polls = {{.period_s = 5.0}}});
+  int asked = 0;
+  for (auto t = 0ms; t < 60s; t += 10ms) {
+    for (const std::string& request : conversation.due(kStart + t)) {
+      (void)request;
+      ++asked;
+      (void)conversation.take(R"({"class":"ERROR","message":"x"})", kStart + t);
+    }
+  }
+  EXPECT_LE(asked, 13);  // one more before the first answer
+}
+
 TEST(Conversation, EchoesTheCookieAtOnceInEveryRequest) {
   Conversation conversation({.polls = {{.peer = 3}}});
   const std::string cookie = cookie_json("0123456789abcdef");

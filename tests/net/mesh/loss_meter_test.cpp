@@ -22,6 +22,16 @@ TEST(LossMeter, ADatagramThatArrivesLateIsNotLost) {
   EXPECT_NEAR(meter.share(), 0.0, 0.01);
 }
 
+TEST(LossMeter, ForgetsALongAbsenceInSeconds) {
+  LossMeter meter;
+  for (int i = 0; i < 100; ++i) meter.update(0);
+
+  for (int i = 0; i < 50; ++i) meter.update(90'000);  // an hour, then two seconds
+
+  EXPECT_LT(meter.share(), 0.3);
+  EXPECT_EQ(meter.lost(), 90'000U);
+}
+
 TEST(LossMeter, WhatIsNotForwardedIsNotLost) {
   LossMeter meter;
   for (std::uint32_t n = 0; n < 100; ++n) meter.update_forwarded(std::uint64_t{5} * n, 6 * n, 6);

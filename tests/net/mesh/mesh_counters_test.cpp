@@ -42,7 +42,8 @@ TEST(MeshCounters, AddUpWhatWasRefusedForItsSealOrItsSignature) {
   counters.add(MeshCounter::kRefusedSignatureWrong);
   counters.add(MeshCounter::kRefusedSignatureMissing);
 
-  EXPECT_EQ(counters.seal_refusals(), 4U);
+  EXPECT_EQ(counters.seal_refusals(), 3U);
+  EXPECT_EQ(counters.version_refusals(), 1U);
   EXPECT_EQ(counters.signature_refusals(), 2U);
   EXPECT_EQ(name_of(counter_of(UnsealError::kNotSealed)), "refused_seal_missing");
   EXPECT_EQ(name_of(counter_of(UnsealError::kOtherVersion)), "refused_seal_version");
