@@ -50,6 +50,7 @@ bool CsvFile::next(DatasetFaults& faults) {
     }
     const std::string_view row(text_.data() + position_, end - position_);
     position_ = end + 1;
+    if (trimmed(row).empty()) continue;
     const std::size_t found = split(row);
     if (found == columns_) return true;
     faults.add(path_, line_, "wrong number of columns",

@@ -65,6 +65,8 @@ Result<void> RobotFolder::append_to(const fs::path& file, std::string_view heade
     out.open(file, std::ios::binary);
     out << header;
     bytes_ += header.size();
+  } else if (std::error_code status; !fs::exists(file, status)) {
+    return fail(ErrorCode::kIo, file.string() + ": was removed while it was written");
   }
   out << text << std::flush;
   bytes_ += text.size();

@@ -6,9 +6,11 @@
 //   id_study foreign [N]     IDs given to boards of other libraries, N boards of 20 s each
 //   id_study cameras [N]     time from first light to ID by frame rate and slot
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <string>
 
 #include "estimator/vision/codebook.hpp"
 #include "tests/support/blinking.hpp"
@@ -155,8 +157,8 @@ void study_lamps(std::size_t n) {
     std::fflush(stdout);
   };
   count("steady", [] { return Light([](Duration, Duration) { return 1.0; }); });
-  for (const double hz : {100.0, 120.0})
-    count(hz == 100.0 ? "mains 50 Hz" : "mains 60 Hz", [&, hz] {
+  for (const double hz : {50.0, 60.0, 100.0, 120.0})
+    count(("flashes at " + std::to_string(std::lround(hz)) + " Hz").c_str(), [&, hz] {
       return test::mains_lamp(hz * uniform(random, 0.998, 1.002), uniform(random, 0.1, 0.95),
                               uniform(random, 0, 1));
     });

@@ -288,6 +288,10 @@ TEST(ToolsAlone, RefuseNumbersThatAreNone) {
     EXPECT_NE(ending.errors.find("is no number"), std::string::npos) << ending.errors;
   }
   EXPECT_EQ(crepesctl({"exposure", "--exposure-us", "300", "--pid=-1"}).how, "exit code 2");
+  for (const char* seed : {"--seed=-1", "--seed=99999999999999999999"}) {
+    EXPECT_EQ(crepesctl({"replay", "swarm", "--out", "results", seed}).how, "exit code 2") << seed;
+    EXPECT_EQ(crepesctl({"codebook", seed}).how, "exit code 2") << seed;
+  }
 }
 
 TEST(ToolsAlone, NameTheNearestSubcommand) {

@@ -12,6 +12,7 @@
 
 #include "daemon/ctl/replay/virtual_swarm.hpp"
 #include "tests/faults/network_faults.hpp"
+#include "tests/faults/sensor_faults.hpp"
 #include "tests/study/crowd.hpp"
 #include "tests/support/heap.hpp"
 
@@ -39,6 +40,21 @@ std::vector<Fault> attacks(std::size_t robots, double from_s) {
                       .to_s = begin_s + kEach_s,
                       .rate = 0.5,
                       .seed = turn});
+  }
+  return faults;
+}
+
+/// The light goes out for everybody for four seconds, so that boards come back where poses put
+/// them.
+std::vector<Fault> blackout(std::size_t robots, double from_s) {
+  std::vector<Fault> faults;
+  for (std::size_t i = 1; i <= robots; ++i) {
+    faults.push_back({.kind = Kind::kCameraBlack,
+                      .robot = RobotId{static_cast<std::uint16_t>(i)},
+                      .from_s = from_s + 0.5 * kPiece_s,
+                      .to_s = from_s + 0.5 * kPiece_s + 4.0,
+                      .rate = 1.0,
+                      .seed = i});
   }
   return faults;
 }
@@ -92,6 +108,10 @@ int fly(std::size_t robots, double hours) {
     network(from, to, sent_s, deliveries);
   };
   sinks.on_report = [&](Report& report) { (*liars)(now_s, report); };
+  std::optional<SensorFaults> sensors;
+  sinks.on_reading = [&](RobotId robot, double true_s, Event& event) {
+    return (*sensors)(robot, true_s, event);
+  };
   ReplayOptions options;
   options.sealed = true;
   const std::optional<SwarmTruth> no_truth;
@@ -102,6 +122,7 @@ int fly(std::size_t robots, double hours) {
     const std::vector<Fault> faults = attacks(robots, from_s);
     network.strike(faults);
     liars.emplace(faults);
+    sensors.emplace(blackout(robots, from_s));
     flight.append(swarm.dataset, from_s);
     const double end_s = from_s + kPiece_s + kPause_s;
     for (; now_s < end_s; now_s += 1.0)

@@ -12,6 +12,7 @@
 
 #include "config/reading/spelling.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
+#include "drivers/base/number_text.hpp"
 
 namespace crepes {
 namespace {
@@ -20,7 +21,7 @@ constexpr int kBarColumns = 79;
 
 }  // namespace
 
-void require_finite_numbers(CLI::App& app) {
+void check_numbers(CLI::App& app) {
   const CLI::Validator finite(
       [](const std::string& text) {
         double number = 0.0;
@@ -28,9 +29,18 @@ void require_finite_numbers(CLI::App& app) {
         return is_wrong ? text + " is no number" : std::string();
       },
       "");
-  for (CLI::Option* option : app.get_options())
+  const CLI::Validator natural(
+      [](const std::string& text) {
+        std::uint64_t number = 0;
+        const std::string_view wrong = parse_number(text, number);
+        return wrong.empty() ? std::string() : fmt::format("{}: {}", text, wrong);
+      },
+      "");
+  for (CLI::Option* option : app.get_options()) {
     if (option->get_type_name().starts_with("FLOAT")) option->check(finite);
-  for (CLI::App* sub : app.get_subcommands({})) require_finite_numbers(*sub);
+    if (option->get_type_name().starts_with("UINT")) option->check(natural);
+  }
+  for (CLI::App* sub : app.get_subcommands({})) check_numbers(*sub);
 }
 
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon) {

@@ -64,9 +64,9 @@ void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<
       ->check(CLI::IsMember(names));
 }
 
-/// Refuses NaN and infinity as numbers of all options of `app` and its subcommands: checks of a
-/// range let NaN pass.
-void require_finite_numbers(CLI::App& app);
+/// For all options of `app` and its subcommands, refuses NaN and infinity, which checks of a range
+/// let pass, and whole numbers below zero or above 2^64 - 1, which would be taken for others.
+void check_numbers(CLI::App& app);
 
 /// --address and --port of the daemon.
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon);

@@ -24,7 +24,7 @@ void add_evaluate(CommandLine& line) {
   sub->add_option("--truth", options.swarm, "the data set, with its truth/")->required();
   sub->add_option("--after", options.after_s, "seconds at the start that are not scored")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0.0, 1e6));
   sub->add_option("--against", options.against,
                   "other results of the same data set; both are scored over their common rows");
   add_json_flag(sub, options.json);

@@ -51,7 +51,9 @@ void add_init(CommandLine& line) {
       "Write the configuration of a new robot from what is connected, with a pattern for every "
       "robot; print what to measure. Asks at a terminal for what no option says");
   sub->add_option("--dir", options.dir, "where to write")->capture_default_str();
-  sub->add_option("--id", options.id, "id of this robot")->check(CLI::Range(1, 65534));
+  sub->add_option("--id", options.id,
+                  "id of this robot; without a swarm.yaml, robots have the ids 1 to 64")
+      ->check(CLI::Range(1, 65534));
   sub->add_option("--robots", options.robots,
                   "how many robots the swarm has; if omitted, a swarm.yaml that is there is kept")
       ->check(CLI::Range(2, 64));

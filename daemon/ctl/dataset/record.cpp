@@ -57,8 +57,11 @@ class Recording {
 
   /// swarm.yaml for the measurements so far.
   [[nodiscard]] Result<void> write_manifest(const std::vector<client::Status::Clock>& clocks) {
-    if (!folder_ || first_ > last_) return {};
-    return write_text_file(dir_ / "swarm.yaml", recorded_manifest(config_, first_, last_, clocks));
+    std::error_code status;
+    if (!folder_ || first_ > last_ || !std::filesystem::exists(folder_->path(), status)) return {};
+    const std::string folder = folder_->path().filename().string();  // its name at the beginning
+    return write_text_file(dir_ / "swarm.yaml",
+                           recorded_manifest(config_, folder, first_, last_, clocks));
   }
 
   [[nodiscard]] const Config& config() const { return config_; }
@@ -81,7 +84,17 @@ class Recording {
     ++progress_.configurations;
     if (!folder_) folder_.emplace(dir_ / own_robot_name(config_));
     if (on_config_) on_config_(config_);
-    return folder_->write_config(text);
+    return begin_files().and_then([&] { return folder_->write_config(text); });
+  }
+
+  /// A sensor that is silent throughout has a file, too, so that the data set can be read.
+  [[nodiscard]] Result<void> begin_files() {
+    std::vector<std::string> sensors{"imu0", "uwb0"};
+    for (std::size_t k = 0; k < config_.cameras.size(); ++k)
+      sensors.push_back(fmt::format("cam{}", k));
+    for (const std::string& sensor : sensors)
+      if (auto begun = folder_->append(sensor, ""); !begun) return begun;
+    return {};
   }
 
   [[nodiscard]] Result<void> append_rows(const Block& block) {

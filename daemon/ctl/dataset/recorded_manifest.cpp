@@ -13,23 +13,19 @@ std::string name_of(const SwarmConfig& swarm, RobotId id) {
   return member == swarm.members.end() ? "" : member->name;
 }
 
-SwarmRobot robot_of(const Config& config, RobotId id, const RobotClock& clock) {
-  const std::string name = name_of(config.swarm, id);
-  return {.id = id, .name = name, .dir = name, .clock = clock};
-}
-
 }  // namespace
 
 std::string own_robot_name(const Config& config) { return name_of(config.swarm, config.robot.id); }
 
-std::string recorded_manifest(const Config& config, Timestamp first, Timestamp last,
-                              const std::vector<client::Status::Clock>& clocks) {
+std::string recorded_manifest(const Config& config, const std::string& dir, Timestamp first,
+                              Timestamp last, const std::vector<client::Status::Clock>& clocks) {
   const RobotClock own{to_seconds(first.time_since_epoch()), 0.0};
   SwarmManifest manifest;
   manifest.scenario = "recorded";
   manifest.duration_s = to_seconds(last - first);
   manifest.network = {.latency_ms = 3.0, .jitter_ms = 3.0, .loss = 0.0, .seed = 1};
-  manifest.robots = {robot_of(config, config.robot.id, own)};
+  manifest.robots = {
+      {.id = config.robot.id, .name = own_robot_name(config), .dir = dir, .clock = own}};
   std::string text =
       "# One robot, as crepesctl record wrote it. True time is its own clock, from its first\n"
       "# measurement on. The network was not recorded: latency, jitter and loss are assumptions.\n"
@@ -43,7 +39,9 @@ std::string recorded_manifest(const Config& config, Timestamp first, Timestamp l
     // local = true (1 + skew) + offset, and at `last` local = last + clock.offset_s.
     const double turned_s = manifest.duration_s * clock.skew_ppm * 1e-6;
     const RobotClock peer{own.offset_s + clock.offset_s - turned_s, clock.skew_ppm};
-    text += "# " + robot_text(robot_of(config, RobotId{clock.peer}, peer));
+    const std::string name = name_of(config.swarm, RobotId{clock.peer});
+    text +=
+        "# " + robot_text({.id = RobotId{clock.peer}, .name = name, .dir = name, .clock = peer});
   }
   return text;
 }

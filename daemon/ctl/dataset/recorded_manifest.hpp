@@ -12,10 +12,11 @@ namespace crepes {
 /// The name of this robot among its swarm's members.
 [[nodiscard]] std::string own_robot_name(const Config& config);
 
-/// The text for measurements from `first` to `last` on the robot's clock. True time begins at
-/// `first`. Robots with known clocks (as of `last`) are listed in comments, for users who add the
-/// recordings of those robots.
-[[nodiscard]] std::string recorded_manifest(const Config& config, Timestamp first, Timestamp last,
+/// The text for measurements from `first` to `last` on the robot's clock, in the folder `dir`. True
+/// time begins at `first`. Robots with known clocks (as of `last`) are listed in comments, for
+/// users who add the recordings of those robots.
+[[nodiscard]] std::string recorded_manifest(const Config& config, const std::string& dir,
+                                            Timestamp first, Timestamp last,
                                             const std::vector<client::Status::Clock>& clocks);
 
 }  // namespace crepes

@@ -207,8 +207,8 @@ Result<CameraRecording> read_camera(const fs::path& dir, std::uint8_t index,
   }
   if (has_images) {
     auto images = read_images(images_file, context);
-    if (!images) return tl::unexpected(images.error());
-    camera.images = std::move(*images);
+    if (!images && !has_spots) return tl::unexpected(images.error());
+    if (images) camera.images = std::move(*images);  // else spots suffice
   }
   return camera;
 }

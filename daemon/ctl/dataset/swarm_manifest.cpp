@@ -53,7 +53,7 @@ std::string plain_name(const YAML::Node& parent, const std::string& key) {
 }
 
 SwarmRobot robot_from(const YAML::Node& node) {
-  constexpr double kLongestOffset = 8e9;  // s; nanoseconds of it still fit 64 bits
+  constexpr double kLongestOffset = 3.9e9;  // s; datagrams carry stamps of up to 4e9
   constexpr double kMaxId = 65534.0;
   SwarmRobot robot;
   const double id = number(node, "id", 1.0, kMaxId);

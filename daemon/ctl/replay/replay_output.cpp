@@ -75,6 +75,9 @@ Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names, Deta
                                         ": has a data set; the results of a replay need a "
                                         "directory of their own");
   }
+  if (detail == Detail::kRecords &&
+      std::ranges::any_of(names, [](const auto& entry) { return entry.second == kTeamStem; }))
+    return fail(ErrorCode::kConfig, "a robot named 'team' has the same files as the team");
   ReplayOutput output(dir, std::move(names));
   remove_earlier_replay(dir);
   for (const auto& [observer, observer_name] : output.names_) {
@@ -90,8 +93,6 @@ Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names, Deta
       output.pairs_.emplace(std::pair(observer, neighbor), std::move(*files));
     }
     if (detail == Detail::kPoses) continue;
-    if (std::ranges::any_of(output.names_, [](const auto& e) { return e.second == kTeamStem; }))
-      return fail(ErrorCode::kConfig, "a robot named 'team' has the same files as the team");
     auto files = create_team(dir / observer_name / kTeamStem);
     if (!files) return tl::unexpected(files.error());
     output.teams_.emplace(observer, std::move(*files));
@@ -149,13 +150,17 @@ void ReplayOutput::write(RobotId observer, const NeighborPose& pose) {
 }
 
 void ReplayOutput::write(RobotId observer, const Records& records) {
+  // Members that were not recorded are measured, too.
+  const auto is_recorded = [&](const auto& record) { return names_.contains(record.neighbor); };
   for (const MeasurementRecord& record : records.measurements) {
+    if (!is_recorded(record)) continue;
     auto& files = files_of(observer, record.neighbor).records;
     CREPES_EXPECT(files.has_value(), "records for an output that takes poses only");
     append_innovation_row(files->innovations.text(), record);
     files->innovations.flush_if_large();
   }
   for (const CalibrationRecord& record : records.calibrations) {
+    if (!is_recorded(record)) continue;
     auto& files = files_of(observer, record.neighbor).records;
     CREPES_EXPECT(files.has_value(), "records for an output that takes poses only");
     if (files->last_calibration && record.stamp - *files->last_calibration < kCalibrationPeriod)

@@ -61,8 +61,12 @@ Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
   std::optional<SwarmTruth> truth;  // judges IDs for the report; no estimator sees it
   if (std::filesystem::exists(options.swarm_dir / "truth")) {
     auto loaded = SwarmTruth::load(options.swarm_dir, dataset->manifest);
-    if (!loaded) return tl::unexpected(loaded.error());
-    truth = std::move(*loaded);
+    if (!loaded && options.reach_m > 0) return tl::unexpected(loaded.error());
+    if (loaded) {
+      truth = std::move(*loaded);
+    } else {
+      dataset->faults.add(options.swarm_dir / "truth", 0, "not used", loaded.error().message);
+    }
   }
   if (options.reach_m > 0 && !truth)
     return fail(ErrorCode::kConfig, "who is in reach of whom is known by truth/, which is missing");

@@ -26,8 +26,7 @@ VirtualRobot::VirtualRobot(RobotRecording recorded, bool sealed)
     : recording(std::move(recorded)),
       estimator(estimator_settings(recording.config)),
       link(new_link()),
-      detector(recording.config.vision),
-      period(from_seconds(1.0 / recording.config.estimator.output_rate_hz)) {
+      detector(recording.config.vision) {
   if (!sealed) return;
   for (MemberConfig& member : recording.config.swarm.members)
     member.public_key = to_text(public_key_of(replay_robot_key(member.id)));

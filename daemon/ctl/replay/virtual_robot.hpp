@@ -18,6 +18,9 @@
 
 namespace crepes {
 
+/// Between poses, whatever rate the robot is configured for: what a replay writes is at 50 Hz.
+inline constexpr Duration kReplayTick{20'000'000};
+
 /// A datagram that reaches a robot.
 struct VirtualDatagram {
   std::vector<std::uint8_t> bytes;
@@ -77,7 +80,6 @@ struct VirtualRobot {
   MeshTrust trust;
   PeerLink link;
   SpotDetector detector;
-  Duration period;         ///< of its ticks, also after a reload
   Duration clock_shift{};  ///< what its clock is ahead of the recorded one
   State state = State::kOn;
   std::deque<VirtualInput> held;  ///< while it is frozen; as many as the daemon's queue holds

@@ -105,9 +105,8 @@ void VirtualSwarm::schedule_recording(std::size_t index) {
     }
   }
   if (recording.imu.empty()) return;
-  const Duration period = robots_[index].period;
   const Timestamp end = recording.imu.back().stamp;
-  for (Timestamp t = recording.imu.front().stamp; t <= end; t += period) {
+  for (Timestamp t = recording.imu.front().stamp; t <= end; t += kReplayTick) {
     schedule_at(t, index, Event(Tick{t}));
   }
   std::vector<ImuSample>().swap(recording.imu);  // what is scheduled is not kept twice

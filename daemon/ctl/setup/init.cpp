@@ -162,6 +162,11 @@ class Interview {
   /// Robots 1 to n, with the shortest patterns that a camera can distinguish.
   std::vector<MemberConfig> new_members(RobotId self) {
     constexpr double kMostRobots = 64;
+    if (self.value > kMostRobots) {
+      throw Unanswered{{ErrorCode::kUsage,
+                        fmt::format("id {}: ids above {} need a swarm.yaml: crepesctl codebook",
+                                    self.value, kMostRobots)}};
+    }
     const auto least = std::max<double>(2.0, self.value);
     const double count =
         options_.robots ? static_cast<double>(*options_.robots)

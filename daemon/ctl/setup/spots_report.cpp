@@ -36,12 +36,13 @@ Json to_json(const Rejected& rejected) {
   return {{"hot", rejected.hot},
           {"huge", rejected.huge},
           {"faint", rejected.faint},
-          {"surplus", rejected.surplus}};
+          {"surplus", rejected.surplus},
+          {"cut", rejected.cut}};
 }
 
 std::string to_text(const Rejected& rejected) {
-  return fmt::format("{} hot pixels, {} huge, {} faint, {} surplus", rejected.hot, rejected.huge,
-                     rejected.faint, rejected.surplus);
+  return fmt::format("{} hot pixels, {} huge, {} faint, {} surplus, {} cut by the border",
+                     rejected.hot, rejected.huge, rejected.faint, rejected.surplus, rejected.cut);
 }
 
 double mean_spots(const SpotsSummary& summary) {

@@ -232,6 +232,22 @@ TEST(ReplayOutput, WritesRecordsWhenAskedAndTakesThemAwayWhenNot) {
   EXPECT_FALSE(fs::exists(file));
 }
 
+TEST(ReplayOutput, LeavesOutWhatIsMeasuredOfAMemberThatWasNotRecorded) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const ReplayOutput::Names names{{RobotId{1}, "r1"}, {RobotId{2}, "r2"}};
+  auto output = ReplayOutput::create(scratch.path(), names, ReplayOutput::Detail::kRecords);
+  MeasurementRecord of_another = a_measurement();
+  of_another.neighbor = RobotId{3};
+  CalibrationRecord its_calibration = a_calibration();
+  its_calibration.neighbor = RobotId{3};
+
+  output->write(RobotId{1}, Records{.measurements = {of_another, a_measurement()},
+                                    .calibrations = {its_calibration}});
+
+  ASSERT_TRUE(output->finish({}));
+  EXPECT_EQ(read_innovation_file(scratch.path() / "r1/r2.innovations.csv")->size(), 1U);
+}
+
 TEST(PoseFile, ReadsBackEveryBit) {
   const ScratchDirectory scratch = ScratchDirectory::create({}).value();
 
