@@ -24,6 +24,7 @@ struct TeamPose {
   /// Of the motion, and of the IMUs' biases: gyroscope and accelerometer of B, then of N.
   Covariance covariance = Covariance::Zero();
   Timestamp last_sighting{};   ///< when anybody saw it, or it anybody, or ranges located it
+  Timestamp since = kNever;    ///< it was placed anew then
   Duration clock_ahead{};      ///< its sensors' stamps are so much ahead of this robot's
   bool needs_witness = false;  ///< not to be used unless another estimate of it agrees
 

@@ -38,7 +38,7 @@ struct GraphConfig {
              "paper's profile always uses pose_graph");
     v.field("team_size", team_size, Bounds{3, 50},
             "robots that team_filter estimates jointly; its cost grows with the cube");
-    v.field("rate_hz", rate_hz, Bounds{5, 100}, "solutions per second");
+    v.field("rate_hz", rate_hz, Bounds{5, 20}, "solutions per second");
     v.choice("cost", cost, kGraphCosts, "lie: weighted by covariance; paper: ||T X^-1 X - I||_F^2");
     v.field("kernel_scale", kernel_scale, Bounds{0.1, 100},
             "residual norm [sigmas] above which the robust kernel reduces the weight");

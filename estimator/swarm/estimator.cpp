@@ -367,6 +367,7 @@ Outputs Estimator::State::handle(const Tick& tick) {
     return {};
   }
   last_tick = tick.stamp;
+  team_log.expire(tick.stamp);
 
   Outputs outputs;
   std::vector<NeighborEstimate> estimates;

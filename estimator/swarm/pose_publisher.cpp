@@ -95,7 +95,7 @@ std::optional<NeighborPose> PosePublisher::graph_corrected_pose() const {
   NeighborPose corrected = *pose_;
   corrected.T_B_N = {perturbed(pose_->T_B_N.pose, correction_->step), correction_->covariance};
   corrected.sources.graph = true;
-  return corrected;
+  return is_certain(corrected.T_B_N.covariance) ? corrected : pose_;
 }
 
 void PosePublisher::update_team(Timestamp now, const RobotState& self, const RobotState& neighbor,
@@ -106,6 +106,8 @@ void PosePublisher::update_team(Timestamp now, const RobotState& self, const Rob
   const TeamPose team =
       predicted(team_->pose, {self.imu, neighbor.imu, team_->bias_B, team_->bias_N}, team_->stamp,
                 stamp, noise_);
+  // Where it is the only one, a robot that the team placed anew is a jump.
+  if (std::exchange(team_since_, team_->pose.since) != team_->pose.since && !pose_) ++starts_;
   const auto is_recent = [&](Timestamp t) { return stamp - t <= recent_; };
   const bool team_sees = team_->stamp - team.last_sighting <= recent_;
   const Timestamp sighted = std::max(last.seen, last.seen_by);

@@ -40,7 +40,10 @@ class PosePublisher {
   void add_graph_correction(Timestamp stamp, const GraphPose& pose);
   /// Replaces the former one.
   void add_team_pose(TeamEstimate estimate) { team_ = std::move(estimate); }
-  void end_team_pose() { team_.reset(); }
+  void end_team_pose() {
+    team_.reset();
+    team_pose_.reset();
+  }
   /// Carries the newest team pose to now.
   void update_team(Timestamp now, const RobotState& self, const RobotState& neighbor,
                    const LastContact& last);
@@ -81,6 +84,7 @@ class PosePublisher {
   ProcessNoise noise_;
   double pose_gate_ = 0.0;
   std::optional<TeamEstimate> team_;
+  Timestamp team_since_ = kNever;          ///< what the team's pose goes back to
   std::optional<NeighborPose> team_pose_;  ///< at the last tick
 };
 

@@ -29,6 +29,11 @@ void TeamLog::add(const TeamSolution& solution) {
   faults_ = solution.faults;
 }
 
+void TeamLog::expire(Timestamp now) {
+  constexpr Duration kLife = std::chrono::seconds{2};
+  if (stamp_ && now - *stamp_ > kLife) faults_.clear();
+}
+
 std::vector<TeamFault> TeamLog::faults_of(RobotId robot) const {
   std::vector<TeamFault> of_robot;
   std::ranges::copy_if(faults_, std::back_inserter(of_robot),

@@ -15,6 +15,8 @@ class TeamLog {
   /// In the order of their stamps.
   void add(const TeamSolution& solution);
   void clear() { *this = TeamLog(); }
+  /// Forgets faults that no later solution has confirmed: a team that is none any more has none.
+  void expire(Timestamp now);
 
   /// By the latest solution.
   [[nodiscard]] std::vector<TeamFault> faults_of(RobotId robot) const;

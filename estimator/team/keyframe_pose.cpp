@@ -49,6 +49,7 @@ TeamPose keyframe_pose(const TeamBelief& belief, RobotId id, const TeamMember& m
                           (robot.motion.q_F_B * so3_exp(tau * w)).normalized()},
                 .v_B_N = v,
                 .last_sighting = std::max(robot.last_sighting, robot.last_fix),
+                .since = robot.since,
                 .clock_ahead = from_seconds(tau)};
   pose.covariance.topLeftCorner<kStates, kStates>() = 0.5 * (of_motion + of_motion.transpose());
   pose.covariance.topRightCorner<kStates, kBiases>() = with_biases;

@@ -274,10 +274,13 @@ void TeamFilter::add_members(const TeamInterval& interval, RobotId first, bool a
   std::map<RobotId, TeamPlace> known;
   for (const auto& [id, robot] : belief_.robots)
     if (are_placed || id == belief_.self) known[id] = TeamPlace::of(belief_, id);
+  std::set<RobotId> liars;
+  for (const TeamFault& fault : estimates_.faults()) liars.insert(fault.robot);
+  liars.erase(interval.self);  // without its own estimates there is no chain
   std::set<RobotId> unplaced;
   for (const auto& [id, robot] : belief_.robots)
     if (!known.contains(id)) unplaced.insert(id);
-  for (const auto& [id, place] : places_by_chains(known, candidates, interval)) {
+  for (const auto& [id, place] : places_by_chains(known, candidates, liars, interval)) {
     const std::size_t reserved = first != RobotId{} && first != id ? 1 : 0;
     unplaced.erase(id);
     if (belief_.robots.contains(id)) {

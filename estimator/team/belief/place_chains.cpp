@@ -35,6 +35,7 @@ Matrix6d start_floor() {
 
 std::vector<std::pair<RobotId, TeamPlace>> places_by_chains(std::map<RobotId, TeamPlace> known,
                                                             std::map<RobotId, TeamPlace> candidates,
+                                                            const std::set<RobotId>& liars,
                                                             const TeamInterval& interval) {
   const auto add_candidates_from = [&](RobotId id) {
     const TeamPlace& via = known.at(id);
@@ -42,7 +43,7 @@ std::vector<std::pair<RobotId, TeamPlace>> places_by_chains(std::map<RobotId, Te
       const bool is_forward = edge.from == id;
       const RobotId other = is_forward ? edge.to : edge.from;
       if ((!is_forward && edge.to != id) || known.contains(other) ||
-          interval.member(other) == nullptr || !is_usable(edge))
+          interval.member(other) == nullptr || !is_usable(edge) || liars.contains(edge.from))
         continue;
       const TeamPlace place = beyond(via, edge, is_forward, interval.self);
       const auto [best, is_first] = candidates.try_emplace(other, place);

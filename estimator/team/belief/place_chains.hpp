@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -19,9 +20,10 @@ inline constexpr double kStartAttitude = radians(1.0);  // rad
 [[nodiscard]] Matrix6d start_floor();
 
 /// Members of the interval that are not known, each by the most certain chain of estimates, the
-/// most certain first. Candidates are known without an estimate, but not better than by a chain.
+/// most certain first. Candidates are known without an estimate, but not better than by a chain. No
+/// chain uses what `liars` estimate.
 [[nodiscard]] std::vector<std::pair<RobotId, TeamPlace>> places_by_chains(
     std::map<RobotId, TeamPlace> known, std::map<RobotId, TeamPlace> candidates,
-    const TeamInterval& interval);
+    const std::set<RobotId>& liars, const TeamInterval& interval);
 
 }  // namespace crepes

@@ -14,7 +14,7 @@ struct TeamPlace {
   Pose T_S_N;
   Eigen::Vector3d v_S_N = Eigen::Vector3d::Zero();
   Covariance covariance = Covariance::Zero();  ///< of [p, v, theta]
-  Timestamp last_sighting{};                   ///< the earliest along the chain
+  Timestamp last_sighting = kNever;            ///< the earliest along the chain
   Timestamp last_fix = kNever;                 ///< by ranges alone
 
   /// Of a robot in the belief.

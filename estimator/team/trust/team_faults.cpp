@@ -7,6 +7,7 @@
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/quantile.hpp"
+#include "estimator/team/trust/witnesses.hpp"
 
 namespace crepes {
 namespace {
@@ -36,21 +37,11 @@ bool is_settled(const TeamBelief& belief, RobotId id) {
 
 /// A robot most of whose ranges, to at least two others, are refused.
 void add_range_fault(const TeamBelief& belief, RobotId id, std::vector<TeamFault>& faults) {
-  int measured = 0;
-  int contradicted = 0;
-  double sum_m = 0.0;
-  for (const auto& [pair, range] : belief.ranges) {
-    const auto agreement = range.agreement.find(id);
-    if (agreement == range.agreement.end() || !is_settled(belief, pair.first) ||
-        !is_settled(belief, pair.second))
-      continue;
-    measured += agreement->second.fused + agreement->second.gated > 1.0 ? 1 : 0;
-    if (!agreement->second.is_contradiction()) continue;
-    ++contradicted;
-    sum_m += range.refused_m.at(id);
-  }
-  if (contradicted >= 2 && 2 * contradicted > measured)
-    faults.push_back({id, TeamFault::Kind::kRanges, sum_m / contradicted});
+  const OwnRanges own = own_ranges_of(belief, id, [&](const RobotPair& pair) {
+    return is_settled(belief, pair.first) && is_settled(belief, pair.second);
+  });
+  if (own.are_false())
+    faults.push_back({id, TeamFault::Kind::kRanges, own.sum_m / own.contradicted});
 }
 
 /// Clocks that differ from most others, this robot's among them.

@@ -87,6 +87,21 @@ Agreement ranges_of(const TeamBelief& belief, RobotId id) {
   return all;
 }
 
+OwnRanges own_ranges_of(const TeamBelief& belief, RobotId id,
+                        const std::function<bool(const RobotPair&)>& counts) {
+  OwnRanges all;
+  for (const auto& [pair, range] : belief.ranges) {
+    const auto agreement = range.agreement.find(id);
+    if (agreement == range.agreement.end() || !counts(pair)) continue;
+    all.measured += agreement->second.fused + agreement->second.gated > 1.0 ? 1 : 0;
+    if (!agreement->second.is_contradiction()) continue;
+    ++all.contradicted;
+    if (const auto refused = range.refused_m.find(id); refused != range.refused_m.end())
+      all.sum_m += refused->second;
+  }
+  return all;
+}
+
 bool looks_turned(const TeamBelief& belief, RobotId observer, const TeamCamera& camera,
                   bool was_turned) {
   if (!contradicts_most(camera) && !(was_turned && contradicts_more(belief, observer, camera)))
@@ -133,7 +148,8 @@ bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {
     const auto own = range.agreement.find(id);
     return belief.robots.at(other).is_trusted && of_other != range.agreement.end() &&
            of_other->second.is_contradiction() && own != range.agreement.end() &&
-           !own->second.is_contradiction();
+           !own->second.is_contradiction() &&
+           !own_ranges_of(belief, other, [](const RobotPair&) { return true; }).are_false();
   });
 }
 

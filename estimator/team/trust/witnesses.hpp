@@ -21,6 +21,18 @@ using IsExcluded = std::function<bool(RobotId, const TeamCamera&)>;
 /// The ranges of a robot and to it.
 [[nodiscard]] Agreement ranges_of(const TeamBelief& belief, RobotId id);
 
+/// The ranges that a robot's own module measured, of those pairs that count.
+struct OwnRanges {
+  int measured = 0;      ///< pairs
+  int contradicted = 0;  ///< of these, pairs whose ranges are refused
+  double sum_m = 0.0;    ///< by which those are too long, together
+
+  /// Most of them, to two others or more.
+  [[nodiscard]] bool are_false() const { return contradicted >= 2 && 2 * contradicted > measured; }
+};
+[[nodiscard]] OwnRanges own_ranges_of(const TeamBelief& belief, RobotId id,
+                                      const std::function<bool(const RobotPair&)>& counts);
+
 /// Whether a camera contradicts most of what it sees, and nobody contradicts the place of the robot
 /// that carries it. If it was found turned before, it need only contradict robots that no other
 /// camera contradicts, more often than it agrees with all others.
@@ -33,7 +45,7 @@ using IsExcluded = std::function<bool(RobotId, const TeamCamera&)>;
 /// came last of all that are contradicted.
 [[nodiscard]] bool is_contradicted(const TeamBelief& belief, const Witnesses& all, RobotId id);
 /// Whether the robot's place agrees with the ranges that it measured, but not with those that
-/// trusted robots measured to it.
+/// trusted robots measured to it. A trusted robot whose own ranges are false says nothing of that.
 [[nodiscard]] bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id);
 
 }  // namespace crepes

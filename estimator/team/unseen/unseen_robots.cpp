@@ -8,11 +8,12 @@
 namespace crepes {
 namespace {
 
-// At 10 Hz. The accelerometers' biases bend a track of 5 s by less than beacons err.
-constexpr std::size_t kLeastIntervals = 20;
-constexpr std::size_t kMostIntervals = 50;
-constexpr std::size_t kTrial = 10;                     // intervals; robots take turns
-constexpr Duration kRecent = std::chrono::seconds{1};  // a robot seen since then is a beacon
+// The accelerometers' biases bend a track of 5 s by less than beacons err.
+constexpr Duration kLeast = std::chrono::seconds{2};
+constexpr Duration kMost = std::chrono::seconds{5};
+constexpr Duration kTrial = std::chrono::seconds{1};
+constexpr Duration kTurn = std::chrono::milliseconds{100};  // by which robots take turns
+constexpr Duration kRecent = std::chrono::seconds{1};       // a robot seen since then is a beacon
 
 /// Members that no camera sees, and whose cameras see nobody.
 std::set<RobotId> unseen_of(const TeamInterval& interval) {
@@ -73,6 +74,7 @@ std::map<std::pair<RobotId, RobotId>, MeanRange> mean_ranges(const TeamInterval&
 
 void UnseenRobots::add(const TeamInterval& interval, const TeamBelief& belief) {
   if (interval.from != end_) unseen_.clear();
+  begin_ = interval.from;
   end_ = interval.to;
   const std::set<RobotId> present = unseen_of(interval);
   std::erase_if(unseen_, [&](const auto& entry) { return !present.contains(entry.first); });
@@ -85,8 +87,12 @@ void UnseenRobots::add(const TeamInterval& interval, const TeamBelief& belief) {
                                 .imu = interval.member(id)->imu,
                                 .self_imu = interval.member(belief.self)->imu,
                                 .ranges = {}});
-    ++unseen.count;
-    if (unseen.intervals.size() > kMostIntervals) unseen.intervals.pop_front();
+    unseen.since += end_ - begin_;
+    unseen.lasted += end_ - begin_;
+    while (unseen.lasted > kMost) {
+      unseen.lasted -= from_seconds(unseen.intervals.front().duration_s);
+      unseen.intervals.pop_front();
+    }
   }
   for (const auto& [pair, mean] : mean_ranges(interval, belief, present)) {
     const auto& [id, beacon] = pair;
@@ -109,8 +115,9 @@ std::map<RobotId, TeamPlace> UnseenRobots::places(const TeamInterval& interval,
   std::map<RobotId, TeamPlace> places;
   const TeamRobot& self = belief.robots.at(belief.self);
   for (const auto& [id, unseen] : unseen_) {
-    if (unseen.intervals.size() < kLeastIntervals || (unseen.count + id.value) % kTrial != 0)
-      continue;
+    const Duration turn = unseen.since + id.value * kTurn;
+    const bool is_due = turn / kTrial != (turn - (end_ - begin_)) / kTrial;
+    if (unseen.lasted < kLeast || !is_due) continue;
     const auto place = place_by_ranges(
         unseen.intervals,
         {.p_body_uwb = interval.member(id)->p_body_uwb,

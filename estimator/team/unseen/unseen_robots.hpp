@@ -25,10 +25,12 @@ class UnseenRobots {
  private:
   struct Unseen {
     std::deque<UnseenInterval> intervals;
-    std::size_t count = 0;  ///< of all intervals, with those that are forgotten
+    Duration lasted{};  ///< these
+    Duration since{};   ///< all, with those that are forgotten
   };
 
-  Timestamp end_{};
+  Timestamp begin_ = kNever;  ///< of the latest interval
+  Timestamp end_ = kNever;
   std::map<RobotId, Unseen> unseen_;
 };
 

@@ -94,6 +94,43 @@ TEST(TeamFaults, AnAntennaDelayThatCameFirstIsOutvoted) {
   EXPECT_EQ(beyond, 0);
 }
 
+// A trusted robot's module, or this robot's own, reads too long: a robot that was away is trusted
+// again all the same.
+TEST(TeamFaults, FalseRangesOfATrustedRobotKeepNobodyOnProbation) {
+  static constexpr RobotId kAway{4};
+  for (const RobotId liar : {RobotId{2}, kSelf}) {
+    SCOPED_TRACE(liar.value);
+    SimulatedTeam team(3, 6);
+    double t = 0.0;
+    const auto is_away = [](RobotId a, RobotId b) { return a == kAway || b == kAway; };
+    team.damage = [&](TeamInterval& interval) {
+      const std::vector<TeamRange> by_one = interval.ranges;
+      for (TeamRange range : by_one) {
+        std::swap(range.observer, range.neighbor);
+        interval.ranges.push_back(range);
+      }
+      for (TeamRange& range : interval.ranges)
+        if (t > 4.0 && range.observer == liar) range.reading.range_m += 1.0;
+      if (t < 6.0 || t > 8.0) return;
+      std::erase_if(interval.members, [](const TeamMember& m) { return m.robot == kAway; });
+      std::erase_if(interval.bearings,
+                    [&](const TeamBearing& z) { return is_away(z.observer, z.bearing.neighbor); });
+      std::erase_if(interval.ranges,
+                    [&](const TeamRange& z) { return is_away(z.observer, z.neighbor); });
+      std::erase_if(interval.edges,
+                    [&](const RelativePoseEdge& edge) { return is_away(edge.from, edge.to); });
+    };
+    TeamFilter filter;
+    int trusted = 0;
+    for (; t < 18.0; t += kIntervalSeconds) {
+      const TeamSolution solution = filter.step(team.next());
+      for (const RobotCalibration& robot : solution.calibrations)
+        if (t > 12.0 && robot.robot == kAway && robot.is_trusted) ++trusted;
+    }
+    EXPECT_GT(trusted, 55);
+  }
+}
+
 TEST(TeamFaults, NamesRangesThatAreTooLong) {
   constexpr RobotId kLiar{4};
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {

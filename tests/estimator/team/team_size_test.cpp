@@ -115,5 +115,33 @@ TEST(TeamSize, RobotsBeyondItsSizeAreHonestOverSeeds) {
   EXPECT_LE(beyond, 1);
 }
 
+// Its tiny covariance makes its estimate the most certain chain, until it is named.
+TEST(TeamSize, ARobotBeyondIsNotPlacedByWhoIsKnownToLie) {
+  static constexpr RobotId kLiar{2};
+  static constexpr RobotId kHonest{3};
+  static constexpr RobotId kHidden{6};
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    SimulatedTeam team(seed, 6);
+    team.sees = [](RobotId a, RobotId b) {
+      if (a != kHidden && b != kHidden) return true;
+      const RobotId other = a == kHidden ? b : a;
+      return other == kLiar || other == kHonest;
+    };
+    team.damage = [](TeamInterval& interval) {
+      interval.settings.max_robots = 5;
+      for (RelativePoseEdge& edge : interval.edges) {
+        if (edge.from != kLiar) continue;
+        edge.T_from_to.pose.p.x() += 2.0;
+        edge.T_from_to.covariance = 1e-6 * Matrix6d::Identity();
+      }
+    };
+    TeamFilter filter;
+    const TeamSolution solution = solution_after(team, filter, 5.0);
+    const TeamPose* pose = find(solution, kHidden);
+    ASSERT_NE(pose, nullptr) << seed;
+    EXPECT_LT(nees_of(*pose, team.truth(kHidden)), 22.5) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace crepes::team_size_test
