@@ -220,7 +220,8 @@ TEST(EstimatorFaults, ANeighborThatTheTeamKnowsNoMoreHasNoPose) {
   EstimatorPair pair(1);
   pair.run_for(2s, hidden);
   ASSERT_EQ(pair.latest(), nullptr);
-  TeamPose known{.neighbor = EstimatorPair::kOther, .T_B_N = {{3.0, 0.0, 0.0}, {}}};
+  TeamPose known{.neighbor = EstimatorPair::kOther,
+                 .T_B_N = {{3.0, 0.0, 0.0}, Eigen::Quaterniond::Identity()}};
   known.covariance.diagonal().setConstant(1e-4);
   TeamSolution solution;
   solution.stamp = pair.own_time(pair.now() - 100ms);
