@@ -21,7 +21,7 @@ using IsExcluded = std::function<bool(RobotId, const TeamCamera&)>;
 /// The ranges of a robot and to it.
 [[nodiscard]] Agreement ranges_of(const TeamBelief& belief, RobotId id);
 
-/// The ranges that a robot's own module measured, of those pairs that count.
+/// Ranges that a robot's own module measured.
 struct OwnRanges {
   int measured = 0;      ///< pairs
   int contradicted = 0;  ///< of these, pairs whose ranges are refused
@@ -30,6 +30,7 @@ struct OwnRanges {
   /// Most of them, to two others or more.
   [[nodiscard]] bool are_false() const { return contradicted >= 2 && 2 * contradicted > measured; }
 };
+/// Of those pairs that count.
 [[nodiscard]] OwnRanges own_ranges_of(const TeamBelief& belief, RobotId id,
                                       const std::function<bool(const RobotPair&)>& counts);
 
