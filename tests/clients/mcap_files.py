@@ -224,18 +224,24 @@ class Convert(unittest.TestCase):
     def tearDownClass(cls):
         cls.directory.cleanup()
 
+    def assert_same(self, found, expected):
+        """Equal lists. assertEqual would take minutes to explain how thousands of entries differ."""
+        self.assertEqual(len(found), len(expected))
+        for one, other in zip(found, expected):
+            self.assertEqual(one, other)
+
     def test_the_index_finds_what_a_scan_finds(self):
         for file in (self.swarm, self.replay):
             self.assertGreater(len(file.messages), 1000)
-            self.assertEqual(sorted(file.indexed), sorted(file.messages))
+            self.assert_same(sorted(file.indexed), sorted(file.messages))
 
     def test_messages_are_in_order_of_time(self):
         for file in (self.swarm, self.replay):
             times = [time for _, _, time, _ in file.messages]
-            self.assertEqual(times, sorted(times))
+            self.assert_same(times, sorted(times))
             for channel in file.channels:
                 sequence = [number for of, number, _, _ in file.messages if of == channel]
-                self.assertEqual(sequence, list(range(len(sequence))))
+                self.assert_same(sequence, list(range(len(sequence))))
 
     def test_every_message_is_what_its_schema_says(self):
         for file in (self.swarm, self.replay):
@@ -256,10 +262,11 @@ class Convert(unittest.TestCase):
         self.assertEqual(len(written), len(imu))
         for (_, message), row in zip(written, imu):
             self.assertEqual([message[key][axis] for key in ("gyro_radps", "accel_mps2") for axis in "xyz"], [float(x) for x in row[1:]])
-        self.assertEqual([message["range_m"] for _, message in self.swarm.of("/r2/range/r1")], [float(row[2]) for row in rows(RECORDING / "r2/uwb0/data.csv")])
-        spots = sorted((float(row[1]), float(row[2])) for row in rows(RECORDING / "r1/cam0/spots.csv") if row[1])
+        self.assert_same([message["range_m"] for _, message in self.swarm.of("/r2/range/r1")], [float(row[2]) for row in rows(RECORDING / "r2/uwb0/data.csv")])
+        # Foxglove's origin is the corner of the first pixel, a recording's its center.
+        spots = sorted((float(row[1]) + 0.5, float(row[2]) + 0.5) for row in rows(RECORDING / "r1/cam0/spots.csv") if row[1])
         circles = sorted((circle["position"]["x"], circle["position"]["y"]) for _, message in self.swarm.of("/r1/cam0/spots") for circle in message["circles"])
-        self.assertEqual(circles, spots)
+        self.assert_same(circles, spots)
 
     def test_a_replay_has_all_its_poses_with_their_errors(self):
         poses = rows(self.results / "r1/r2.csv")

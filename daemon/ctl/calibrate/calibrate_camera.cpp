@@ -82,7 +82,7 @@ Result<CalibrationReport> calibrate_camera(const CalibrateCameraOptions& options
        .height = camera.resolution[1],
        .lens = lens,
        .p_B_C = camera.T_cam_imu.inverse().p,
-       .noise = noise_with_vibration(recording->config.imu.noise, recording->imu, 4),
+       .noise = noise_with_vibration(recording->config.imu.noise, recording->imu, 8),
        .on_progress = progress});
   const auto reported =
       report_camera(result, {.words = "boards", .key = "boards", .count = found->boards.size()},

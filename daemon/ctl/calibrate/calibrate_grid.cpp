@@ -192,7 +192,7 @@ Result<void> calibrate_film(const CalibrateGridOptions& options, const GridPictu
                                    .height = read.resolution[1],
                                    .lens = lens.lens.numbers,
                                    .p_B_C = body.p_B_C,
-                                   .noise = noise_with_vibration(body.noise, body.imu, 4),
+                                   .noise = noise_with_vibration(body.noise, body.imu, 8),
                                    .on_progress = part_of(options, kShareOfLens, 1.0)});
   }
   if (lens.refusals.empty() && !found.refusals.empty()) {
