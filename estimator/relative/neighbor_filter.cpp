@@ -20,6 +20,8 @@ using E = ErrorState;
 constexpr double kGraphSpeedSigma = 0.3;  // m/s
 // So long after three ranges they hold the distance.
 constexpr Duration kRangesLast = std::chrono::milliseconds{500};
+// So long after a bearing it holds the direction.
+constexpr Duration kSightLasts = std::chrono::milliseconds{500};
 
 ErrorState::Covariance first_covariance(const Matrix6d& pose, double speed_sigma,
                                         const Priors& priors) {
@@ -217,10 +219,11 @@ void NeighborFilter::apply(const E::Vector& correction) {
   inject(correction, state_);
   const bool is_far = correction.segment<3>(E::kTheta).norm() > kFar ||
                       correction.segment<3>(E::kP).norm() > kFar * before.T_B_N.p.norm();
-  // Below that, while ranges hold the distance, the rotation by the range bias is enough, and it
-  // also takes care of the IMUs' noise.
+  // Below that, while ranges hold the distance and our camera the direction, the rotation by the
+  // range bias is enough, and it also takes care of the IMUs' noise. If only the neighbor sees us,
+  // nobody measures how its frame is turned about us, and P must move with the estimate.
   Eigen::Matrix<double, E::kMotion, 3> by_m = motion_by_misalignment(before);
-  if (is_far || !has_ranges()) {
+  if (is_far || !has_ranges() || is_blind()) {
     const MotionTransport T = error_transport(before, state_.motion);
     transport_motion(T, P_);
     by_m = (T * by_m).eval();
@@ -229,6 +232,8 @@ void NeighborFilter::apply(const E::Vector& correction) {
 }
 
 bool NeighborFilter::has_ranges() const { return stamp_ < ranges_used_.front() + kRangesLast; }
+
+bool NeighborFilter::is_blind() const { return stamp_ > seen_ + kSightLasts; }
 
 // The error along one attitude axis a correlates with all others: x = g a + rest, g = P a / s^2.
 // The parts are spaced along g, with a smaller variance along it.
@@ -263,7 +268,10 @@ std::vector<NeighborFilter::Part> NeighborFilter::split() const {
 
 Fusion NeighborFilter::fuse_bearing(const DirectionReading& z, const Eigen::Vector3d& p_N_M,
                                     double gate_nis) {
-  return correct(linearize_bearing(state_, z.u, z.camera, p_N_M, z.sigma_rad), gate_nis);
+  const Fusion fusion =
+      correct(linearize_bearing(state_, z.u, z.camera, p_N_M, z.sigma_rad), gate_nis);
+  if (fusion.verdict == Verdict::kFused) seen_ = stamp_;
+  return fusion;
 }
 
 Fusion NeighborFilter::fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,

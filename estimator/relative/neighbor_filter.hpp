@@ -23,6 +23,7 @@ struct Priors {
   double accel_scale = 0.0;  ///< of each entry
   double range_bias_m = 0.0;
   double misalignment_rad = 0.0;
+  double lens_rad = 0.0;  ///< of a camera's directions, besides a rotation
 };
 
 /// The direction of an LED ring in the body of the robot whose camera sees it.
@@ -108,6 +109,8 @@ class NeighborFilter {
   Fusion correct(std::optional<Innovation> z, double gate_nis);
   /// Whether ranges that were used hold the distance.
   [[nodiscard]] bool has_ranges() const;
+  /// Whether our camera has not seen the neighbor of late.
+  [[nodiscard]] bool is_blind() const;
   /// Corrects the state, after P.
   void apply(const ErrorState::Vector& correction);
 
@@ -117,6 +120,7 @@ class NeighborFilter {
   ProcessNoise noise_;
   /// The newest, oldest first.
   std::array<Timestamp, 3> ranges_used_{Timestamp::min(), Timestamp::min(), Timestamp::min()};
+  Timestamp seen_ = kNever;  ///< when a bearing of our camera was last used
 };
 
 /// One Gaussian of a split, and its weight.

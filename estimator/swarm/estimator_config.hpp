@@ -19,6 +19,7 @@ struct EstimatorConfig {
   double lag_ms = 100.0;
   double output_rate_hz = 50.0;
   double camera_misalignment_deg = 0.17;
+  double camera_lens_mrad = 0.6;
   double gate_probability = 0.999;
   double predicted_after_s = 0.5;
   double forget_after_s = 30.0;
@@ -35,6 +36,8 @@ struct EstimatorConfig {
             "poses per second, and the most reports per second to the peers");
     v.field("camera_misalignment_deg", camera_misalignment_deg, Bounds{0, 10},
             "error of T_cam_imu's rotation, one sigma");
+    v.field("camera_lens_mrad", camera_lens_mrad, Bounds{0, 20},
+            "error of the directions of a lens that no rotation explains, one sigma");
     v.field("gate_probability", gate_probability, Bounds{0.9, 0.9999999},
             "measurements less likely than this are refused");
     v.field("predicted_after_s", predicted_after_s, Bounds{0.05, 60},

@@ -56,6 +56,7 @@ FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuNoise&
   s.priors.accel_scale = imu.accelerometer_scale_sigma;
   s.priors.range_bias_m = range.bias_sigma_m;
   s.priors.misalignment_rad = radians(estimator.camera_misalignment_deg);
+  s.priors.lens_rad = 1e-3 * estimator.camera_lens_mrad;
 
   const double p = estimator.gate_probability;
   s.gates = {.range = chi_square_quantile(p, 1),

@@ -8,9 +8,11 @@ namespace crepes {
 
 Event TeamSolver::solve(const TeamProblem& problem, const GraphConfig& config) {
   if (const auto* interval = std::get_if<TeamInterval>(&problem)) {
-    const std::optional<TeamSolution> by_peer = peer_view_.step(*interval, filter_.belief());
-    const TeamSolution own = filter_.step(*interval);
-    return by_peer.value_or(own);
+    std::optional<PeerView::View> by_peer = peer_view_.step(*interval, filter_.belief());
+    TeamSolution own = filter_.step(*interval);
+    if (!by_peer) return own;
+    if (by_peer->belief) filter_.replace(*std::move(by_peer->belief));
+    return std::move(by_peer->solution);
   }
   return solve_pose_graph(std::get<GraphProblem>(problem), config);
 }

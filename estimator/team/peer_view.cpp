@@ -14,11 +14,7 @@ namespace crepes {
 namespace {
 
 constexpr Duration kDark = std::chrono::seconds{1};
-constexpr std::size_t kLeastMembers = 5;  // four beacons, and this robot
-
-bool concerns(const TeamBearing& reading, RobotId id) {
-  return reading.observer == id || reading.bearing.neighbor == id;
-}
+constexpr std::size_t kLeastMembers = 5;  // four beacons, and this robot in the dark
 
 /// The same, as the peer itself would filter it. Of its estimates it has no more than this robot.
 TeamInterval as_of(RobotId peer, TeamInterval interval) {
@@ -28,20 +24,33 @@ TeamInterval as_of(RobotId peer, TeamInterval interval) {
   return interval;
 }
 
+/// What a turn e of this robot adds to a place p in its frame is not linear: the second-order term
+/// e x (e x p) / 2, of a Gaussian e. This is its mean square, by Isserlis' theorem.
+Eigen::Matrix3d bent_by_turn(const Eigen::Matrix3d& turn, const Eigen::Vector3d& p) {
+  const Eigen::Vector3d turned = turn * p;
+  const double trace = turn.trace();
+  const Eigen::Matrix3d crossed = (trace * turned + 2.0 * (turn * turned)) * p.transpose();
+  const double square = trace * trace + 2.0 * turn.squaredNorm();
+  return 0.25 * (p.dot(turned) * turn + 2.0 * turned * turned.transpose() - crossed -
+                 crossed.transpose() + square * p * p.transpose());
+}
+
 }  // namespace
 
-std::optional<TeamSolution> PeerView::step(const TeamInterval& interval, const TeamBelief& own) {
-  const bool is_lit = std::ranges::any_of(interval.bearings, [&](const TeamBearing& reading) {
-    return concerns(reading, interval.self);
-  });
-  if (is_lit) lit_ = interval.to;
-  if (interval.to - lit_ < kDark || interval.members.size() < kLeastMembers) {
+std::optional<PeerView::View> PeerView::step(const TeamInterval& interval, const TeamBelief& own) {
+  for (const TeamBearing& reading : interval.bearings) {
+    if (reading.observer == interval.self) sees_ = interval.to;
+    if (reading.bearing.neighbor == interval.self) is_seen_ = interval.to;
+  }
+  const bool is_dark = interval.to - is_seen_ >= kDark;
+  if (interval.to - sees_ < kDark || (is_dark && interval.members.size() < kLeastMembers)) {
     forget();
     return std::nullopt;
   }
   choose_peer(interval, own);
   if (peer_ == RobotId{}) return std::nullopt;
-  TeamSolution solution = filter_.step(as_of(peer_, interval));
+  View view{.solution = filter_.step(as_of(peer_, interval)), .belief = {}};
+  TeamSolution& solution = view.solution;
   if (std::ranges::find(solution.faults, peer_, &TeamFault::robot) != solution.faults.end()) {
     const RobotId faulty = peer_;
     forget();
@@ -52,17 +61,20 @@ std::optional<TeamSolution> PeerView::step(const TeamInterval& interval, const T
   const auto self = belief.robots.find(interval.self);
   if (self == belief.robots.end()) return std::nullopt;
   const bool needs_witness = !self->second.is_trusted && !is_plausible(belief, interval.self);
-  const TeamBelief seen = seen_from(interval.self, belief);
+  TeamBelief seen = seen_from(interval.self, belief);
+  const Eigen::Matrix3d turn = belief.pose(interval.self).covariance.bottomRightCorner<3, 3>();
   solution.poses.clear();
   for (const auto& [id, robot] : seen.robots) {
     if (id == interval.self || !robot.is_trusted) continue;
     TeamPose& pose = solution.poses.emplace_back(keyframe_pose(seen, id, *interval.member(id)));
+    pose.covariance.topLeftCorner<3, 3>() += bent_by_turn(turn, pose.T_B_N.p);
     pose.last_sighting = std::max(self->second.last_sighting, self->second.last_fix);
     pose.needs_witness = needs_witness;
   }
   if (solution.poses.empty()) return std::nullopt;
   solution.calibrations = calibrations_of(seen, interval.settings.priors);
-  return solution;
+  if (!is_dark && self->second.is_trusted) view.belief = std::move(seen);
+  return view;
 }
 
 void PeerView::forget() {
@@ -71,23 +83,20 @@ void PeerView::forget() {
   filter_ = {};
 }
 
-/// The one with most bearings, as long as it has any.
+/// The one whose cameras have most bearings, as long as they have any.
 void PeerView::choose_peer(const TeamInterval& interval, const TeamBelief& own) {
   std::map<RobotId, int> bearings;
-  for (const TeamBearing& reading : interval.bearings) {
-    ++bearings[reading.observer];
-    ++bearings[reading.bearing.neighbor];
-  }
+  for (const TeamBearing& reading : interval.bearings) ++bearings[reading.observer];
   std::erase_if(bearings, [&](const auto& entry) {
     return interval.member(entry.first) == nullptr || entry.first == former_;
   });
-  if (bearings.contains(peer_)) peer_lit_ = interval.to;
+  if (bearings.contains(peer_)) peer_sees_ = interval.to;
   const bool stays =
-      peer_ != RobotId{} && interval.member(peer_) != nullptr && interval.to - peer_lit_ < kDark;
+      peer_ != RobotId{} && interval.member(peer_) != nullptr && interval.to - peer_sees_ < kDark;
   if (stays || bearings.empty()) return;
   const RobotId next =
       std::ranges::max_element(bearings, {}, &std::pair<const RobotId, int>::second)->first;
-  peer_lit_ = interval.to;
+  peer_sees_ = interval.to;
   if (next == peer_) return;
   peer_ = next;
   const bool goes_on = filter_.belief().robots.contains(interval.self);

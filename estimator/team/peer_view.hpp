@@ -1,4 +1,4 @@
-/// The team as a peer sees it, for a robot in the dark.
+/// The team as a peer sees it, for a robot that sees nobody.
 #pragma once
 
 #include <optional>
@@ -7,27 +7,34 @@
 
 namespace crepes {
 
-/// A robot that sees nobody, and that nobody sees, knows of the others only their distances. Then a
-/// second filter estimates the team in the frame of a peer that sees others, as that peer itself
-/// does. It begins with what this robot believed until then, if that is known. There ranges hold or
-/// place this robot like any other one that nobody sees, and the belief is turned into this robot's
-/// frame (`root_change`). Deterministic.
+/// A robot that sees nobody does not know how the team is turned about it, but for what the IMUs
+/// tell in time. In its own frame that is an error of all others' places, which is not linear, and
+/// a filter would soon be too certain. If nobody sees it either, it knows of the others only their
+/// distances. Then a second filter estimates the team in the frame of a peer that sees others, as
+/// that peer itself does. There this robot is like any other one, whose heading is open, or which
+/// ranges hold or place. It begins with what this robot believed until then, if that is known. The
+/// belief is turned into this robot's frame (`root_change`). Deterministic.
 class PeerView {
  public:
+  /// The team in this robot's frame.
+  struct View {
+    TeamSolution solution;
+    std::optional<TeamBelief> belief;  ///< what the own filter goes on from, if this robot is seen
+  };
+
   /// Intervals must follow each other. `own` is what this robot's own filter believed before it.
-  /// Empty unless this robot has been in the dark for a second, and has a place in the peer's
-  /// frame.
-  [[nodiscard]] std::optional<TeamSolution> step(const TeamInterval& interval,
-                                                 const TeamBelief& own);
+  /// Empty unless this robot has seen nobody for a second, and has a place in the peer's frame.
+  [[nodiscard]] std::optional<View> step(const TeamInterval& interval, const TeamBelief& own);
 
  private:
   void choose_peer(const TeamInterval& interval, const TeamBelief& own);
   void forget();
 
-  Timestamp lit_ = kNever;       ///< when this robot was last seen or saw anybody
-  Timestamp peer_lit_ = kNever;  ///< likewise the peer
-  RobotId peer_{};               ///< whose frame it is; RobotId{} if there is none
-  RobotId former_{};             ///< one that turned out to have a fault
+  Timestamp sees_ = kNever;     ///< when this robot last saw anybody
+  Timestamp is_seen_ = kNever;  ///< when anybody last saw it
+  Timestamp peer_sees_ = kNever;
+  RobotId peer_{};    ///< whose frame it is; RobotId{} if there is none
+  RobotId former_{};  ///< one that turned out to have a fault
   TeamFilter filter_;
 };
 

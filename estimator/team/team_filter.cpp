@@ -179,6 +179,7 @@ void TeamFilter::append_cameras(const TeamInterval& interval) {
                        .is_free = turn.has_value(),
                        .is_refused = turn && trust_.is_refused(reading.observer)});
     if (turn) belief_.P.bottomRightCorner<3, 3>() = *turn;
+    belief_.append(3, interval.settings.priors.lens_rad);
   }
 }
 
@@ -254,7 +255,7 @@ std::vector<bool> TeamFilter::corrected_states(Stage stage) const {
     if (!is_corrected(id)) continue;
     if (robot.motion_index >= 0) mark(robot.motion_index, FreeMotionAt::kMotion);
     mark(robot.bias_index, TeamRobot::kCalibration);
-    for (const TeamCamera& camera : robot.cameras) mark(camera.index, 3);
+    for (const TeamCamera& camera : robot.cameras) mark(camera.index, TeamCamera::kStates);
   }
   for (const auto& [pair, range] : belief_.ranges) {
     const bool is_between_trusted =

@@ -46,6 +46,8 @@ class TeamFilter {
   [[nodiscard]] TeamSolution step(const TeamInterval& interval);
   /// At the end of the last interval.
   [[nodiscard]] const TeamBelief& belief() const { return belief_; }
+  /// Goes on from another belief of that time.
+  void replace(TeamBelief belief) { belief_ = std::move(belief); }
 
  private:
   using Stage = TeamReadings::Stage;

@@ -107,6 +107,8 @@ Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vecto
                                 .dark = scenario.dark,
                                 .sight_m = scenario.sight_m};
   const auto spots_of = [&](const DemoRobot& robot) {
+    if (robot.config.robot.id == scenario.blind)
+      return record_spots(robot, duration_s, [](double) { return std::vector<Spot>{}; });
     if (scenario.pictured) {
       RenderedSpots pictures(world, robot.config, *scenario.pictured);
       return record_spots(robot, duration_s, [&](double t_s) { return pictures.at(t_s); });

@@ -30,6 +30,7 @@ struct Scenario {
   Darkness dark{};
   RangeModel ranges = RangeModel::kSimulated;
   double sight_m = 1e3;  ///< no camera sees further
+  RobotId blind{};       ///< the cameras of this robot see nothing
   /// Spots are what the detector finds in rendered pictures of such boards, without disturbances.
   std::optional<LedBoard> pictured{};
   bool are_boards_measured = false;  ///< robots know their size, within 2 %
@@ -51,6 +52,8 @@ inline constexpr std::array kScenarios{
     Scenario{.name = "fence", .world = SimScenario::kFour, .obstacles = Obstacles::kFence},
     Scenario{
         .name = "blackout", .world = SimScenario::kFour, .dark = {.from_s = 15.0, .to_s = 30.0}},
+    Scenario{.name = "blind", .world = SimScenario::kFour, .blind = RobotId{4}},
+    Scenario{.name = "blind-pair", .world = SimScenario::kTwo, .blind = RobotId{2}},
     Scenario{.name = "thin-ranges", .world = SimScenario::kFour, .ranges = RangeModel::kLinkTrack},
     Scenario{.name = "thin-pair", .world = SimScenario::kTwo, .ranges = RangeModel::kLinkTrack},
     Scenario{.name = "workshop",

@@ -32,9 +32,11 @@ inline TeamBelief true_belief(const TrueMotions& at_beginning, const TeamInterva
   }
   for (const TeamBearing& reading : next.bearings) {
     auto& cameras = belief.robots.at(reading.observer).cameras;
-    if (std::ranges::find(cameras, reading.bearing.p_B_C, &TeamCamera::p_B_C) == cameras.end())
+    if (std::ranges::find(cameras, reading.bearing.p_B_C, &TeamCamera::p_B_C) == cameras.end()) {
       cameras.push_back({.p_B_C = reading.bearing.p_B_C,
                          .index = belief.append(3, next.settings.priors.misalignment_rad)});
+      belief.append(3, next.settings.priors.lens_rad);
+    }
   }
   belief.append_range_biases(next);
   return belief;

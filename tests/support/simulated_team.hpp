@@ -13,6 +13,7 @@
 #include "estimator/core/so3.hpp"
 #include "estimator/team/belief/robot_trajectory.hpp"
 #include "estimator/team/belief/team_interval.hpp"
+#include "estimator/team/belief/team_state.hpp"
 #include "tests/support/random_geometry.hpp"
 
 namespace crepes::test {
@@ -30,7 +31,8 @@ inline TeamSettings team_settings() {
                      .accel_bias_mps2 = 0.035,
                      .gyro_scale = 0.003,
                      .range_bias_m = 0.05,
-                     .misalignment_rad = radians(0.17)},
+                     .misalignment_rad = radians(0.17),
+                     .lens_rad = 6e-4},
           .bearing_gate = 13.8,
           .range_gate = 10.8};
 }
@@ -39,6 +41,7 @@ inline TeamSettings team_settings() {
 class SimulatedTeam {
  public:
   explicit SimulatedTeam(std::uint64_t seed, int count = 4) : random_(seed) {
+    RandomGeometry lenses(seed + 1'000'000);
     for (int i = 0; i < count; ++i) {
       Body& body = bodies_[RobotId{static_cast<std::uint16_t>(i + 1)}];
       const double angle = 2.0 * std::numbers::pi * i / count;
@@ -48,6 +51,7 @@ class SimulatedTeam {
       body.bias = {.gyro_radps = random_.vector(0.005), .accel_mps2 = random_.vector(0.035)};
       body.misalignment = random_.vector(radians(0.17));
       body.antenna_delay_m = random_.normal(0.05 * std::sqrt(0.4));
+      body.lens = lenses.vector(6e-4);
     }
   }
 
@@ -116,6 +120,7 @@ class SimulatedTeam {
     FreeMotion motion;
     ImuBias bias;
     Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();
+    Eigen::Vector3d lens = Eigen::Vector3d::Zero();
     double antenna_delay_m = 0.0;
     double phase = 0.0;
     std::vector<ImuMean> imu;
@@ -159,7 +164,9 @@ class SimulatedTeam {
     const FreeMotion to = paths.at(j).at(t_s).motion;
     const Eigen::Vector3d d =
         from.q_F_B.conjugate() * (to.p_F + to.q_F_B * p_body_led_ - from.p_F) - p_body_camera_;
-    const Eigen::Vector3d u = so3_exp(bodies_.at(i).misalignment) * d.normalized();
+    const Body& body = bodies_.at(i);
+    const TeamCamera camera{.misalignment = body.misalignment, .lens = body.lens};
+    const Eigen::Vector3d u = camera.seen(d.normalized());
     return {.stamp = now_ + from_seconds(t_s + late_s[i]),
             .neighbor = j,
             .u_B = so3_exp(error) * u,

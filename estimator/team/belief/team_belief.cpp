@@ -135,7 +135,8 @@ void TeamBelief::remove(RobotId id) {
   const TeamRobot robot = robots.at(id);
   std::vector<std::pair<int, int>> blocks{{robot.motion_index, kMotion},
                                           {robot.bias_index, TeamRobot::kCalibration}};
-  for (const TeamCamera& camera : robot.cameras) blocks.emplace_back(camera.index, 3);
+  for (const TeamCamera& camera : robot.cameras)
+    blocks.emplace_back(camera.index, TeamCamera::kStates);
   for (auto range = ranges.begin(); range != ranges.end();) {
     const bool concerned = range->first.first == id || range->first.second == id;
     if (concerned) blocks.emplace_back(range->second.index, 1);
@@ -238,7 +239,10 @@ void TeamBelief::inject(const Eigen::VectorXd& dx) {
     robot.bias.gyro_scale += dx.segment<9>(robot.bias_index + 6).reshaped<Eigen::ColMajor>(3, 3);
     robot.antenna_delay_m += dx(robot.delay_index());
     robot.clock_s += dx(robot.clock_index());
-    for (TeamCamera& camera : robot.cameras) camera.misalignment += dx.segment<3>(camera.index);
+    for (TeamCamera& camera : robot.cameras) {
+      camera.misalignment += dx.segment<3>(camera.index);
+      camera.lens += dx.segment<3>(camera.lens_index());
+    }
   }
   for (auto& [pair, range] : ranges) range.bias_m += dx(range.index);
 }

@@ -40,11 +40,20 @@ struct Agreement {
 /// What is known of one camera of a robot.
 struct TeamCamera {
   Eigen::Vector3d p_B_C = Eigen::Vector3d::Zero();
-  Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< u_measured = Exp(m) u
-  int index = 0;
+  static constexpr int kStates = 6;  ///< [misalignment, lens]
+
+  Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< m, see `seen`
+  Eigen::Vector3d lens = Eigen::Vector3d::Zero();          ///< c, see `seen` [rad]
+  int index = 0;                                           ///< of its states
   std::map<RobotId, Agreement> agreement{};  ///< of its bearings, by the robot that it sees
   bool is_free = false;     ///< it may be turned: its prior allowed for any misalignment
   bool is_refused = false;  ///< it contradicted the others after that, too
+
+  /// Where the camera sees what is in this true direction (body axes): Exp(m) u, moved towards c by
+  /// the part of c across. Besides a rotation, a principal point that is off does just that to the
+  /// directions of a circle through the optical axis, and a focal length nearly, with c along it.
+  [[nodiscard]] Eigen::Vector3d seen(const Eigen::Vector3d& u) const;
+  [[nodiscard]] int lens_index() const { return index + 3; }
 };
 
 /// What is known of one robot.

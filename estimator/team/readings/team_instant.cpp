@@ -33,7 +33,7 @@ InstantStates::InstantStates(const TeamBelief& belief, double time_s)
   for (const auto& [id, robot] : belief.robots) {
     add(robot.delay_index(), 1);
     add(robot.clock_index(), 1);
-    for (const TeamCamera& camera : robot.cameras) add(camera.index, 3);
+    for (const TeamCamera& camera : robot.cameras) add(camera.index, TeamCamera::kStates);
   }
   for (const auto& [pair, range] : belief.ranges) add(range.index, 1);
 }

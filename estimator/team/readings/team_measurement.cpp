@@ -95,12 +95,15 @@ std::optional<SightModel> SightModel::at(const TeamPair& pair, const TeamCamera&
   const Eigen::Matrix3d M = so3_exp(camera.misalignment).toRotationMatrix();
 
   SightModel model;
-  model.predicted_ = M * direction;
+  model.predicted_ = camera.seen(direction);
   model.across_ = tangent_basis(model.predicted_);
   TeamRow& row = model.row_;
   row.dimension = 2;
   row.variance = sigma_rad * sigma_rad;
-  const Eigen::Matrix<double, 2, 3> across = model.across_.transpose() * M;
+  const Eigen::Vector3d turned = M * direction;
+  const Eigen::Matrix3d bent = (1.0 - turned.dot(camera.lens)) * Eigen::Matrix3d::Identity() -
+                               turned * camera.lens.transpose();
+  const Eigen::Matrix<double, 2, 3> across = model.across_.transpose() * bent * M;
   const Eigen::Matrix<double, 2, 3> by_d =
       across * (Eigen::Matrix3d::Identity() - direction * direction.transpose()) / distance;
   add_motion(-by_d * line.R_B_F, by_d * hat(line.p_B_M), pair.observer_path, i, pair.observer,
@@ -110,6 +113,9 @@ std::optional<SightModel> SightModel::at(const TeamPair& pair, const TeamCamera&
              pair.neighbor_path, j, pair.neighbor, pair.states, row);
   add_columns(pair.states.of(camera.index),
               -across * hat(direction) * so3_right_jacobian(camera.misalignment), row);
+  add_columns(
+      pair.states.of(camera.lens_index()),
+      model.across_.transpose() * (Eigen::Matrix3d::Identity() - turned * turned.transpose()), row);
   add_clocks(
       by_d * line.R_B_F * pair.neighbor_path.velocity_F(t_j_s, pair.neighbor_arms.p_body_led), pair,
       row);
@@ -120,7 +126,7 @@ std::optional<Eigen::Vector2d> SightModel::residual(const TeamPair& pair, const 
                                                     const Eigen::Vector3d& u_B, double t_s) const {
   const LineOfSight line = line_of_sight(pair, camera, pair.observer_path.motion_at(t_s),
                                          pair.neighbor_path.motion_at(pair.neighbor_time_s(t_s)));
-  const Eigen::Vector3d then = so3_exp(camera.misalignment) * line.d.normalized();
+  const Eigen::Vector3d then = camera.seen(line.d.normalized());
   const Eigen::Vector3d u = shortest_rotation(then, predicted_) * u_B;
   const double cosine = predicted_.dot(u);
   if (!(cosine > 0.0)) return std::nullopt;

@@ -15,7 +15,7 @@ namespace crepes {
 /// A measurement of one or two dimensions, z = h(x) + residual, and the states of the instant that
 /// it depends on.
 struct TeamRow {
-  static constexpr int kMaxColumns = 2 * FreeMotionAt::kMotion + 5;  ///< clocks and three constants
+  static constexpr int kMaxColumns = 2 * FreeMotionAt::kMotion + 8;  ///< clocks and six constants
 
   int dimension = 0;
   int size = 0;  ///< of the columns that are used
@@ -47,7 +47,7 @@ struct TeamPair {
 /// All bearings of one camera to one robot within an interval are one measurement: the errors of
 /// lens and spot last longer than that. `reading`s are turned to the instant `t_s` of the row.
 ///
-///   u = Exp(m) d / |d|,  d = R_i^T (p_j + R_j l_j - p_i) - c_i
+///   u = TeamCamera::seen(d / |d|),  d = R_i^T (p_j + R_j l_j - p_i) - c_i
 ///
 /// with robot j at its own clock's time t + tau_j - tau_i. All times are by the observer's clock.
 class SightModel {

@@ -43,9 +43,9 @@ Known known(int robots, double seconds, const std::function<void(SimulatedTeam&)
     alter(team);
     bool is_known = false;
     for (double t = 0.0; t < seconds; t += kIntervalSeconds) {
-      const auto solution = view.step(team.next(), {});
-      if (!solution) continue;
-      for (const TeamPose& pose : solution->poses) {
+      const auto seen = view.step(team.next(), {});
+      if (!seen) continue;
+      for (const TeamPose& pose : seen->solution.poses) {
         if (pose.needs_witness) continue;
         is_known = true;
         ++all.poses;
@@ -95,12 +95,12 @@ TEST(PeerView, GoesOnFromWhatWasKnown) {
     for (double t = 0.0; t < 25.0; t += kIntervalSeconds) {
       if (t > 5.0) team.sees = [](RobotId i, RobotId j) { return i != kSelf && j != kSelf; };
       const TeamInterval interval = team.next();
-      const auto solution = view.step(interval, filter.belief());
+      const auto seen = view.step(interval, filter.belief());
       (void)filter.step(interval);
       if (t < 7.0) continue;
-      ASSERT_TRUE(solution) << seed << " at " << t;
-      ASSERT_EQ(solution->poses.size(), 6U) << seed << " at " << t;
-      for (const TeamPose& pose : solution->poses) {
+      ASSERT_TRUE(seen) << seed << " at " << t;
+      ASSERT_EQ(seen->solution.poses.size(), 6U) << seed << " at " << t;
+      for (const TeamPose& pose : seen->solution.poses) {
         const Pose truth = team.truth(pose.neighbor);
         EXPECT_LT(test::nees_of(pose, truth), kSixDof5Sigma) << seed << " at " << t;
         sum_m2 += test::error_of(pose, truth).head<3>().squaredNorm();
@@ -123,16 +123,47 @@ TEST(PeerView, GoesOnWithAnotherPeer) {
     if (t > 9.0) {
       std::erase_if(interval.members, [](const TeamMember& m) { return m.robot == kPeer; });
     }
-    const auto solution = view.step(interval, filter.belief());
+    const auto seen = view.step(interval, filter.belief());
     (void)filter.step(interval);
     if (t < 7.0) continue;
-    ASSERT_TRUE(solution) << t;
-    EXPECT_EQ(solution->poses.size(), t > 9.0 ? 5U : 6U) << t;
-    for (const TeamPose& pose : solution->poses) {
+    ASSERT_TRUE(seen) << t;
+    EXPECT_EQ(seen->solution.poses.size(), t > 9.0 ? 5U : 6U) << t;
+    for (const TeamPose& pose : seen->solution.poses) {
       const Pose truth = team.truth(pose.neighbor);
       EXPECT_LT(test::nees_of(pose, truth), kSixDof5Sigma) << t;
       EXPECT_LT(test::error_of(pose, truth).head<3>().norm(), 0.5) << t;
     }
+  }
+}
+
+// A robot whose cameras see nobody any more goes on in the frame of one that sees it.
+TEST(PeerView, ShowsABlindRobotItsTeam) {
+  for (std::uint64_t seed = 1; seed <= kTeams; ++seed) {
+    SimulatedTeam team(seed, 3);
+    team.hovers = true;
+    PeerView view;
+    TeamFilter filter;
+    for (double t = 0.0; t < 30.0; t += kIntervalSeconds) {
+      if (t > 3.0) team.sees = [](RobotId i, RobotId) { return i != kSelf; };
+      const TeamInterval interval = team.next();
+      auto seen = view.step(interval, filter.belief());
+      (void)filter.step(interval);
+      if (t < 5.0) continue;
+      ASSERT_TRUE(seen && seen->belief) << seed << " at " << t;
+      for (const TeamPose& pose : seen->solution.poses)
+        EXPECT_LT(test::nees_of(pose, team.truth(pose.neighbor)), kSixDof5Sigma)
+            << seed << " at " << t;
+      EXPECT_EQ(seen->belief->self, kSelf);
+      filter.replace(*std::move(seen->belief));
+    }
+    // It sees again, and its own filter knows as much.
+    team.sees = [](RobotId, RobotId) { return true; };
+    const TeamInterval interval = team.next();
+    EXPECT_FALSE(view.step(interval, filter.belief()));
+    const TeamSolution solution = filter.step(interval);
+    ASSERT_EQ(solution.poses.size(), 2U);
+    for (const TeamPose& pose : solution.poses)
+      EXPECT_LT(test::nees_of(pose, team.truth(pose.neighbor)), kSixDof5Sigma) << seed;
   }
 }
 

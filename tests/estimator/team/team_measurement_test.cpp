@@ -17,7 +17,7 @@ constexpr double kTime = 0.06;     // s; a point of the trajectories' grid
 constexpr double kStep = 1e-6;
 constexpr int kPerRobot = FreeMotionAt::kMotion + TeamRobot::kCalibration;
 constexpr int kCamera = 2 * kPerRobot;
-constexpr int kRangeBias = kCamera + 3;
+constexpr int kRangeBias = kCamera + TeamCamera::kStates;
 
 /// Two robots with random motions, and everything that a measurement between them depends on.
 struct Scene {
@@ -40,6 +40,7 @@ struct Scene {
     }
     camera.p_B_C = random.vector(0.1);
     camera.misalignment = random.vector(0.1);
+    camera.lens = random.vector(6e-4);
     camera.index = kCamera;
     bias.bias_m = 0.1;
     bias.index = kRangeBias;
@@ -47,7 +48,9 @@ struct Scene {
 
   void perturb(int state, double by) {
     if (state >= kCamera) {
-      (state == kRangeBias ? bias.bias_m : camera.misalignment(state - kCamera)) += by;
+      (state == kRangeBias           ? bias.bias_m
+       : state < camera.lens_index() ? camera.misalignment(state - kCamera)
+                                     : camera.lens(state - camera.lens_index())) += by;
       return;
     }
     TeamRobot& robot = robots.at(std::size_t(state / kPerRobot));
@@ -93,7 +96,7 @@ Eigen::Vector3d true_bearing(const Scene& scene, const TeamPair& pair, double t_
       pair.neighbor_path.motion_at(t_s + pair.neighbor.clock_s - pair.observer.clock_s);
   const Eigen::Vector3d p_F_led = to.p_F + to.q_F_B * pair.neighbor_arms.p_body_led;
   const Eigen::Vector3d d = from.q_F_B.conjugate() * (p_F_led - from.p_F) - scene.camera.p_B_C;
-  return so3_exp(scene.camera.misalignment) * d.normalized();
+  return scene.camera.seen(d.normalized());
 }
 
 /// By each state, of what `f` measures of a scene.
