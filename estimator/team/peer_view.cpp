@@ -42,8 +42,11 @@ std::optional<PeerView::View> PeerView::step(const TeamInterval& interval, const
     if (reading.observer == interval.self) sees_ = interval.to;
     if (reading.bearing.neighbor == interval.self) is_seen_ = interval.to;
   }
+  if (own.robots.size() > 1) knows_ = interval.to;
   const bool is_dark = interval.to - is_seen_ >= kDark;
-  if (interval.to - sees_ < kDark || (is_dark && interval.members.size() < kLeastMembers)) {
+  const bool is_blind = interval.to - sees_ >= kDark;
+  const bool is_alone = !is_dark && interval.to - knows_ >= kDark;
+  if (!(is_blind || is_alone) || (is_dark && interval.members.size() < kLeastMembers)) {
     forget();
     return std::nullopt;
   }
@@ -83,12 +86,21 @@ void PeerView::forget() {
   filter_ = {};
 }
 
-/// The one whose cameras have most bearings, as long as they have any.
+/// The one whose cameras have most bearings, as long as they have any. One of which there is an
+/// estimate comes first: without that, it knows nobody itself.
 void PeerView::choose_peer(const TeamInterval& interval, const TeamBelief& own) {
+  constexpr int kEstimated = 1'000'000;
   std::map<RobotId, int> bearings;
   for (const TeamBearing& reading : interval.bearings) ++bearings[reading.observer];
+  for (auto& [id, count] : bearings) {
+    const bool is_estimated = std::ranges::any_of(interval.edges, [&](const RelativePoseEdge& e) {
+      return (e.from == id || e.to == id) && e.from != interval.self && e.to != interval.self;
+    });
+    count += is_estimated ? kEstimated : 0;
+  }
   std::erase_if(bearings, [&](const auto& entry) {
-    return interval.member(entry.first) == nullptr || entry.first == former_;
+    return interval.member(entry.first) == nullptr || entry.first == former_ ||
+           entry.first == interval.self;
   });
   if (bearings.contains(peer_)) peer_sees_ = interval.to;
   const bool stays =

@@ -1,4 +1,4 @@
-/// The team as a peer sees it, for a robot that sees nobody.
+/// The team as a peer sees it, for a robot that sees or knows nobody.
 #pragma once
 
 #include <optional>
@@ -10,10 +10,11 @@ namespace crepes {
 /// A robot that sees nobody does not know how the team is turned about it, but for what the IMUs
 /// tell in time. In its own frame that is an error of all others' places, which is not linear, and
 /// a filter would soon be too certain. If nobody sees it either, it knows of the others only their
-/// distances. Then a second filter estimates the team in the frame of a peer that sees others, as
-/// that peer itself does. There this robot is like any other one, whose heading is open, or which
-/// ranges hold or place. It begins with what this robot believed until then, if that is known. The
-/// belief is turned into this robot's frame (`root_change`). Deterministic.
+/// distances. If it measures no ranges, no estimate tells it of anybody. Then a second filter
+/// estimates the team in the frame of a peer that sees others, as that peer itself does. There this
+/// robot is like any other one, whose heading is open, or which ranges hold, or ranges or bearings
+/// place. It begins with what this robot believed until then, if that is known. The belief is
+/// turned into this robot's frame (`root_change`). Deterministic.
 class PeerView {
  public:
   /// The team in this robot's frame.
@@ -23,7 +24,8 @@ class PeerView {
   };
 
   /// Intervals must follow each other. `own` is what this robot's own filter believed before it.
-  /// Empty unless this robot has seen nobody for a second, and has a place in the peer's frame.
+  /// Empty unless this robot has seen nobody, or known nobody, for a second and has a place in the
+  /// peer's frame.
   [[nodiscard]] std::optional<View> step(const TeamInterval& interval, const TeamBelief& own);
 
  private:
@@ -32,6 +34,7 @@ class PeerView {
 
   Timestamp sees_ = kNever;     ///< when this robot last saw anybody
   Timestamp is_seen_ = kNever;  ///< when anybody last saw it
+  Timestamp knows_ = kNever;    ///< when its own filter last knew anybody
   Timestamp peer_sees_ = kNever;
   RobotId peer_{};    ///< whose frame it is; RobotId{} if there is none
   RobotId former_{};  ///< one that turned out to have a fault

@@ -9,6 +9,7 @@
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 #include "estimator/team/belief/place_chains.hpp"
+#include "estimator/team/belief/sight_places.hpp"
 #include "estimator/team/keyframe_pose.hpp"
 #include "estimator/team/readings/reading_rows.hpp"
 #include "estimator/team/readings/team_update.hpp"
@@ -271,7 +272,8 @@ std::vector<bool> TeamFilter::corrected_states(Stage stage) const {
 /// placed here or removed.
 void TeamFilter::add_members(const TeamInterval& interval, RobotId first, bool are_placed,
                              TeamSolution& solution) {
-  const std::map<RobotId, TeamPlace> candidates = unseen_places(interval, are_placed);
+  std::map<RobotId, TeamPlace> candidates = unseen_places(interval, are_placed);
+  if (are_placed) candidates.merge(places_by_sight(interval, belief_));
   std::map<RobotId, TeamPlace> known;
   for (const auto& [id, robot] : belief_.robots)
     if (are_placed || id == belief_.self) known[id] = TeamPlace::of(belief_, id);

@@ -133,6 +133,9 @@ Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vecto
     recording.imu = record_imu(world, robot, duration_s);
     recording.ranges = simulated_ranges(world, robot.config, robot.clock, scenario.ranges,
                                         disturbance.obstacles, duration_s);
+    std::erase_if(recording.ranges, [&](const UwbRange& z) {
+      return id == scenario.rangeless || z.neighbor == scenario.rangeless;
+    });
     recording.cameras.push_back({.spots = spots_of(robot), .images = {}});
     miscalibrate(robot.config, seed);
     if (scenario.are_boards_measured) measure_boards(*scenario.pictured, seed, robot.config);

@@ -31,6 +31,7 @@ struct Scenario {
   RangeModel ranges = RangeModel::kSimulated;
   double sight_m = 1e3;  ///< no camera sees further
   RobotId blind{};       ///< the cameras of this robot see nothing
+  RobotId rangeless{};   ///< this robot has no UWB module
   /// Spots are what the detector finds in rendered pictures of such boards, without disturbances.
   std::optional<LedBoard> pictured{};
   bool are_boards_measured = false;  ///< robots know their size, within 2 %
@@ -54,6 +55,7 @@ inline constexpr std::array kScenarios{
         .name = "blackout", .world = SimScenario::kFour, .dark = {.from_s = 15.0, .to_s = 30.0}},
     Scenario{.name = "blind", .world = SimScenario::kFour, .blind = RobotId{4}},
     Scenario{.name = "blind-pair", .world = SimScenario::kTwo, .blind = RobotId{2}},
+    Scenario{.name = "rangeless", .world = SimScenario::kFour, .rangeless = RobotId{4}},
     Scenario{.name = "thin-ranges", .world = SimScenario::kFour, .ranges = RangeModel::kLinkTrack},
     Scenario{.name = "thin-pair", .world = SimScenario::kTwo, .ranges = RangeModel::kLinkTrack},
     Scenario{.name = "workshop",

@@ -1,4 +1,5 @@
-/// A robot whose cameras see nobody, but which others see: its poses are as certain as they say.
+/// A robot whose cameras see nobody, or which has no UWB module, but which others see: it has poses
+/// that are as certain as they say.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,6 +33,16 @@ TEST(BlindRobot, KnowsTheOneThatSeesItAsWellAsItSays) {
 
     EXPECT_EQ(found.gross_errors.all.share(), 0.0) << seed;
     EXPECT_GT(found.worst_availability, 0.9) << seed;
+  }
+}
+
+TEST(RangelessRobot, HasATeamAllTheSame) {
+  for (const int seed : {1, 2}) {
+    const study::TeamQuality found = quality("rangeless", seed);
+
+    EXPECT_EQ(found.gross_errors.all.share(), 0.0) << seed;
+    EXPECT_GT(found.worst_availability, 0.95) << seed;
+    EXPECT_LT(found.position_rmse_m, 0.06) << seed;
   }
 }
 
