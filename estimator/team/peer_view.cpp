@@ -1,6 +1,7 @@
 #include "estimator/team/peer_view.hpp"
 
 #include <algorithm>
+#include <compare>
 #include <map>
 #include <utility>
 
@@ -86,28 +87,35 @@ void PeerView::forget() {
   filter_ = {};
 }
 
-/// The one whose cameras have most bearings, as long as they have any. One of which there is an
-/// estimate comes first: without that, it knows nobody itself.
+/// The one whose cameras have most bearings, as long as they have any. One that estimates connect
+/// with others comes first: without them, its filter knows nobody.
 void PeerView::choose_peer(const TeamInterval& interval, const TeamBelief& own) {
-  constexpr int kEstimated = 1'000'000;
-  std::map<RobotId, int> bearings;
-  for (const TeamBearing& reading : interval.bearings) ++bearings[reading.observer];
-  for (auto& [id, count] : bearings) {
-    const bool is_estimated = std::ranges::any_of(interval.edges, [&](const RelativePoseEdge& e) {
-      return (e.from == id || e.to == id) && e.from != interval.self && e.to != interval.self;
+  struct Merit {
+    bool is_estimated = false;
+    int bearings = 0;
+    auto operator<=>(const Merit&) const = default;
+  };
+  std::map<RobotId, Merit> merits;
+  for (const TeamBearing& reading : interval.bearings) ++merits[reading.observer].bearings;
+  for (auto& [id, merit] : merits) {
+    merit.is_estimated = std::ranges::any_of(interval.edges, [&](const RelativePoseEdge& edge) {
+      return (edge.from == id || edge.to == id) && edge.from != interval.self &&
+             edge.to != interval.self;
     });
-    count += is_estimated ? kEstimated : 0;
   }
-  std::erase_if(bearings, [&](const auto& entry) {
+  std::erase_if(merits, [&](const auto& entry) {
     return interval.member(entry.first) == nullptr || entry.first == former_ ||
            entry.first == interval.self;
   });
-  if (bearings.contains(peer_)) peer_sees_ = interval.to;
-  const bool stays =
-      peer_ != RobotId{} && interval.member(peer_) != nullptr && interval.to - peer_sees_ < kDark;
-  if (stays || bearings.empty()) return;
-  const RobotId next =
-      std::ranges::max_element(bearings, {}, &std::pair<const RobotId, int>::second)->first;
+  const auto best = std::ranges::max_element(merits, {}, [](const auto& e) { return e.second; });
+  const auto present = merits.find(peer_);
+  if (present != merits.end()) peer_sees_ = interval.to;
+  const bool is_useless = filter_.belief().robots.size() < 2 && present != merits.end() &&
+                          !present->second.is_estimated && best->second.is_estimated;
+  const bool stays = peer_ != RobotId{} && interval.member(peer_) != nullptr &&
+                     interval.to - peer_sees_ < kDark && !is_useless;
+  if (stays || merits.empty()) return;
+  const RobotId next = best->first;
   peer_sees_ = interval.to;
   if (next == peer_) return;
   peer_ = next;
