@@ -1,8 +1,8 @@
 #include "estimator/team/peer_view.hpp"
 
 #include <algorithm>
-#include <compare>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "estimator/team/belief/place_chains.hpp"
@@ -90,18 +90,16 @@ void PeerView::forget() {
 /// The one whose cameras have most bearings, as long as they have any. One that estimates connect
 /// with others comes first: without them, its filter knows nobody.
 void PeerView::choose_peer(const TeamInterval& interval, const TeamBelief& own) {
-  struct Merit {
-    bool is_estimated = false;
-    int bearings = 0;
-    auto operator<=>(const Merit&) const = default;
-  };
-  std::map<RobotId, Merit> merits;
-  for (const TeamBearing& reading : interval.bearings) ++merits[reading.observer].bearings;
-  for (auto& [id, merit] : merits) {
-    merit.is_estimated = std::ranges::any_of(interval.edges, [&](const RelativePoseEdge& edge) {
-      return (edge.from == id || edge.to == id) && edge.from != interval.self &&
-             edge.to != interval.self;
-    });
+  std::set<RobotId> estimated;
+  for (const RelativePoseEdge& edge : interval.edges) {
+    if (edge.from != interval.self && edge.to != interval.self)
+      estimated.insert({edge.from, edge.to});
+  }
+  std::map<RobotId, std::pair<bool, int>> merits;  // whether it is estimated, and its bearings
+  for (const TeamBearing& reading : interval.bearings) {
+    auto& [is_estimated, bearings] = merits[reading.observer];
+    is_estimated = estimated.contains(reading.observer);
+    ++bearings;
   }
   std::erase_if(merits, [&](const auto& entry) {
     return interval.member(entry.first) == nullptr || entry.first == former_ ||
@@ -111,7 +109,7 @@ void PeerView::choose_peer(const TeamInterval& interval, const TeamBelief& own) 
   const auto present = merits.find(peer_);
   if (present != merits.end()) peer_sees_ = interval.to;
   const bool is_useless = filter_.belief().robots.size() < 2 && present != merits.end() &&
-                          !present->second.is_estimated && best->second.is_estimated;
+                          !present->second.first && best->second.first;
   const bool stays = peer_ != RobotId{} && interval.member(peer_) != nullptr &&
                      interval.to - peer_sees_ < kDark && !is_useless;
   if (stays || merits.empty()) return;

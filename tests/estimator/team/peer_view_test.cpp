@@ -70,17 +70,24 @@ TEST(PeerView, ShowsNothingWithFewerThanFour) {
   EXPECT_EQ(known(4, 8.0, [](SimulatedTeam&) {}).poses, 0);
 }
 
-TEST(PeerView, EndsWhenTheRobotIsSeen) {
+TEST(PeerView, EndsWhenTheRobotSeesAndKnowsOthers) {
   SimulatedTeam team(3, 7);
   PeerView view;
+  TeamFilter filter;
+  const auto is_known = [&] {
+    const TeamInterval interval = team.next();
+    const bool by_peer = view.step(interval, filter.belief()).has_value();
+    (void)filter.step(interval);
+    return by_peer;
+  };
   team.hovers = true;
   team.sees = [](RobotId i, RobotId j) { return i != kSelf && j != kSelf; };
   bool was_known = false;
-  for (double t = 0.0; t < 12.0; t += kIntervalSeconds)
-    was_known = view.step(team.next(), {}).has_value() || was_known;
+  for (double t = 0.0; t < 12.0; t += kIntervalSeconds) was_known = is_known() || was_known;
   EXPECT_TRUE(was_known);
   team.sees = [](RobotId, RobotId) { return true; };
-  EXPECT_FALSE(view.step(team.next(), {}).has_value());
+  (void)is_known();  // after which its own filter knows those of whom it has estimates
+  EXPECT_FALSE(is_known());
 }
 
 // A robot that was seen for some seconds goes on from what it knew then.
