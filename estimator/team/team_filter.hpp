@@ -22,10 +22,10 @@ namespace crepes {
 ///
 /// States: each other robot's [p, v, theta]; every robot's gyroscope and accelerometer bias, its
 /// gyroscope's scale and axis errors and its antenna delay; every camera's misalignment and lens
-/// error; a range bias a pair. All pairs of a robot share its states, so that the team calibrates itself. The
-/// bearings of the interval are linearized at their mean time, through the IMUs, and correct it
-/// together (iterated least squares); then its ranges do. Then all motions advance to the end of
-/// the interval, the next keyframe.
+/// error; a range bias a pair. All pairs of a robot share its states, so that the team calibrates
+/// itself. The bearings of the interval are linearized at their mean time, through the IMUs, and
+/// correct it together (iterated least squares); then its ranges do. Then all motions advance to
+/// the end of the interval, the next keyframe.
 ///
 /// A new robot is on probation for a second: until its measurements agree with the others, they
 /// correct nobody but itself, and while they contradict it, it has no pose. A camera that
