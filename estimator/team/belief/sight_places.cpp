@@ -123,9 +123,11 @@ struct Attitude {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< body axes
 };
 
-/// How a robot at this place is turned that sees these trusted ones.
+/// How a robot with its LEDs at this place is turned that sees these trusted ones. Where its
+/// cameras are from its LEDs follows from that, so it counts as an error of the place.
 std::optional<Attitude> attitude_by(const std::vector<Ray>& rays, const Position& at,
-                                    const TeamInterval& interval, const TeamBelief& belief) {
+                                    const Eigen::Vector3d& p_B_led, const TeamInterval& interval,
+                                    const TeamBelief& belief) {
   Eigen::Matrix3d B = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   std::vector<std::pair<Eigen::Vector3d, double>> goals;
@@ -136,7 +138,7 @@ std::optional<Attitude> attitude_by(const std::vector<Ray>& rays, const Position
     const double distance = d.norm();
     if (distance < kNearest) return std::nullopt;
     const double moved2 = (to.covariance.topLeftCorner<3, 3>() + at.covariance).trace() / 3.0 +
-                          ray.moved_m * ray.moved_m;
+                          (ray.p_B_C - p_B_led).squaredNorm() + ray.moved_m * ray.moved_m;
     const double variance = ray.sigma_rad * ray.sigma_rad + moved2 / (distance * distance);
     B += d / distance * ray.u_B.transpose() / variance;
     information += (Eigen::Matrix3d::Identity() - ray.u_B * ray.u_B.transpose()) / variance;
@@ -184,12 +186,11 @@ std::map<RobotId, TeamPlace> places_by_sight(const TeamInterval& interval,
     if (of_it.size() < 2 || by_it.size() < 2) continue;
     const auto leds = meeting_point(of_it, belief);
     if (!leds) continue;
-    // Its cameras are near its LEDs, as seen from the others.
-    const auto attitude = attitude_by(by_it, *leds, interval, belief);
+    const Eigen::Vector3d& p_B_led = interval.member(id)->p_body_led;
+    const auto attitude = attitude_by(by_it, *leds, p_B_led, interval, belief);
     if (!attitude) continue;
-    TeamPlace place{
-        .T_S_N = {leds->p_F - attitude->q_F_B * interval.member(id)->p_body_led, attitude->q_F_B},
-        .last_sighting = interval.to};
+    TeamPlace place{.T_S_N = {leds->p_F - attitude->q_F_B * p_B_led, attitude->q_F_B},
+                    .last_sighting = interval.to};
     const double speed = interval.settings.priors.speed_mps;
     place.covariance.topLeftCorner<3, 3>() = leds->covariance;
     place.covariance.diagonal().segment<3>(3).setConstant(speed * speed);
