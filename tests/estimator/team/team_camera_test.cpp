@@ -3,12 +3,16 @@
 
 #include <Eigen/QR>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
 #include "estimator/team/belief/team_state.hpp"
+#include "estimator/team/team_filter.hpp"
 #include "estimator/vision/double_sphere.hpp"
+#include "tests/support/simulated_team.hpp"
+#include "tests/support/team_solution.hpp"
 
 namespace crepes::team_camera_test {
 namespace {
@@ -77,6 +81,33 @@ TEST(TeamCamera, MovesADirectionTowardsItsLensErrorAndNotAlongIt) {
   const TeamCamera camera{.lens = {0.0, 0.0, 1e-3}};
   EXPECT_NEAR(camera.seen(Eigen::Vector3d::UnitX()).z(), 1e-3, 1e-8);
   EXPECT_TRUE(camera.seen(Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitZ()));
+}
+
+/// Mean NEES of a team whose lenses err as the priors say, or are believed to be perfect.
+double mean_nees(bool are_believed) {
+  double nees = 0.0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    test::SimulatedTeam team(seed, 6);
+    if (are_believed)
+      team.damage = [](TeamInterval& interval) { interval.settings.priors.lens_rad = 0.0; };
+    TeamFilter filter;
+    for (int i = 0; i < 60; ++i) {
+      const TeamSolution solution = filter.step(team.next());
+      if (i < 40) continue;
+      for (const TeamPose& pose : solution.poses) {
+        nees += test::nees_of(pose, team.truth(pose.neighbor));
+        ++count;
+      }
+    }
+  }
+  return nees / count;
+}
+
+TEST(TeamCamera, ThatIsBelievedToBePerfectMakesTheTeamTooCertain) {
+  const double as_they_are = mean_nees(false);
+  EXPECT_LT(as_they_are, 9.0);
+  EXPECT_GT(mean_nees(true), 1.5 * as_they_are);
 }
 
 }  // namespace
