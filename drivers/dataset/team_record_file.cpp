@@ -176,9 +176,12 @@ void append_team_calibration_rows(std::string& text, const TeamRecord& record,
                robot.imu.gyro_scale_sigma.col(column));
     rows.add("antenna_delay", robot.antenna_delay_m, robot.antenna_delay_sigma_m);
     rows.add("clock", robot.clock_s, robot.clock_sigma_s);
-    for (std::size_t i = 0; i < robot.cameras.size(); ++i)
-      rows.add(fmt::format("camera{}", i), robot.cameras[i].rotation,
-               robot.cameras[i].covariance.diagonal().cwiseSqrt());
+    for (std::size_t i = 0; i < robot.cameras.size(); ++i) {
+      const CameraMisalignment& camera = robot.cameras[i];
+      rows.add(fmt::format("camera{}", i), camera.rotation,
+               camera.covariance.diagonal().cwiseSqrt());
+      rows.add(fmt::format("lens{}", i), camera.lens, camera.lens_sigma);
+    }
   }
 }
 

@@ -19,6 +19,7 @@ enum class SimScenario : std::uint8_t {
   kLine,
   kStatic,
   kFormation,
+  kNear,
 };
 inline constexpr std::array kSimScenarios{Choice{"two", SimScenario::kTwo},
                                           Choice{"four", SimScenario::kFour},
@@ -27,7 +28,8 @@ inline constexpr std::array kSimScenarios{Choice{"two", SimScenario::kTwo},
                                           Choice{"occluded", SimScenario::kOccluded},
                                           Choice{"line", SimScenario::kLine},
                                           Choice{"static", SimScenario::kStatic},
-                                          Choice{"formation", SimScenario::kFormation}};
+                                          Choice{"formation", SimScenario::kFormation},
+                                          Choice{"near", SimScenario::kNear}};
 
 /// A simulated world instead of devices.
 struct SimConfig {

@@ -15,6 +15,7 @@ namespace crepes {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+constexpr double kNearSide = 0.6;  // m, between two multirotors
 constexpr double kLineStep = 4.0;  // m, along the corridor
 constexpr double kLineSide = 1.5;  // m, from its middle
 
@@ -171,6 +172,9 @@ std::map<RobotId, Motion> motions_of(SimScenario scenario, int seed) {
       }
       return motions;
     }
+    case SimScenario::kNear:
+      return {{RobotId{1}, steered(waves(1), 0.0, 0.0, 0.0, 0.0)},
+              {RobotId{2}, steered(waves(2), kNearSide, 0.0, 0.0, kPi)}};
     case SimScenario::kStatic:
       return {{RobotId{1}, resting(waves(1), 0.0, 0.0, 1.2, 0.0)},
               {RobotId{2}, resting(waves(2), 5.0, 0.4, 1.0, kPi)}};

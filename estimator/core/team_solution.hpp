@@ -59,6 +59,10 @@ struct CameraMisalignment {
   /// Rotation vector, in body axes, from a direction by the calibration to the one measured [rad].
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  /// What its lens adds: all directions are moved towards this point, in body axes [rad], by the
+  /// part of it across.
+  Eigen::Vector3d lens = Eigen::Vector3d::Zero();
+  Eigen::Vector3d lens_sigma = Eigen::Vector3d::Zero();
   State state = State::kCalibrated;
 
   /// One sigma of the angle, about the axis of the rotation.

@@ -8,6 +8,7 @@
 #include "estimator/core/contract.hpp"
 #include "estimator/core/so3.hpp"
 #include "estimator/relative/bearing_measurement.hpp"
+#include "estimator/relative/parallax.hpp"
 #include "estimator/relative/polar_error.hpp"
 #include "estimator/relative/pose_measurement.hpp"
 #include "estimator/relative/range_update.hpp"
@@ -103,41 +104,6 @@ double intersection_weight(const Matrix6d& first, const Matrix6d& second) {
   return best;
 }
 
-// While ranges hold the distance, bearings must not observe the range bias. Distance and range bias
-// are strongly correlated, so the covariance of the position is long along the line of sight. Each
-// bearing rotates that line by microradians, and the IMUs' noise moves the estimate, which the next
-// bearings undo. If P keeps its orientation, this couples into the distance, and the estimates of
-// robots at rest drift apart. So the position errors of P are rotated until this bearing is
-// uncorrelated with the range bias, as far as the jitter of the line of sight explains the
-// correlation. A parallax from motion is much larger and stays. Compare Huang, Mourikis and
-// Roumeliotis 2010: an unobservable direction must be unobservable at every linearization.
-Eigen::Matrix3d unobservable_bias_rotation(const BearingInnovation& z, const E::Covariance& P) {
-  constexpr double kLineOfSightJitter = 3e-4;  // rad
-  const Eigen::Vector3d along = P.block<E::kP, E::kRangeBias, 3, 1>();
-  const Eigen::Matrix<double, 2, 3> by_p = z.H.middleCols<3>(E::kP);
-  const Eigen::Vector2d seen = z.H.lazyProduct(P.block<0, E::kRangeBias, E::kSeen, 1>());
-  const Eigen::Matrix2d across = by_p * by_p.transpose();
-  const Eigen::Vector3d aside = -by_p.transpose() * across.inverse() * seen;
-  const double length2 = along.squaredNorm();
-  if (!(aside.squaredNorm() < 0.01 * length2)) return Eigen::Matrix3d::Identity();  // converging
-  const double share = kLineOfSightJitter * kLineOfSightJitter /
-                       (kLineOfSightJitter * kLineOfSightJitter + aside.squaredNorm() / length2);
-  return so3_exp(share / length2 * along.cross(aside)).toRotationMatrix();
-}
-
-void rotate_position(const Eigen::Matrix3d& turn, E::Covariance& P) {
-  auto rows = P.seen_rows<E::kP, 3>();
-  rows = (turn * rows).eval();
-  auto columns = P.columns<E::kP, 3>();
-  columns = (columns * turn.transpose()).eval();
-}
-template <int M>
-void rotate_position(const Eigen::Matrix3d& turn, UpdateOutcome<M, E::kSize>& outcome) {
-  const auto apply = [&turn](auto&& rows) { rows = (turn * rows).eval(); };
-  apply(outcome.correction.template segment<3>(E::kP));
-  apply(outcome.G.template middleRows<3>(E::kP));
-}
-
 // A rotation of all that our camera sees cannot be distinguished from its misalignment m:
 //   dp = p x dm,  dv = v x dm,  dtheta = -R^T dm.
 Eigen::Matrix<double, E::kMotion, 3> motion_by_misalignment(const RelativeMotion& motion) {
@@ -200,15 +166,15 @@ void NeighborFilter::advance_to(Timestamp to, const ImuHistory& imu_B, const Imu
 template <class Innovation>
 Fusion NeighborFilter::correct(std::optional<Innovation> z, double gate_nis) {
   if (!z) return {};
-  const Eigen::Matrix3d turn =
-      has_ranges() ? unobservable_bias_rotation(*z, P_) : Eigen::Matrix3d::Identity();
-  z->H.template middleCols<3>(E::kP) *= turn;  // like a rotation of P, which may yet be gated
   auto outcome = kalman_gain(*z, gate_nis, P_);
   const Fusion fusion = fusion_of(*z, outcome);
   if (outcome.verdict != Verdict::kFused) return fusion;
-  rotate_position(turn, outcome);
-  rotate_position(turn, P_);
-  correct_covariance(outcome, P_);
+  if (has_ranges()) {
+    const E::Vector withheld = withhold_distance(*z, state_.motion.T_B_N.p, P_, outcome);
+    correct_covariance(outcome, withheld, P_);
+  } else {
+    correct_covariance(outcome, P_);
+  }
   apply(outcome.correction);
   return fusion;
 }
@@ -219,9 +185,9 @@ void NeighborFilter::apply(const E::Vector& correction) {
   inject(correction, state_);
   const bool is_far = correction.segment<3>(E::kTheta).norm() > kFar ||
                       correction.segment<3>(E::kP).norm() > kFar * before.T_B_N.p.norm();
-  // Below that, while ranges hold the distance and our camera the direction, the rotation by the
-  // range bias is enough, and it also takes care of the IMUs' noise. If only the neighbor sees us,
-  // nobody measures how its frame is turned about us, and P must move with the estimate.
+  // Below that, while ranges hold the distance and our camera the direction, P needs no transport:
+  // bearings do not correct the distance. If only the neighbor sees us, nobody measures how its
+  // frame is turned about us, and P must move with the estimate.
   Eigen::Matrix<double, E::kMotion, 3> by_m = motion_by_misalignment(before);
   if (is_far || !has_ranges() || is_blind()) {
     const MotionTransport T = error_transport(before, state_.motion);

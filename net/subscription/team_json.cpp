@@ -41,6 +41,7 @@ Json camera_json(const CameraMisalignment& camera) {
   put_estimate(json, "misalignment_deg", camera.rotation, camera.covariance.diagonal().cwiseSqrt(),
                kDegPerRad);
   put_estimate(json, "turned_deg", camera.rotation.norm(), camera.angle_sigma_rad(), kDegPerRad);
+  put_estimate(json, "lens_mrad", camera.lens, camera.lens_sigma, 1e3);
   json["state"] = name_of(camera.state);
   return json;
 }

@@ -40,6 +40,7 @@ struct Scenario {
 inline constexpr std::array kScenarios{
     Scenario{.name = "static", .world = SimScenario::kStatic},
     Scenario{.name = "manual", .world = SimScenario::kTwo},
+    Scenario{.name = "near", .world = SimScenario::kNear},
     Scenario{.name = "four", .world = SimScenario::kFour},
     Scenario{.name = "long-range", .world = SimScenario::kLongRange},
     Scenario{.name = "aggressive", .world = SimScenario::kAggressive},

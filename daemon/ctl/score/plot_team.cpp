@@ -85,6 +85,8 @@ std::optional<Quantity> quantity_named(const std::string& name) {
   if (name == "clock") return Quantity{"clock ahead of the observer's", "ms", 1e3};
   if (name.starts_with("camera"))
     return Quantity{"misalignment of camera " + name.substr(6), "deg", kDegPerRad};
+  if (name.starts_with("lens"))
+    return Quantity{"lens error of camera " + name.substr(4), "mrad", 1e3};
   return std::nullopt;
 }
 

@@ -85,6 +85,8 @@ std::string robot_file(const RobotPlan& plan) {
       "uwb:\n"
       "  noise_m: 0.1                            # between robots that turn\n"
       "  bias_sigma_m: 0.2                       # until `crepesctl calibrate range`\n"
+      "  bias_drift_m: 0.06                      # with the antennas' direction, in bias_time_s\n"
+      "  bias_time_s: 2\n"
       "net: {{interface: {2}}}\n",
       plan.id.value, to_yaml(plan.camera.rate_hz), plan.interface);
 }

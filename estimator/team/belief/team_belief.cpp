@@ -211,7 +211,9 @@ RobotCalibration TeamBelief::calibration(RobotId id) const {
   for (const TeamCamera& camera : robot.cameras) {
     calibration.cameras.push_back({.p_B_C = camera.p_B_C,
                                    .rotation = camera.misalignment,
-                                   .covariance = P.block<3, 3>(camera.index, camera.index)});
+                                   .covariance = P.block<3, 3>(camera.index, camera.index),
+                                   .lens = camera.lens,
+                                   .lens_sigma = sigmas(camera.lens_index())});
   }
   return calibration;
 }

@@ -135,12 +135,12 @@ TEST(NeighborFilter, ErrorsAreAsLargeAsItSaysRightAfterARawPose) {
   EXPECT_LT(nees, kHigh);
 }
 
-/// What the filter takes the range's bias, zero in truth, for after two robots stood still.
-double range_bias_learned_at_rest(std::uint64_t seed, Duration duration) {
+/// The filter after two robots stood still, at `p_B_N` in truth. The range's bias is zero.
+NeighborFilter after_rest(std::uint64_t seed, Duration duration, const Eigen::Vector3d& p_B_N,
+                          double bias_sigma_m, const Eigen::Vector3d& first_p_B_N) {
   constexpr double kBearing = 3.5e-4;  // rad
   constexpr double kRange = 0.05;      // m
   test::RandomGeometry random(seed);
-  const Eigen::Vector3d p_B_N(4.0, 1.0, 0.3);
   const ProcessNoise noise{.gyro_density = 4e-4, .accel_density = 2e-3};
   ImuHistory imu_B;
   ImuHistory imu_N;
@@ -161,11 +161,11 @@ double range_bias_learned_at_rest(std::uint64_t seed, Duration duration) {
   Matrix6d start = Matrix6d::Identity() * 1e-4;
   start.topLeftCorner<3, 3>().diagonal().setConstant(0.01);
   NeighborFilter filter(Timestamp{0ms},
-                        GaussianPose{{p_B_N, Eigen::Quaterniond::Identity()}, start}, noise,
+                        GaussianPose{{first_p_B_N, Eigen::Quaterniond::Identity()}, start}, noise,
                         {.speed_mps = 0.1,
                          .gyro_bias_radps = 0.005,
                          .accel_bias_mps2 = 0.03,
-                         .range_bias_m = 0.05,
+                         .range_bias_m = bias_sigma_m,
                          .misalignment_rad = 0.0026});
   for (Timestamp t{10ms}; t <= Timestamp{duration}; t += 10ms) {
     sample(t);
@@ -175,15 +175,31 @@ double range_bias_learned_at_rest(std::uint64_t seed, Duration duration) {
     static_cast<void>(filter.fuse_range({p_B_N.norm() + random.normal(kRange), kRange},
                                         Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), kNoGate));
   }
-  return filter.state().range_bias_m;
+  return filter;
 }
 
 TEST(NeighborFilter, AtRestBearingsSayNothingOfTheDistance) {
   constexpr int kRuns = 10;
+  const Eigen::Vector3d p_B_N(4.0, 1.0, 0.3);
   double sum = 0.0;
-  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) sum += range_bias_learned_at_rest(seed, 60s);
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed)
+    sum += after_rest(seed, 60s, p_B_N, 0.05, p_B_N).state().range_bias_m;
 
   EXPECT_NEAR(sum / kRuns, 0.0, 0.02);
+}
+
+// The first range said so, and nothing can tell it from the range's bias.
+TEST(NeighborFilter, AtRestADistanceStaysAsUncertainAsTheRangesBias) {
+  constexpr int kRuns = 20;
+  constexpr double kBias = 0.1;  // m
+  const Eigen::Vector3d p_B_N(1.0, 0.3, 0.1);
+  const Eigen::Vector3d u = p_B_N.normalized();
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    const NeighborFilter filter = after_rest(seed, 20s, p_B_N, kBias, p_B_N);
+    const Eigen::Matrix3d P = filter.pose_covariance().topLeftCorner<3, 3>();
+    // The start knows it with a sigma of 0.1 m, too; of both remains 0.07 m.
+    EXPECT_GT(std::sqrt(u.dot(P * u)), 0.9 * kBias / std::sqrt(2.0)) << seed;
+  }
 }
 
 /// Of where across the line of sight the neighbor is, the mean squared error of 150 pairs over its

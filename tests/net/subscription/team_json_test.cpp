@@ -41,6 +41,8 @@ TeamRobotStatus robot_with(RobotId id, int cameras) {
         {.p_B_C = {0.1234567, -0.0234567, 0.1 * i},
          .rotation = radians(0.4) * Eigen::Vector3d::UnitZ(),
          .covariance = std::pow(radians(0.05), 2) * Eigen::Matrix3d::Identity(),
+         .lens = {-0.00023456, 0.00034567, 0.0},
+         .lens_sigma = Eigen::Vector3d::Constant(0.00043456),
          .state = CameraMisalignment::State::kTurned});
   }
   robot.residuals = {ResidualStatus{.nis = 0.81234, .fused = 1234567, .refused = 54321},
@@ -99,6 +101,8 @@ TEST(TeamJson, ReportsOneRobotInFull) {
   const Json& camera = robot["calibration"]["cameras"][0];
   EXPECT_EQ(camera["turned_deg"], Json({{"value", 0.4}, {"sigma", 0.05}}));
   EXPECT_EQ(camera["misalignment_deg"]["value"], Json({0.0, 0.0, 0.4}));
+  EXPECT_EQ(camera["lens_mrad"]["value"], Json({-0.2346, 0.3457, 0.0}));
+  EXPECT_EQ(camera["lens_mrad"]["sigma"], Json({0.43, 0.43, 0.43}));
   EXPECT_EQ(camera["state"], "turned");
   EXPECT_EQ(robot["faults"][0],
             "its camera is turned by 0.40 +- 0.05 deg against its calibration; calibrate it again");

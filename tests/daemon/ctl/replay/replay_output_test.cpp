@@ -122,8 +122,10 @@ TeamRecord a_team_record() {
   robot.robot = RobotId{2};
   robot.clock_s = 0.003;
   robot.clock_sigma_s = 0.001;
-  robot.cameras.push_back(
-      {.rotation = {0.1, 0.2, 0.3}, .covariance = 0.25 * Eigen::Matrix3d::Identity()});
+  robot.cameras.push_back({.rotation = {0.1, 0.2, 0.3},
+                           .covariance = 0.25 * Eigen::Matrix3d::Identity(),
+                           .lens = {0.0, 0.001, -0.002},
+                           .lens_sigma = {0.0006, 0.0005, 0.0004}});
   return record;
 }
 
@@ -154,7 +156,7 @@ TEST(TeamRecordFile, ReadsBackWhatItWrote) {
   EXPECT_EQ(residuals->at(1).residual.kind, TeamResidual::Kind::kGyro);
   EXPECT_EQ(residuals->at(1).residual.dimension, 6);
   ASSERT_TRUE(quantities) << quantities.error().message;
-  ASSERT_EQ(quantities->size(), 8U);
+  ASSERT_EQ(quantities->size(), 9U);
   EXPECT_EQ(quantities->at(6).quantity, "clock");
   EXPECT_EQ(quantities->at(6).dimension, 1);
   EXPECT_EQ(quantities->at(6).value[0], 0.003);
@@ -163,6 +165,9 @@ TEST(TeamRecordFile, ReadsBackWhatItWrote) {
   EXPECT_EQ(quantities->at(7).dimension, 3);
   EXPECT_EQ(quantities->at(7).value, (std::array{0.1, 0.2, 0.3}));
   EXPECT_EQ(quantities->at(7).sigma, (std::array{0.5, 0.5, 0.5}));
+  EXPECT_EQ(quantities->at(8).quantity, "lens0");
+  EXPECT_EQ(quantities->at(8).value, (std::array{0.0, 0.001, -0.002}));
+  EXPECT_EQ(quantities->at(8).sigma, (std::array{0.0006, 0.0005, 0.0004}));
 }
 
 TEST(TeamRecordFile, RefusesAKindThatIsNone) {
@@ -187,7 +192,7 @@ TEST(ReplayOutput, WritesTheTeamOfEachObserver) {
     ASSERT_TRUE(output->finish({}));
   }
   EXPECT_EQ(read_team_innovation_file(file)->size(), 2U);
-  EXPECT_EQ(read_team_calibration_file(scratch.path() / "r1/team.calibration.csv")->size(), 8U);
+  EXPECT_EQ(read_team_calibration_file(scratch.path() / "r1/team.calibration.csv")->size(), 9U);
   ASSERT_TRUE(ReplayOutput::create(scratch.path(), kNames)->finish({}));
   EXPECT_FALSE(fs::exists(file));
 }
