@@ -144,7 +144,8 @@ TEST_F(Plot, DrawsErrorsInnovationsAndBiasesOnOnePage) {
   EXPECT_NE(html.find("The team as r1 estimates it"), std::string::npos);
   EXPECT_NE(html.find("bearing of r2: 33 fused, 11 refused"), std::string::npos);
   EXPECT_NE(html.find("r2: misalignment of camera 0"), std::string::npos);
-  constexpr std::size_t kOfTeam = 1U + 5U;  // residuals; biases, delay, clock, camera
+  EXPECT_NE(html.find("r2: lens error of camera 0"), std::string::npos);
+  constexpr std::size_t kOfTeam = 1U + 6U;  // residuals; biases, delay, clock, camera, lens
   EXPECT_EQ(count_of(html, "<svg"), 1U + 6U + 2U + 1U + 7U + 1U + kOfTeam);
   EXPECT_EQ(count_of(html, "<svg"), count_of(html, "</svg>"));
   EXPECT_EQ(count_of(html, "nan"), 0U);
