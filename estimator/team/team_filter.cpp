@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <optional>
 #include <set>
 #include <utility>
@@ -22,7 +21,6 @@ namespace {
 constexpr double kUnknownDistance = 0.10;  // m; the least by which a step is judged
 constexpr double kLinear = 0.01;           // rad, and relative to the distance
 constexpr int kMaxIterations = 4;
-constexpr double kSignificant = 5.0;      // sigmas of the directions: a parallax
 constexpr double kAgreementMemory = 0.5;  // s
 constexpr std::size_t kMaxCameras = 4;    // of a robot, whatever it reports
 
@@ -45,21 +43,6 @@ double largest_step(const std::map<RobotId, TeamRobot>& robots, const Eigen::Vec
                         dx.segment<3>(robot.motion_index).norm() / distance});
   }
   return largest;
-}
-
-/// The mean relative error of the distances of those robots that are corrected, weighed by their
-/// squares, by the states: the team's scale, of which bearings at rest say nothing.
-Eigen::VectorXd scale_by_states(const std::map<RobotId, TeamRobot>& robots,
-                                const std::vector<bool>& corrected) {
-  Eigen::VectorXd by_states = Eigen::VectorXd::Zero(std::ssize(corrected));
-  double sum_m2 = 0.0;
-  for (const auto& [id, robot] : robots) {
-    const int index = robot.motion_index;
-    if (index < 0 || !corrected[static_cast<std::size_t>(index)]) continue;
-    by_states.segment<3>(index) = robot.motion.p_F;
-    sum_m2 += robot.motion.p_F.squaredNorm();
-  }
-  return sum_m2 > 0.0 ? Eigen::VectorXd(by_states / sum_m2) : by_states;
 }
 
 }  // namespace
@@ -241,13 +224,8 @@ bool TeamFilter::correct(const TeamInterval& interval, Stage stage, TeamReadings
     belief_.robots = robots;
     belief_.ranges = ranges;
     if (rows.empty()) return true;  // the last step may have made all ranges unlikely
-    TeamUpdate update(rows, dy, instant.covariance(), instant.with_belief());
+    const TeamUpdate update(rows, dy, instant.covariance(), instant.with_belief());
     if (!update.is_valid()) return false;
-    if (!readings.sights.empty()) {
-      const auto others = static_cast<double>(belief_.robots.size() - 1);
-      update.withhold(scale_by_states(belief_.robots, corrected),
-                      kSignificant * kSignificant * others, belief_.P);
-    }
     Eigen::VectorXd next = update.correction();
     for (Eigen::Index i = 0; i < next.size(); ++i)
       if (!corrected[static_cast<std::size_t>(i)]) next(i) = 0.0;
