@@ -384,8 +384,12 @@ std::optional<std::string> team_status_json(const SystemStatus& status, RobotId 
   Json json =
       team_part_json(status, TeamDetail::kFull, [robot](RobotId id) { return id == robot; });
   std::string text = dump(json);
-  while (text.size() > kMaxSubscriptionDatagram) {  // four cameras, or several faults
+  if (text.size() > kMaxSubscriptionDatagram) {  // two cameras, and a fault
     json["truncated"] = true;
+    erase_in_each(json["team"]["robots"][0]["calibration"], "cameras", "lens_mrad");
+    text = dump(json);
+  }
+  while (text.size() > kMaxSubscriptionDatagram) {  // four cameras, or several faults
     Json& only = json["team"]["robots"][0];
     if (only["calibration"].erase("gyro_scale") == 0 && !drop_last(only["calibration"], "cameras"))
       only.erase("faults");

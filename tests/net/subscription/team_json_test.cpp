@@ -138,7 +138,11 @@ TEST(TeamJson, FitsADatagramHoweverLargeTheTeam) {
     SystemStatus status = team_of(4, cameras);
     const std::string text = team_status_json(status, kOther).value();
     EXPECT_LE(text.size(), kMaxSubscriptionDatagram);
-    EXPECT_EQ(Json::parse(text).contains("truncated"), cameras > 2) << cameras << " cameras";
+    const Json json = Json::parse(text);
+    EXPECT_EQ(json.contains("truncated"), cameras > 1) << cameras << " cameras";
+    const Json& listed = json["team"]["robots"][0]["calibration"]["cameras"];
+    EXPECT_GE(listed.size(), std::min<std::size_t>(cameras, 2));
+    for (const Json& camera : listed) EXPECT_EQ(camera.contains("lens_mrad"), cameras == 1);
     for (TeamRobotStatus& robot : status.estimator.team->robots)
       robot.faults.resize(40, robot.faults.front());
     EXPECT_LE(team_status_json(status, kOther)->size(), kMaxSubscriptionDatagram);
@@ -197,7 +201,8 @@ TEST(TeamJson, HasOnlyDocumentedKeys) {
   std::ifstream file(std::string(source_dir()) + "/config/docs/formats.md");
   const std::string document{std::istreambuf_iterator<char>(file), {}};
   std::set<std::string> keys;
-  add_keys(Json::parse(team_status_json(team_of(4, 2), kOther).value()), keys);
+  for (const int cameras : {1, 2})
+    add_keys(Json::parse(team_status_json(team_of(4, cameras), kOther).value()), keys);
   add_keys(Json::parse(pair_status_json(team_of(4, 2), kOther).value()), keys);
   EXPECT_GT(keys.size(), 25U);
   for (const std::string& key : keys)
