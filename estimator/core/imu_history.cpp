@@ -46,7 +46,7 @@ std::size_t ImuHistory::first_after(Timestamp t) const {
   return low;
 }
 
-bool ImuHistory::push(const ImuSample& sample) {
+bool ImuHistory::push(const ImuSample& sample, const Eigen::Vector3d& blow_mps) {
   if (!is_plausible(sample)) return false;
   std::size_t place = first_after(sample.stamp);
   if (place > 0 && (*this)[place - 1].stamp == sample.stamp) return false;
@@ -57,8 +57,8 @@ bool ImuHistory::push(const ImuSample& sample) {
     --place;
   }
   ++size_;
-  for (std::size_t i = size_ - 1; i > place; --i) slot(i) = (*this)[i - 1];
-  slot(place) = sample;
+  for (std::size_t i = size_ - 1; i > place; --i) slot(i) = slot(i - 1);
+  slot(place) = {sample, blow_mps};
   if (place + 1 == size_) observe_motion();
   return true;
 }
@@ -124,6 +124,10 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
     add(sample, dt, sum);
     // In a gap the next sample is held, so that the error shrinks towards it.
     if (!covered) extrapolate(to_seconds(sample.stamp - end), dt);
+    if (i > 0 && !blow_mps(i).isZero()) {
+      const double share = dt / to_seconds(sample.stamp - (*this)[i - 1].stamp);
+      sum.blow_variance_m2ps2 += share * blow_mps(i).cwiseAbs2();
+    }
     t = end;
   }
   if (t < to) {
@@ -140,7 +144,8 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
           .gyro_noise_density = gyro_.noise_density(),
           .accel_noise_density = accel_.noise_density(),
           .gyro_innovation_density = sum.gyro_innovation_density,
-          .accel_innovation_density = sum.accel_innovation_density};
+          .accel_innovation_density = sum.accel_innovation_density,
+          .blow_variance_m2ps2 = sum.blow_variance_m2ps2};
 }
 
 Duration ImuHistory::extrapolated(Timestamp from, Timestamp to) const {

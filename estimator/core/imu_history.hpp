@@ -26,6 +26,8 @@ struct ImuMean {
   /// Errors of the extrapolation, as the density of a random walk.
   double gyro_innovation_density = 0.0;   ///< [rad/s/sqrt(s)]
   double accel_innovation_density = 0.0;  ///< [m/s^2/sqrt(s)]
+  /// Variance of the velocity after the interval by forces that were refused, but may be real.
+  Eigen::Vector3d blow_variance_m2ps2 = Eigen::Vector3d::Zero();
 };
 
 /// Finite, and within 100 rad/s and 1000 m/s^2 an axis.
@@ -43,13 +45,14 @@ class ImuHistory {
   static constexpr Duration kMaxHold = std::chrono::milliseconds{500};
 
   /// False, and nothing changes, if the sample is implausible, a duplicate, or older than all kept.
-  bool push(const ImuSample& sample);
+  /// `blow_mps` is the velocity by forces that were refused since the sample before.
+  bool push(const ImuSample& sample, const Eigen::Vector3d& blow_mps = Eigen::Vector3d::Zero());
 
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] std::size_t size() const { return size_; }
   /// Counted from the oldest.
   [[nodiscard]] const ImuSample& operator[](std::size_t i) const {
-    return samples_[(first_ + i) % kCapacity];
+    return kept_[(first_ + i) % kCapacity].sample;
   }
   [[nodiscard]] const ImuSample& newest() const { return (*this)[size_ - 1]; }
 
@@ -65,7 +68,15 @@ class ImuHistory {
   [[nodiscard]] Eigen::Quaterniond rotation(Timestamp from, Timestamp to) const;
 
  private:
-  ImuSample& slot(std::size_t i) { return samples_[(first_ + i) % kCapacity]; }
+  struct Kept {
+    ImuSample sample;
+    Eigen::Vector3d blow_mps = Eigen::Vector3d::Zero();
+  };
+
+  Kept& slot(std::size_t i) { return kept_[(first_ + i) % kCapacity]; }
+  [[nodiscard]] const Eigen::Vector3d& blow_mps(std::size_t i) const {
+    return kept_[(first_ + i) % kCapacity].blow_mps;
+  }
   [[nodiscard]] std::size_t first_after(Timestamp t) const;
   /// The newest samples, if they are equally spaced.
   template <class Samples>
@@ -81,7 +92,7 @@ class ImuHistory {
   [[nodiscard]] double strides_to(Timestamp from, Timestamp to, double period_s) const;
   void add_predicted(Timestamp from, Timestamp to, ImuMean& sum) const;
 
-  std::array<ImuSample, kCapacity> samples_{};
+  std::array<Kept, kCapacity> kept_{};
   std::size_t first_ = 0;
   std::size_t size_ = 0;
   SignalModel gyro_;

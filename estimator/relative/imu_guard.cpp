@@ -18,11 +18,17 @@ constexpr PerSensor kHarmless{.gyro = 0.1, .accel = 0.5};
 // A robot is assumed not to change its rate or its force by more within one sample and keep the new
 // value: 200 rad/s^2, and half of gravity within 10 ms.
 constexpr PerSensor kLargestChange{.gyro = 2.0, .accel = 5.0};
-constexpr std::size_t kDecided = 6;  // samples after which a change is called a jump
+// Samples after which a change is a vibration that begins, or else, longer than a blow, a jump.
+constexpr std::size_t kVibrates = 6;
+constexpr std::size_t kJumps = 10;
 constexpr double kMostSteps = 10.0;  // over which an innovation grows as a random walk
 constexpr Duration kTypicalPeriod = std::chrono::milliseconds{10};
 // Across a longer gap there is no prediction.
 constexpr Duration kLongestGap = std::chrono::milliseconds{100};
+
+// The change of a robot's speed by a blow, an axis. A robot that hits a wall at 0.5 m/s and is
+// thrown back changes by as much.
+constexpr double kHardestBlow = 1.0;  // m/s
 
 // Medians of innovations: half again the vibration of a sample, which no airframe exceeds.
 constexpr PerSensor kMostVibration{.gyro = 3.0, .accel = 30.0};
@@ -162,7 +168,16 @@ void ImuGuard::update_sigmas(const PerSensor& innovation) {
   accel_.add(innovation.accel);
 }
 
+Eigen::Vector3d ImuGuard::blow_mps(const ImuSample& believed) const {
+  return believed.stamp == blow_ ? blow_mps_ : Eigen::Vector3d::Zero();
+}
+
 void ImuGuard::believe(const ImuSample& sample) {
+  if (!refused_mps_.isZero()) {
+    blow_ = sample.stamp;
+    blow_mps_ = refused_mps_.cwiseMax(-kHardestBlow).cwiseMin(kHardestBlow);
+    refused_mps_.setZero();
+  }
   if (reference_) {
     turn_force(sample, reference_->last.stamp);
     correct_force(sample);
@@ -198,8 +213,20 @@ void ImuGuard::follow_force(const ImuSample& sample, const ImuSample& last) {
 
 void ImuGuard::believe_held(std::size_t from) {
   count(ImuFault::kSpike, from);
+  for (std::size_t i = 0; i < from; ++i)
+    refuse_spike(held_.at(i), i > 0 ? held_.at(i - 1) : reference_->last);
   for (std::size_t i = from; i < held_count_; ++i) believe(held_.at(i));
   clear_held();
+}
+
+void ImuGuard::refuse_spike(const ImuSample& spike, const ImuSample& before) {
+  refused_mps_ +=
+      to_seconds(spike.stamp - before.stamp) * (spike.accel_mps2 - reference_->last.accel_mps2);
+  if (spike_count_ == kMostSpikes) {
+    std::shift_left(spikes_.begin(), spikes_.end(), 1);
+    --spike_count_;
+  }
+  spikes_.at(spike_count_++) = spike;
 }
 
 void ImuGuard::drop_held(ImuFault fault) {
@@ -240,15 +267,10 @@ void ImuGuard::judge(const ImuSample& sample) {
   hold(sample);
   if (has_jumped_) {
     if (held_count_ == kMostHeld && held_are_plausible()) restart_from_held();
-  } else if (held_count_ == kDecided) {
-    const bool is_unsteady =
-        std::all_of(held_.begin(), held_.begin() + kDecided,
-                    [this](const ImuSample& one) { return is_reachable(one); });
-    if (is_unsteady) {
-      believe_held(0);  // a vibration has begun
-    } else {
-      has_jumped_ = true;
-    }
+  } else if (held_count_ == kVibrates && are_held_reachable()) {
+    believe_held(0);
+  } else if (held_count_ == kJumps) {
+    has_jumped_ = true;
   }
 }
 
@@ -268,8 +290,17 @@ std::size_t ImuGuard::first_of_level() const {
   return first;
 }
 
+/// From the last believed sample, which may have been a part of a blow: then the force returns to
+/// what it was over the last samples.
 bool ImuGuard::is_reachable(const ImuSample& sample) const {
-  return is_within(distance(sample, reference_->last), largest_change());
+  PerSensor change = distance(sample, reference_->last);
+  change.accel = std::min(change.accel, (sample.accel_mps2 - force_).norm());
+  return is_within(change, largest_change());
+}
+
+bool ImuGuard::are_held_reachable() const {
+  const std::span held = std::span(held_).first(held_count_);
+  return std::ranges::all_of(held, [this](const ImuSample& one) { return is_reachable(one); });
 }
 
 bool ImuGuard::held_are_plausible() const {

@@ -44,7 +44,8 @@ struct PerSensor {
 /// innovation waits for its successors, and nothing is believed meanwhile: ImuHistory extrapolates
 /// with the noise that belongs to it. If the successors return to the prediction, the sample was a
 /// spike. If they agree with the sample, the motion has changed, and all are believed, one sample
-/// late. A false alarm costs no more than that.
+/// late. A false alarm costs no more than that. A spike of the accelerometer looks like a blow, as
+/// when a robot lands or hits a wall. It is refused, but `blow_mps` tells what it would have been.
 ///
 /// A change that no robot makes within a sample (unit, swapped axes) is not believed when it stays.
 /// Samples are believed again when they return, or when a fifth of a second of them is plausible.
@@ -65,6 +66,11 @@ class ImuGuard {
   /// True if the sample does not contradict the mean rates about its stamp.
   [[nodiscard]] bool agrees(const ImuSample& sample, const ImuMean& mean) const;
 
+  /// The velocity that refused forces would have caused before this believed sample, body axes.
+  [[nodiscard]] Eigen::Vector3d blow_mps(const ImuSample& believed) const;
+  /// The latest samples that were refused as spikes, in order of their stamps.
+  [[nodiscard]] std::span<const ImuSample> spikes() const { return {spikes_.data(), spike_count_}; }
+
   /// True if the last sample was saturated. The ones before it were as wrong, and believed.
   [[nodiscard]] bool is_saturated() const { return watch_.is_saturated(); }
   /// By reason.
@@ -72,6 +78,7 @@ class ImuGuard {
 
  private:
   static constexpr std::size_t kMostHeld = 20;  ///< the samples that are judged after a jump
+  static constexpr std::size_t kMostSpikes = 16;
 
   void count(ImuFault fault, std::size_t samples = 1) {
     refused_.at(static_cast<std::size_t>(fault)) += samples;
@@ -86,6 +93,7 @@ class ImuGuard {
   void judge(const ImuSample& sample);
   void update_sigmas(const PerSensor& innovation);
   void believe(const ImuSample& sample);
+  void refuse_spike(const ImuSample& spike, const ImuSample& before);
   void believe_held(std::size_t from);
   void drop_held(ImuFault fault);
   void clear_held();
@@ -97,6 +105,7 @@ class ImuGuard {
   [[nodiscard]] bool is_shock(const PerSensor& back, const PerSensor& on) const;
   [[nodiscard]] std::size_t first_of_level() const;
   [[nodiscard]] bool is_reachable(const ImuSample& sample) const;
+  [[nodiscard]] bool are_held_reachable() const;
   [[nodiscard]] bool held_are_plausible() const;
 
   ImuWatch watch_;
@@ -105,6 +114,9 @@ class ImuGuard {
   InnovationScale accel_;
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  ///< smoothed specific force, body axes
   Timestamp since_ = kNever;  ///< the first of the samples whose forces agree
+  Eigen::Vector3d refused_mps_ = Eigen::Vector3d::Zero();  ///< since the last believed sample
+  Eigen::Vector3d blow_mps_ = Eigen::Vector3d::Zero();
+  Timestamp blow_ = kNever;   ///< the believed sample after it
   bool has_refused_ = false;  ///< since the last sample that was believed
   bool has_jumped_ = false;   ///< the held samples must be plausible to be believed
   bool gyro_has_jumped_ = false;
@@ -112,6 +124,8 @@ class ImuGuard {
 
   std::array<ImuSample, kMostHeld> held_{};
   std::size_t held_count_ = 0;
+  std::array<ImuSample, kMostSpikes> spikes_{};
+  std::size_t spike_count_ = 0;
   std::array<ImuSample, kMostHeld + 1> believed_{};
   std::size_t believed_count_ = 0;
   ImuFaultCounts refused_{};

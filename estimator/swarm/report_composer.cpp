@@ -1,9 +1,26 @@
 #include "estimator/swarm/report_composer.hpp"
 
+#include <algorithm>
+
 namespace crepes {
 namespace {
 
 constexpr Duration kRepeated = std::chrono::milliseconds{520};
+
+/// In order of their stamps. Spikes are among them: peers refuse them too, and so know of a blow
+/// that may be real.
+std::vector<ImuSample> samples_since(Timestamp since, const RobotState& self) {
+  std::vector<ImuSample> samples;
+  std::size_t first = self.imu.size();
+  while (first > 0 && self.imu[first - 1].stamp >= since) --first;
+  samples.reserve(self.imu.size() - first + self.guard.spikes().size());
+  for (std::size_t i = first; i < self.imu.size(); ++i) samples.push_back(self.imu[i]);
+  for (const ImuSample& spike : self.guard.spikes()) {
+    if (spike.stamp < since) continue;
+    samples.insert(std::ranges::upper_bound(samples, spike.stamp, {}, &ImuSample::stamp), spike);
+  }
+  return samples;
+}
 
 }  // namespace
 
@@ -24,10 +41,7 @@ std::optional<Report> ReportComposer::compose(Timestamp now, const RobotState& s
   report.sender = self_;
   report.stamp = now;
   report.tilt = *self.tilt;
-  std::size_t first = self.imu.size();
-  while (first > 0 && self.imu[first - 1].stamp >= now - kRepeated) --first;
-  report.imu.reserve(self.imu.size() - first);
-  for (std::size_t i = first; i < self.imu.size(); ++i) report.imu.push_back(self.imu[i]);
+  report.imu = samples_since(now - kRepeated, self);
   report.bearings = bearings_.all();
   report.ranges = ranges_.all();
   report.estimates = estimates;

@@ -23,7 +23,7 @@ struct RobotState {
     const bool is_late = !imu.empty() && sample.stamp < imu.newest().stamp;
     if (is_late && !guard.agrees(sample, imu.mean(sample.stamp - kAbout, sample.stamp)))
       return false;
-    return imu.push(sample);
+    return imu.push(sample, guard.blow_mps(sample));
   }
 
   /// True if the IMU does not show the motion at `t`: no sample for half a second, a saturated

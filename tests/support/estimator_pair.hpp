@@ -73,6 +73,12 @@ class EstimatorPair {
     for (const Duration end = now_ + duration; now_ < end;) advance(with);
   }
 
+  /// Something hits us, or the neighbor, within the next inertial sample.
+  void hit(bool own, const Eigen::Vector3d& v_W) {
+    const Timestamp stamp{now_ + std::chrono::milliseconds{3}};
+    own ? pair_.hit_B(stamp, v_W) : pair_.hit_N(stamp, v_W);
+  }
+
   /// Our estimator receives what its team's filter found.
   void solve(const TeamSolution& solution) { (void)estimator_.step(solution); }
 

@@ -1,8 +1,10 @@
 /// Two robots that fly smooth figures around each other, and what their sensors say.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/imu_history.hpp"
@@ -12,7 +14,13 @@
 
 namespace crepes::test {
 
-/// One robot's way: sums of sines in position and attitude, a function of time.
+/// Changes a robot's velocity at once.
+struct Blow {
+  double t = 0.0;
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();  ///< [m/s]
+};
+
+/// One robot's way: sums of sines in position and attitude, a function of time, and blows.
 struct SmoothFlight {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   Eigen::Vector3d swing = Eigen::Vector3d::Zero();  ///< [m]
@@ -20,16 +28,22 @@ struct SmoothFlight {
   Eigen::Vector3d phase = Eigen::Vector3d::Zero();
   double tilt = 0.2;      ///< [rad]
   double yaw_rate = 0.2;  ///< [rad/s]
+  std::vector<Blow> blows{};
 
   [[nodiscard]] Pose T_W_B(double t) const {
     const Eigen::Vector3d s = (rate * t + phase).array().sin();
     const Eigen::Vector3d c = (rate * t + phase).array().cos();
-    return {center + swing.cwiseProduct(s), so3_exp({0.0, 0.0, yaw_rate * t + phase.z()}) *
-                                                so3_exp({tilt * c.x(), tilt * c.y(), 0.0})};
+    Eigen::Vector3d p = center + swing.cwiseProduct(s);
+    for (const Blow& blow : blows) p += std::max(0.0, t - blow.t) * blow.v_W;
+    return {p, so3_exp({0.0, 0.0, yaw_rate * t + phase.z()}) *
+                   so3_exp({tilt * c.x(), tilt * c.y(), 0.0})};
   }
   [[nodiscard]] Eigen::Vector3d v_W_B(double t) const {
     const Eigen::Vector3d c = (rate * t + phase).array().cos();
-    return swing.cwiseProduct(rate).cwiseProduct(c);
+    Eigen::Vector3d v = swing.cwiseProduct(rate).cwiseProduct(c);
+    for (const Blow& blow : blows)
+      if (t > blow.t) v += blow.v_W;
+    return v;
   }
 };
 
@@ -130,6 +144,14 @@ class SimulatedPair {
             .N = side(peer_bearing(stamp), N_.T_W_B(t), mounting_N, truth_.bias_N),
             .range_m = range(stamp).range_m,
             .range_sigma_m = std::hypot(noise_.range, noise_.priors.range_bias_m)};
+  }
+
+  /// Something hits B, or N: its velocity changes at once.
+  void hit_B(Timestamp stamp, const Eigen::Vector3d& v_W) {
+    B_.blows.push_back({seconds(stamp), v_W});
+  }
+  void hit_N(Timestamp stamp, const Eigen::Vector3d& v_W) {
+    N_.blows.push_back({seconds(stamp), v_W});
   }
 
   /// Both robots look with other cameras at the same places from now on.

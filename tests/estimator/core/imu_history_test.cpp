@@ -151,6 +151,28 @@ TEST(ImuHistory, SumsTheTimeThatNoSampleCovers) {
     EXPECT_NEAR(to_seconds(imu.extrapolated(Timestamp{from}, Timestamp{to})), 0.05, 1e-9);
 }
 
+TEST(ImuHistory, PartsOfABlowAddUpToIt) {
+  ImuHistory imu;
+  for (int i = 1; i <= 20; ++i) {
+    if (i == 10) continue;  // refused
+    imu.push(sample_at(i * 10ms),
+             i == 11 ? Eigen::Vector3d{0.3, -0.4, 0.0} : Eigen::Vector3d::Zero());
+  }
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (Timestamp t{2ms}; t < Timestamp{190ms}; t += 7ms)
+    sum += imu.mean(t, t + 7ms).blow_variance_m2ps2;
+  EXPECT_LT((sum - Eigen::Vector3d{0.09, 0.16, 0.0}).norm(), 1e-12);
+  EXPECT_TRUE(imu.mean(Timestamp{20ms}, Timestamp{90ms}).blow_variance_m2ps2.isZero());
+  EXPECT_TRUE(imu.mean(Timestamp{110ms}, Timestamp{150ms}).blow_variance_m2ps2.isZero());
+
+  // Samples that come late move the others.
+  imu.push(sample_at(15ms));
+  EXPECT_LT((imu.mean(Timestamp{80ms}, Timestamp{120ms}).blow_variance_m2ps2 -
+             Eigen::Vector3d{0.09, 0.16, 0.0})
+                .norm(),
+            1e-12);
+}
+
 TEST(ImuHistory, RotationBackUndoesRotationForth) {
   RandomGeometry random(2);
   ImuHistory imu;

@@ -157,6 +157,65 @@ TEST(ImuGuard, ADamagedSampleIsNotBelievedForAMoment) {
   EXPECT_EQ(guard.accept(samples[152]).front().stamp, samples[152].stamp);
 }
 
+TEST(ImuGuard, TellsWhatARefusedForceWouldHaveDone) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    auto samples = samples_of(kMotions[0], seed, 3 * kSecond);
+    samples[150].accel_mps2 += Eigen::Vector3d{30.0, -20.0, 0.0};  // a blow over two samples
+    samples[151].accel_mps2 += Eigen::Vector3d{20.0, 0.0, 0.0};
+    samples[200].accel_mps2.z() -= 900.0;
+    ImuGuard guard;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      for (const ImuSample& believed : guard.accept(samples[i])) {
+        const Eigen::Vector3d blow = guard.blow_mps(believed);
+        if (believed.stamp == samples[152].stamp) {
+          EXPECT_LT((blow - Eigen::Vector3d{0.5, -0.2, 0.0}).norm(), 0.05) << seed;
+        } else if (believed.stamp == samples[201].stamp) {
+          EXPECT_EQ(blow.z(), -1.0) << seed;  // no robot is hit harder
+        } else {
+          EXPECT_EQ(blow, Eigen::Vector3d::Zero().eval()) << seed << ' ' << i;
+        }
+      }
+    }
+    ASSERT_EQ(guard.spikes().size(), 3U) << seed;
+    EXPECT_EQ(guard.spikes()[1].accel_mps2, samples[151].accel_mps2);
+  }
+}
+
+TEST(ImuGuard, ALandingCostsNoMoreThanItsSamples) {
+  // Forces of a multirotor that sets down within 60 ms. Some of them may be believed.
+  constexpr std::array kForces{0.6, 3.5, 11.1, 17.4, 14.5, 6.2, 1.3, 0.4};
+  for (const double vibration : {0.0, 0.1, 0.2, 0.3, 0.4, 0.6}) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      RandomGeometry random(seed);
+      auto samples = samples_of(kMotions[1], seed, 3 * kSecond);
+      for (ImuSample& sample : samples) sample.accel_mps2 += random.vector(vibration);
+      for (std::size_t i = 0; i < kForces.size(); ++i)
+        samples[150 + i].accel_mps2.z() += kForces.at(i);
+      ImuGuard guard;
+      const std::size_t believed = believed_of(guard, samples).size();
+
+      EXPECT_GE(believed + kForces.size(), samples.size()) << vibration << ' ' << seed;
+      EXPECT_EQ(count(guard, ImuFault::kJump), 0U) << vibration << ' ' << seed;
+      // Within 40 ms after it.
+      ImuGuard again;
+      std::size_t soon = 0;
+      for (std::size_t i = 0; i < 150 + kForces.size() + 4; ++i)
+        soon += again.accept(samples[i]).size();
+      EXPECT_GE(soon, 150U + 3U) << vibration << ' ' << seed;
+    }
+  }
+}
+
+TEST(ImuGuard, RemembersTheLatestSpikesOnly) {
+  auto samples = samples_of(kMotions[0], 1, 60 * kSecond);
+  for (std::size_t i = 1; i <= 50; ++i) samples[i * kSecond].gyro_radps.x() = 34.9;
+  ImuGuard guard;
+  believed_of(guard, samples);
+  ASSERT_FALSE(guard.spikes().empty());
+  EXPECT_LE(guard.spikes().size(), 20U);
+  EXPECT_EQ(guard.spikes().back().stamp, samples[50 * kSecond].stamp);
+}
+
 TEST(ImuGuard, AChangeThatStaysIsBelievedASampleLate) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     auto samples = samples_of(kMotions[0], seed, 2 * kSecond);

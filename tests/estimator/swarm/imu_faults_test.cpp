@@ -99,6 +99,33 @@ TEST(ImuFaults, ADamagedSampleCostsNoPoseAndLittleAccuracy) {
   }
 }
 
+/// A robot lands or hits a wall: the sample looks as if it were damaged, but its speed changes.
+TEST(ImuFaults, ABlowCostsNoPoseAndIsWithinItsSigma) {
+  int poses = 0;
+  int beyond = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    EstimatorPair pair(seed);
+    RandomGeometry random(seed);
+    pair.run_for(kWarmUp);
+    const std::size_t before = pair.found().size();
+    for (int i = 0; i < kInstants; ++i) {
+      const Eigen::Vector3d v_W = random.uniform(0.2, 0.8) * random.vector(1.0).normalized();
+      pair.run_for(10ms * random.index(50));
+      pair.hit(i % 2 == 0, v_W);
+      pair.run_for(500ms);
+      pair.hit(i % 2 == 0, -v_W);
+      pair.run_for(500ms);
+      EXPECT_NE(pair.latest(), nullptr) << seed << ' ' << i;
+    }
+    const Duration tested = pair.now() - kWarmUp;
+    EXPECT_EQ(pair.found().size() - before, static_cast<std::size_t>(tested / EstimatorPair::kTick))
+        << seed;
+    poses += static_cast<int>(pair.found().size() - before);
+    beyond += beyond_five_sigma(pair);
+  }
+  EXPECT_LE(beyond, poses / 2000) << "of " << poses;
+}
+
 TEST(ImuFaults, ADamagedSampleIsCountedWithItsReason) {
   for (const bool own : {true, false}) {
     EstimatorPair pair(1);

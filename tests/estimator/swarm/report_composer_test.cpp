@@ -106,5 +106,25 @@ TEST(ReportComposer, StaysBoundedWhileThereIsNoTilt) {
   EXPECT_LE(report->bearings.size(), 53U);
 }
 
+TEST(ReportComposer, ReportsSpikesAmongTheSamples) {
+  ReportComposer composer(RobotId{1});
+  RobotState state = state_with_imu(0);
+  state.tilt = Tilt{.stamp = Timestamp{1200ms}};
+  for (int i = 1; i <= 120; ++i) {
+    ImuSample sample{Timestamp{i * 10ms}, Eigen::Vector3d::Constant(1e-4 * (i % 7)),
+                     Eigen::Vector3d{1e-3 * (i % 5), 0.0, 9.81}};
+    if (i == 40 || i == 100) sample.accel_mps2.x() = -40.0;
+    for (const ImuSample& believed : state.guard.accept(sample)) state.add_believed(believed);
+  }
+  ASSERT_EQ(state.imu.size(), 118U);
+
+  const auto report = composer.compose(Timestamp{1200ms}, state, {});
+
+  ASSERT_EQ(report->imu.size(), 53U);  // from 680 ms on: the first spike is too old
+  EXPECT_TRUE(std::ranges::is_sorted(report->imu, {}, &ImuSample::stamp));
+  EXPECT_EQ(report->imu[32].stamp, Timestamp{1000ms});
+  EXPECT_EQ(report->imu[32].accel_mps2.x(), -40.0);
+}
+
 }  // namespace
 }  // namespace crepes::report_composer_test
