@@ -50,7 +50,7 @@ class SimulatedTeam {
                      random_.rotation()};
       body.bias = {.gyro_radps = random_.vector(0.005), .accel_mps2 = random_.vector(0.035)};
       body.misalignment = random_.vector(radians(0.17));
-      body.antenna_delay_m = random_.normal(0.05 * std::sqrt(0.4));
+      body.antenna_delay_m = random_.normal(range_bias_sigma_m_ * std::sqrt(0.4));
       body.lens = lenses.vector(6e-4);
     }
   }
@@ -63,6 +63,14 @@ class SimulatedTeam {
   /// Whether the robots hover, which their IMUs feel. Their motions relative to each other, which
   /// are all that a team knows, are the same without.
   bool hovers = false;
+  /// Whether nobody moves.
+  bool rests = false;
+
+  /// Draws the range biases with this sigma, and says so in the settings.
+  void bias_ranges(double sigma_m) {
+    for (auto& [id, body] : bodies_) body.antenna_delay_m *= sigma_m / range_bias_sigma_m_;
+    range_bias_sigma_m_ = sigma_m;
+  }
 
   /// The next interval, with estimates of direct neighbors that are wrong by a little.
   TeamInterval next() {
@@ -71,6 +79,7 @@ class SimulatedTeam {
     interval.from = now_;
     interval.to = now_ + kInterval;
     interval.settings = team_settings();
+    interval.settings.priors.range_bias_m = range_bias_sigma_m_;
     std::map<RobotId, RobotTrajectory> paths;
     for (auto& [id, body] : bodies_) {
       const std::vector<ImuMean> before = body.imu;
@@ -130,6 +139,7 @@ class SimulatedTeam {
   // neither.
   std::vector<ImuMean> true_imu(Body& body) {
     std::vector<ImuMean> imu(10);
+    if (rests) return imu;
     for (ImuMean& mean : imu) {
       body.phase += 0.01;
       mean.gyro_radps = 0.5 * Eigen::Vector3d(std::sin(2.0 * body.phase), std::cos(body.phase),
@@ -181,7 +191,7 @@ class SimulatedTeam {
     const double distance =
         (to.p_F + to.q_F_B * p_body_uwb_ - from.p_F - from.q_F_B * p_body_uwb_).norm();
     auto [bias, is_new] = range_bias_.try_emplace({i, j}, 0.0);
-    if (is_new) bias->second = random_.normal(0.05 * std::sqrt(0.2));
+    if (is_new) bias->second = random_.normal(range_bias_sigma_m_ * std::sqrt(0.2));
     const double delay_m = bodies_.at(i).antenna_delay_m + bodies_.at(j).antenna_delay_m;
     return {i,
             j,
@@ -208,6 +218,7 @@ class SimulatedTeam {
   }
 
   RandomGeometry random_;
+  double range_bias_sigma_m_ = 0.05;
   std::map<RobotId, Body> bodies_;
   std::map<std::pair<RobotId, RobotId>, double> range_bias_;
   Timestamp now_ = Timestamp{std::chrono::seconds{10}};
