@@ -62,8 +62,8 @@ TEST(TeamFilter, ModulesThatAllMeasureTooLongStayWithinTheCovariance) {
   }
 }
 
-// Bearings at rest say nothing of the scale, and what ranges say of it errs with their biases. It is
-// somewhat too certain: 2.2 on the mean, where 1 would be right.
+// Bearings at rest say nothing of the scale, and what ranges say of it errs with their biases. It
+// is somewhat too certain: 2.2 on the mean, where 1 would be right.
 TEST(TeamFilter, AtRestItsScaleErrsLittleMoreThanItSays) {
   constexpr int kSeeds = 20;
   double sum = 0.0;
