@@ -26,7 +26,8 @@ struct ImuMean {
   /// Errors of the extrapolation, as the density of a random walk.
   double gyro_innovation_density = 0.0;   ///< [rad/s/sqrt(s)]
   double accel_innovation_density = 0.0;  ///< [m/s^2/sqrt(s)]
-  /// Variance of the velocity after the interval by forces that were refused, but may be real.
+  /// Variance of the velocity after the interval by forces that were refused, but may be real; body
+  /// axes. Those of parts add up to that of the whole.
   Eigen::Vector3d blow_variance_m2ps2 = Eigen::Vector3d::Zero();
 };
 
@@ -45,7 +46,7 @@ class ImuHistory {
   static constexpr Duration kMaxHold = std::chrono::milliseconds{500};
 
   /// False, and nothing changes, if the sample is implausible, a duplicate, or older than all kept.
-  /// `blow_mps` is the velocity by forces that were refused since the sample before.
+  /// `blow_mps` is the velocity, in body axes, by forces that were refused since the sample before.
   bool push(const ImuSample& sample, const Eigen::Vector3d& blow_mps = Eigen::Vector3d::Zero());
 
   [[nodiscard]] bool empty() const { return size_ == 0; }
