@@ -38,6 +38,12 @@ E::Vector along_line(const E::Vector& gain, const Eigen::RowVector3d& line) {
 
 }  // namespace
 
+double probability_true(double innovation_m, double variance_m2) {
+  const double nis = innovation_m * innovation_m / variance_m2;
+  const double density = std::exp(-0.5 * nis) / std::sqrt(2.0 * std::numbers::pi * variance_m2);
+  return density / (density + kFalseRangeDensity);
+}
+
 RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double gate_nis,
                             E::Covariance& P, double shared_m2) {
   const Eigen::RowVector3d line = z.H.middleCols<3>(E::kP);
@@ -56,9 +62,7 @@ RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double 
   fusion.log_likelihood = -0.5 * (fusion.nis + std::log(2.0 * std::numbers::pi * expected));
   fusion.residual[0] = residual;
   fusion.sigma[0] = std::sqrt(expected);
-  // The probability that the range is true. One that is more likely false is refused.
-  const double density = std::exp(fusion.log_likelihood);
-  const double is_true = density / (density + kFalseRangeDensity);
+  const double is_true = probability_true(residual, expected);
   const bool fits = fusion.nis <= gate_nis && is_true >= 0.5;
   fusion.verdict = fits ? Verdict::kFused : Verdict::kGated;
   if (fusion.verdict == Verdict::kGated || predicted <= shared) return update;

@@ -9,6 +9,10 @@ namespace crepes {
 /// same for the pairs' filters, their hypotheses and the team's filter.
 inline constexpr double kFalseRangeDensity = 0.05;
 
+/// The probability that a range is true, by its innovation and the variance that is expected of it
+/// (probabilistic data association, Bar-Shalom and Tse 1975). Below one half it is refused.
+[[nodiscard]] double probability_true(double innovation_m, double variance_m2);
+
 struct RangeUpdate {
   Fusion fusion;
   ErrorState::Vector correction = ErrorState::Vector::Zero();  ///< to be injected

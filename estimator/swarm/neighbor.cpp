@@ -102,6 +102,7 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
     publisher_.update(now, self, body_, hypotheses_, intake_);
   if (!self.lacks_imu(now) && !body_.lacks_imu(now))
     publisher_.update_team(now, self, body_, intake_.last_contact());
+  if (publisher_.must_filter_restart()) hypotheses_.clear();
   if (outcomes().keeps_records() && !hypotheses_.empty())
     outcomes().add(hypotheses_.leader().heaviest().calibration());
   reason_ = publisher_.published() ? NoPoseReason::kNone : reason(now, self);

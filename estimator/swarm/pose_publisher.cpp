@@ -12,7 +12,15 @@ constexpr Duration kMaxAge = std::chrono::milliseconds{20};  // of a published s
 constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
 constexpr Duration kUnranged = std::chrono::seconds{1};  // so long a distance stays certain
 constexpr Duration kRareRanges = std::chrono::milliseconds{200};  // more are refused, not rare
-constexpr Duration kTeamLife = std::chrono::milliseconds{800};    // the longest lag, and a solution
+constexpr Duration kDispute = std::chrono::seconds{1};
+constexpr Duration kRestart = std::chrono::seconds{2};          // until a filter is there again
+constexpr Duration kTeamLife = std::chrono::milliseconds{800};  // the longest lag, and a solution
+
+/// A pose that is wrong, or one that differs from it by so much is.
+std::optional<NeighborPose> doubtful(NeighborPose pose, const Vector6d& difference) {
+  pose.T_B_N.covariance += difference * difference.transpose();
+  return is_certain(pose.T_B_N.covariance) ? std::optional(pose) : std::nullopt;
+}
 
 }  // namespace
 
@@ -128,23 +136,43 @@ void PosePublisher::update_team(Timestamp now, const RobotState& self, const Rob
                   .range = is_recent(last.ranged),
                   .imu = is_recent(neighbor.imu.newest().stamp),
                   .graph = true};
-  if (is_certain(pose.T_B_N.covariance)) team_pose_ = pose;
+  if (!is_certain(pose.T_B_N.covariance)) return;
+  team_pose_ = pose;
+  compare();
+}
+
+/// What a filter out of sight predicts disputes nothing.
+void PosePublisher::compare() {
+  if (!pose_ || pose_->mode == PoseMode::kPredicted) return;
+  const Vector6d d = pose_difference(pose_->T_B_N.pose, team_pose_->T_B_N.pose);
+  const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
+  if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return dispute_.reset();
+  const Timestamp now = team_pose_->stamp;
+  if (!dispute_) dispute_ = Dispute{.since = now, .last = now, .difference = d};
+  dispute_->last = now;
+  dispute_->difference = d;
+}
+
+bool PosePublisher::must_filter_restart() {
+  if (!dispute_ || dispute_->last - dispute_->since < kDispute || team_->pose.needs_witness ||
+      is_by_imus_)
+    return false;
+  dispute_->since = dispute_->restarted = dispute_->last;
+  return true;
 }
 
 std::optional<NeighborPose> PosePublisher::published() const {
   if (!team_pose_) return graph_corrected_pose();
   const bool needs_witness = team_->pose.needs_witness;
-  if (!pose_ || pose_->mode == PoseMode::kPredicted)
-    return needs_witness ? graph_corrected_pose() : team_pose_;
-  const Vector6d d = pose_difference(pose_->T_B_N.pose, team_pose_->T_B_N.pose);
-  const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
-  if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return team_pose_;
+  if (!pose_ || pose_->mode == PoseMode::kPredicted) {
+    if (needs_witness) return graph_corrected_pose();
+    const bool is_disputed = dispute_ && team_pose_->stamp - dispute_->restarted <= kRestart;
+    return is_disputed ? doubtful(*team_pose_, dispute_->difference) : team_pose_;
+  }
+  if (!dispute_ || dispute_->last != team_pose_->stamp) return team_pose_;
   if (needs_witness) return graph_corrected_pose();
   // One of the two is wrong, and what shows which is how the pair knows its distance.
-  if (is_by_imus_) return team_pose_;
-  NeighborPose doubtful = *pose_;
-  doubtful.T_B_N.covariance += d * d.transpose();
-  return is_certain(doubtful.T_B_N.covariance) ? std::optional(doubtful) : std::nullopt;
+  return is_by_imus_ ? team_pose_ : doubtful(*pose_, dispute_->difference);
 }
 
 }  // namespace crepes

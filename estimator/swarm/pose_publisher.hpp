@@ -43,10 +43,14 @@ class PosePublisher {
   void end_team_pose() {
     team_.reset();
     team_pose_.reset();
+    dispute_.reset();
   }
-  /// Carries the newest team pose to now.
+  /// Carries the newest team pose to now, and compares it with the filter's.
   void update_team(Timestamp now, const RobotState& self, const RobotState& neighbor,
                    const LastContact& last);
+  /// True once the team's pose has contradicted the filter's for a second: the filter must start
+  /// anew. Measurements that the team's filter believes agree with others', too.
+  [[nodiscard]] bool must_filter_restart();
 
   /// The filter's pose at the last tick. Empty while unknown or too uncertain.
   [[nodiscard]] const std::optional<NeighborPose>& pose() const { return pose_; }
@@ -56,11 +60,13 @@ class PosePublisher {
   [[nodiscard]] std::optional<NeighborEstimate> estimate() const;
   /// The team's pose if there is one and it agrees with the filter's. If they contradict each
   /// other, the filter's, with a covariance that contains the difference; none if that is too
-  /// uncertain. Without a team's pose, or with one that needs a witness and has none, the filter's,
+  /// uncertain. While a filter that was contradicted starts anew, the team's, with that difference.
+  /// Without a team's pose, or with one that needs a witness and has none, the filter's,
   /// with the paper's graph's correction, if a recent one exists.
   [[nodiscard]] std::optional<NeighborPose> published() const;
 
  private:
+  void compare();
   [[nodiscard]] std::optional<NeighborPose> graph_corrected_pose() const;
 
   /// Difference of the graph's pose to the published one at the same instant.
@@ -68,6 +74,14 @@ class PosePublisher {
     Timestamp stamp;
     Vector6d step;
     Matrix6d covariance;
+  };
+
+  /// The team's pose contradicts the filter's.
+  struct Dispute {
+    Timestamp since;  ///< or since the filter last restarted
+    Timestamp last;
+    Vector6d difference;
+    Timestamp restarted = kNever;
   };
 
   RobotId neighbor_;
@@ -86,6 +100,7 @@ class PosePublisher {
   std::optional<TeamEstimate> team_;
   Timestamp team_since_ = kNever;          ///< what the team's pose goes back to
   std::optional<NeighborPose> team_pose_;  ///< at the last tick
+  std::optional<Dispute> dispute_;         ///< until both agree
 };
 
 }  // namespace crepes

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <utility>
@@ -21,7 +22,9 @@ namespace {
 constexpr double kUnknownDistance = 0.10;  // m; the least by which a step is judged
 constexpr double kLinear = 0.01;           // rad, and relative to the distance
 constexpr int kMaxIterations = 4;
+constexpr double kSignificant = 4.0;      // sigmas of the directions: a parallax
 constexpr double kAgreementMemory = 0.5;  // s
+constexpr double kOneOfLate = 0.35;       // a range within that time
 constexpr std::size_t kMaxCameras = 4;    // of a robot, whatever it reports
 
 /// Whether this robot itself has an estimate of the other one, or is estimated by it.
@@ -44,6 +47,39 @@ double largest_step(const std::map<RobotId, TeamRobot>& robots, const Eigen::Vec
   }
   return largest;
 }
+
+/// Whether ranges to this robot came of late, and agree. Else its distance follows from bearings.
+bool has_range(const TeamBelief& belief, RobotId id) {
+  return std::ranges::any_of(belief.ranges, [&](const auto& entry) {
+    const auto& [pair, range] = entry;
+    if (pair.first != id && pair.second != id) return false;
+    return std::ranges::any_of(range.agreement, [](const auto& observed) {
+      const Agreement& agreement = observed.second;
+      return agreement.fused > std::max(kOneOfLate, agreement.gated);
+    });
+  });
+}
+
+/// The mean relative error of the distances that ranges hold, weighed by their squares, by the
+/// states: the team's scale, of which bearings at rest say nothing. `count` robots are meant.
+struct TeamScale {
+  Eigen::VectorXd by_states;
+  int count = 0;
+
+  TeamScale(const TeamBelief& belief, const std::vector<bool>& corrected)
+      : by_states(Eigen::VectorXd::Zero(std::ssize(corrected))) {
+    double sum_m2 = 0.0;
+    for (const auto& [id, robot] : belief.robots) {
+      const int index = robot.motion_index;
+      if (index < 0 || !corrected[static_cast<std::size_t>(index)] || !has_range(belief, id))
+        continue;
+      by_states.segment<3>(index) = robot.motion.p_F;
+      sum_m2 += robot.motion.p_F.squaredNorm();
+      ++count;
+    }
+    if (sum_m2 > 0.0) by_states /= sum_m2;
+  }
+};
 
 }  // namespace
 
@@ -91,6 +127,13 @@ bool TeamFilter::remove_members(const TeamInterval& interval) {
   }
   bool has_spoilt = false;
   const std::vector<RobotId> false_ones = false_gyros(interval);
+  // This robot's own gyroscope may have been false for longer than it was found to be.
+  const bool has_refusal_ended = trust_.is_gyro_false(belief_.self, interval.from) &&
+                                 !trust_.is_gyro_false(belief_.self, interval.to);
+  if (has_refusal_ended && !are_others_plausible()) {
+    if (!recall(interval, {belief_.self})) begin_anew(interval);
+    return true;
+  }
   for (const RobotId id : false_ones) {
     has_spoilt = has_spoilt || belief_.robots.at(id).is_trusted;
     remove(id);
@@ -106,6 +149,12 @@ bool TeamFilter::remove_members(const TeamInterval& interval) {
   }
   begin_anew(interval);
   return false;
+}
+
+bool TeamFilter::are_others_plausible() const {
+  return std::ranges::all_of(belief_.robots, [this](const auto& entry) {
+    return entry.first == belief_.self || is_plausible(belief_, entry.first);
+  });
 }
 
 /// This robot itself stays.
@@ -224,8 +273,12 @@ bool TeamFilter::correct(const TeamInterval& interval, Stage stage, TeamReadings
     belief_.robots = robots;
     belief_.ranges = ranges;
     if (rows.empty()) return true;  // the last step may have made all ranges unlikely
-    const TeamUpdate update(rows, dy, instant.covariance(), instant.with_belief());
+    TeamUpdate update(rows, dy, instant.covariance(), instant.with_belief());
     if (!update.is_valid()) return false;
+    if (stage == Stage::kTrusted && !readings.sights.empty()) {
+      const TeamScale scale(belief_, corrected);
+      update.withhold(scale.by_states, kSignificant * kSignificant * scale.count, belief_.P);
+    }
     Eigen::VectorXd next = update.correction();
     for (Eigen::Index i = 0; i < next.size(); ++i)
       if (!corrected[static_cast<std::size_t>(i)]) next(i) = 0.0;

@@ -54,6 +54,7 @@ class TeamFilter {
 
   /// Whether the robots that remain must be placed again.
   [[nodiscard]] bool remove_members(const TeamInterval& interval);
+  [[nodiscard]] bool are_others_plausible() const;
   void remove(RobotId id);
   /// After false gyroscopes. False if there is no earlier belief.
   [[nodiscard]] bool recall(const TeamInterval& interval, const std::vector<RobotId>& false_gyros);

@@ -17,6 +17,7 @@ namespace {
 constexpr double kPrincipalPointSigma = 0.4;  // px
 constexpr std::uint64_t kCalibrationKey = 0x63616c69U;
 constexpr std::uint64_t kBoardKey = 0x626f6172U;
+constexpr std::uint64_t kRestKey = 0x72657374U;
 
 std::vector<ImuSample> record_imu(const SimWorld& world, const DemoRobot& robot,
                                   double duration_s) {
@@ -81,10 +82,37 @@ Trajectory record_truth(const SimWorld& world, RobotId robot, double duration_s)
   return Trajectory(std::move(samples));
 }
 
+/// Four robots near the corners of a square. They more or less face its center.
+SimWorld world_at_rest(int seed) {
+  constexpr double kSide = 3.0;    // m
+  constexpr double kAround = 0.7;  // m
+  constexpr double kTurn = 0.5;    // rad
+  constexpr double kTilt = 0.03;   // rad
+  std::map<RobotId, Motion> motions;
+  for (std::uint16_t id = 1; id <= 4; ++id) {
+    const SeededNoise noise{kRestKey, static_cast<std::uint64_t>(seed), id};
+    const auto within = [&noise](int index, double center, double around) {
+      const double at = 2.0 * noise.uniform(static_cast<std::uint64_t>(index)) - 1.0;
+      return Wave{.offset = center + around * at};
+    };
+    const double x = id % 2 == 0 ? kSide : 0.0;
+    const double y = id > 2 ? kSide : 0.0;
+    const double inwards = std::atan2(kSide / 2.0 - y, kSide / 2.0 - x);
+    motions.emplace(RobotId{id}, Motion{.x = within(0, x, kAround),
+                                        .y = within(1, y, kAround),
+                                        .z = within(2, 0.4, 0.25),
+                                        .yaw = within(3, inwards, kTurn),
+                                        .pitch = within(4, 0.0, kTilt),
+                                        .roll = within(5, 0.0, kTilt)});
+  }
+  return {seed, std::move(motions)};
+}
+
 }  // namespace
 
 SensorPriors priors_of(const Scenario& scenario) {
   SensorPriors priors;
+  if (scenario.range_bias_m) priors.range_bias_m = *scenario.range_bias_m;
   if (scenario.ranges == RangeModel::kLinkTrack) priors.range_bias_m = kLinkTrackBias;
   return priors;
 }
@@ -93,9 +121,11 @@ Swarm simulate_swarm(const Scenario& scenario, int seed, double duration_s) {
   SimConfig sim;
   sim.scenario = scenario.world;
   sim.seed = seed;
-  const SimWorld world(sim);
-  return simulate_swarm(scenario, world, demo_swarm(sim, world.robots(), 0.0, 40000, 40100),
-                        duration_s);
+  const SimWorld world = scenario.rests ? world_at_rest(seed) : SimWorld(sim);
+  std::vector<DemoRobot> robots = demo_swarm(sim, world.robots(), 0.0, 40000, 40100);
+  for (DemoRobot& robot : robots)
+    if (scenario.range_bias_m) robot.config.uwb.noise.bias_sigma_m = *scenario.range_bias_m;
+  return simulate_swarm(scenario, world, std::move(robots), duration_s);
 }
 
 Swarm simulate_swarm(const Scenario& scenario, const SimWorld& world, std::vector<DemoRobot> robots,

@@ -29,6 +29,9 @@ struct Scenario {
   bool hides_images = true;  ///< what hides a robot hides its mirror image, too
   Darkness dark{};
   RangeModel ranges = RangeModel::kSimulated;
+  /// One sigma of each pair's constant [m], which the robots know; empty: the simulated world's.
+  std::optional<double> range_bias_m{};
+  bool rests = false;    ///< four robots stand on a floor, in place of `world`
   double sight_m = 1e3;  ///< no camera sees further
   RobotId blind{};       ///< the cameras of this robot see nothing
   RobotId rangeless{};   ///< this robot has no UWB module
@@ -54,6 +57,7 @@ inline constexpr std::array kScenarios{
     Scenario{.name = "fence", .world = SimScenario::kFour, .obstacles = Obstacles::kFence},
     Scenario{
         .name = "blackout", .world = SimScenario::kFour, .dark = {.from_s = 15.0, .to_s = 30.0}},
+    Scenario{.name = "rest", .range_bias_m = 0.2, .rests = true},
     Scenario{.name = "blind", .world = SimScenario::kFour, .blind = RobotId{4}},
     Scenario{.name = "blind-pair", .world = SimScenario::kTwo, .blind = RobotId{2}},
     Scenario{.name = "rangeless", .world = SimScenario::kFour, .rangeless = RobotId{4}},

@@ -1,7 +1,6 @@
 #include "estimator/team/readings/reading_rows.hpp"
 
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "estimator/relative/range_update.hpp"
@@ -36,8 +35,7 @@ std::optional<TeamRow> mean_of(const ReadingScene& scene, const Sight& sight) {
 bool associate(double S, double moved, TeamRow& row) {
   const double innovation = row.residual.x() + moved;
   const double nis = innovation * innovation / S;
-  const double density = std::exp(-0.5 * nis) / std::sqrt(2.0 * std::numbers::pi * S);
-  const double is_true = density / (density + kFalseRangeDensity);
+  const double is_true = probability_true(innovation, S);
   const double weight = is_true * (1.0 - (1.0 - is_true) * nis);
   if (is_true < 0.5 || weight <= 0.0) return false;
   row.variance += S / weight - S;

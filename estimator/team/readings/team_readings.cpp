@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "estimator/relative/range_update.hpp"
 #include "estimator/team/readings/reading_scene.hpp"
 #include "estimator/team/unseen/team_darkness.hpp"
 
@@ -171,7 +172,8 @@ TeamResidual gate(const ReadingScene& scene, TeamRangeBias& bias, Ranging& rangi
     const double residual = row->residual.x();
     variance = row->covariance(scene.instant.covariance())(0, 0);
     noise = z->reading.sigma_m * z->reading.sigma_m;
-    const bool fits = residual * residual <= scene.interval.settings.range_gate * variance;
+    const bool fits = residual * residual <= scene.interval.settings.range_gate * variance &&
+                      probability_true(residual, variance) >= 0.5;
     if (!ranging.dark) bias.add(ranging.observer, fits, residual);
     mean.add({residual, 0.0}, fits);
     return !fits;

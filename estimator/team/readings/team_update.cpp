@@ -128,6 +128,7 @@ TeamUpdate::TeamUpdate(const std::vector<TeamRow>& rows, const VectorXd& dy, con
   const Eigen::LLT<MatrixXd> factors(S);
   is_valid_ = factors.info() == Eigen::Success && by_y.root.allFinite();
   if (!is_valid_) return;
+  factor_ = factors.matrixL();
   gain_ = std::move(by_y.root);
   factors.matrixL().solveInPlace(gain_);
   factors.matrixL().solveInPlace(by_y.z);
@@ -135,17 +136,46 @@ TeamUpdate::TeamUpdate(const std::vector<TeamRow>& rows, const VectorXd& dy, con
   correction_ = of_all_ * (gain_.transpose() * by_y.z);
 }
 
+void TeamUpdate::withhold(const VectorXd& by_states, double least, const MatrixXd& P) {
+  const VectorXd with_error = P * by_states;
+  const double variance = by_states.dot(with_error);
+  if (!(variance > 0.0)) return;
+  error_G_ = gain_ * (of_all_.transpose() * by_states);
+  // What is measured of the error, for a unit of it and with unit noise, and how it errs besides.
+  const VectorXd seen = factor_.triangularView<Eigen::Lower>() * error_G_ / variance;
+  const double seen2 = seen.squaredNorm();
+  const VectorXd across = factor_.triangularView<Eigen::Lower>().transpose() * seen;
+  const double noise =
+      std::max(0.0, across.squaredNorm() - seen2 - variance * seen2 * seen2);  // of rounding
+  const double share = seen2 * seen2 > least * noise ? least * noise / (seen2 * seen2) : 1.0;
+  withheld_ = share / variance * with_error;
+  correction_ -= by_states.dot(correction_) * withheld_;
+}
+
 void TeamUpdate::correct(const std::vector<bool>& corrected, MatrixXd& P) const {
   MatrixXd G = MatrixXd::Zero(P.rows(), gain_.rows());
   add_large_product(of_all_, gain_, G);
-  if (std::ranges::all_of(corrected, std::identity{})) return subtract_square(G, P);
-  const MatrixXd before = P;
+  const bool are_all_corrected = std::ranges::all_of(corrected, std::identity{});
+  const MatrixXd before = are_all_corrected ? MatrixXd() : P;
   subtract_square(G, P);
+  if (withheld_.size() > 0) {
+    const VectorXd kept = error_G_.norm() * withheld_;
+    P.noalias() += kept * kept.transpose();
+  }
+  if (are_all_corrected) return;
   const auto is_kept = [&](Index i) { return !corrected[static_cast<std::size_t>(i)]; };
   for (Index j = 0; j < P.cols(); ++j) {
     if (!is_kept(j)) continue;
-    for (Index i = 0; i < P.rows(); ++i)
-      if (is_kept(i)) P(i, j) = before(i, j);
+    // Joseph's form for the gain that corrects neither this state nor what is withheld.
+    const double rest =
+        withheld_.size() > 0 ? G.row(j).dot(error_G_) - error_G_.squaredNorm() * withheld_(j) : 0.0;
+    for (Index i = 0; i < P.rows(); ++i) {
+      if (is_kept(i)) {
+        P(i, j) = before(i, j);
+      } else if (rest != 0.0) {
+        P(i, j) = P(j, i) += rest * withheld_(i);
+      }
+    }
   }
 }
 

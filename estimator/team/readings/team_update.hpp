@@ -19,6 +19,11 @@ class TeamUpdate {
   TeamUpdate(const std::vector<TeamRow>& rows, const Eigen::VectorXd& dy,
              const Eigen::MatrixXd& of_y, const Eigen::MatrixXd& of_all);
 
+  /// Withholds the correction of one error, by_states^T x, and of all that goes with it, as far as
+  /// its square is not `least` times that of the noise (estimator/relative/parallax.hpp). P is the
+  /// covariance of all states x.
+  void withhold(const Eigen::VectorXd& by_states, double least, const Eigen::MatrixXd& P);
+
   /// False if the innovation's covariance is singular. Then nothing else may be called.
   [[nodiscard]] bool is_valid() const { return is_valid_; }
   /// Of all states, from their mean.
@@ -31,7 +36,10 @@ class TeamUpdate {
  private:
   Eigen::MatrixXd of_all_;  ///< with those of y that are measured
   Eigen::MatrixXd gain_;    ///< G = of_all gain^T
+  Eigen::MatrixXd factor_;  ///< S = factor factor^T, the innovation's covariance
   Eigen::VectorXd correction_;
+  Eigen::VectorXd withheld_;  ///< of all states, by the error; empty if nothing is
+  Eigen::VectorXd error_G_;   ///< the error's row of G
   bool is_valid_ = false;
 };
 

@@ -296,10 +296,15 @@ Duration TeamTrust::probation(RobotId robot, Timestamp now) const {
 std::vector<TeamFault> TeamTrust::gyro_faults(Timestamp now) const {
   std::vector<TeamFault> faults;
   for (const auto& [id, doubt] : gyro_doubts_) {
-    if (doubt.found && now - *doubt.found < kGyroRefusal)
-      faults.push_back({id, TeamFault::Kind::kGyro, doubt.rate_radps});
+    if (is_gyro_false(id, now)) faults.push_back({id, TeamFault::Kind::kGyro, doubt.rate_radps});
   }
   return faults;
+}
+
+bool TeamTrust::is_gyro_false(RobotId robot, Timestamp now) const {
+  const auto doubt = gyro_doubts_.find(robot);
+  return doubt != gyro_doubts_.end() && doubt->second.found &&
+         now - *doubt->second.found < kGyroRefusal;
 }
 
 bool is_plausible(const TeamBelief& belief, RobotId id) {

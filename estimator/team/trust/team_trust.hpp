@@ -43,6 +43,8 @@ class TeamTrust {
 
   /// Robots whose gyroscope was found false within the last second.
   [[nodiscard]] std::vector<TeamFault> gyro_faults(Timestamp now) const;
+  /// Whether it is one of them.
+  [[nodiscard]] bool is_gyro_false(RobotId robot, Timestamp now) const;
 
   /// Whether the gyroscope of a trusted robot was false of late, so that all states may be
   /// disturbed.

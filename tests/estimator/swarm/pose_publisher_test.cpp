@@ -97,19 +97,29 @@ class TeamAndFilter : public TeamPublisher {
  protected:
   /// The latest range came at `ranged_ms`, if ever; the filter has used none.
   [[nodiscard]] std::optional<NeighborPose> with_filter_at(const Pose& place,
-                                                           std::optional<int> ranged_ms = {}) {
+                                                           std::optional<int> ranged_ms = {},
+                                                           int now_ms = 1000) {
     HypothesisSet hypotheses(settings(), kMounting);
-    EXPECT_TRUE(hypotheses.initialize(at_ms(980), GraphPose{kNeighbor, {place, covariance()}}));
+    const GraphPose start{kNeighbor, {place, covariance()}};
+    EXPECT_TRUE(hypotheses.initialize(at_ms(now_ms - 20), start));
     ReadingIntake intake(kNeighbor, settings());
     if (ranged_ms) {
       UwbRange refused{.stamp = at_ms(*ranged_ms), .neighbor = kNeighbor, .range_m = -1.0};
       EXPECT_FALSE(intake.add_range(refused, MeasurementKind::kRange));
     }
     publisher_.clear();
-    publisher_.update(at_ms(1000), self_, neighbor_, hypotheses, intake);
+    publisher_.update(at_ms(now_ms), self_, neighbor_, hypotheses, intake);
     if (!publisher_.pose()) return std::nullopt;
-    publisher_.update_team(at_ms(1000), self_, neighbor_, {.seen = at_ms(990)});
+    publisher_.update_team(at_ms(now_ms), self_, neighbor_, {.seen = at_ms(now_ms - 10)});
     return publisher_.published();
+  }
+  /// The team's pose and samples until `now_ms`.
+  void go_on_until(int now_ms) {
+    self_.imu = neighbor_.imu = imu_at_rest(now_ms);
+    add(now_ms - 100, now_ms - 100);
+  }
+  [[nodiscard]] static double sigma_m(const NeighborPose& pose) {
+    return std::sqrt(pose.T_B_N.covariance(0, 0));
   }
 };
 
@@ -142,6 +152,38 @@ TEST_F(TeamAndFilter, OneThatContradictsTheTeamLosesIfRangesAreRare) {
   ASSERT_TRUE(doubtful);
   EXPECT_LT((doubtful->T_B_N.pose.p - elsewhere.p).norm(), 1e-6);
   EXPECT_GT(std::sqrt(doubtful->T_B_N.covariance(0, 0)), 0.8);
+}
+
+// Until it is there again, the team's pose may be the wrong one.
+TEST_F(TeamAndFilter, AFilterThatTheTeamContradictsForASecondStartsAnew) {
+  const Pose elsewhere{{kDistance + 0.8, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
+  for (int ms = 1000; ms <= 2000; ms += 100) {
+    go_on_until(ms);
+    EXPECT_TRUE(with_filter_at(elsewhere, ms - 100, ms)) << ms;
+    EXPECT_EQ(publisher_.must_filter_restart(), ms == 2000) << ms;
+  }
+  go_on_until(2200);
+  const auto alone = at(2200);
+  ASSERT_TRUE(alone);
+  EXPECT_LT((alone->T_B_N.pose.p - kTruth.p).norm(), 1e-6);
+  EXPECT_GT(sigma_m(*alone), 0.8);
+  EXPECT_FALSE(publisher_.must_filter_restart());
+
+  go_on_until(2500);
+  ASSERT_TRUE(with_filter_at(kTruth, 2400, 2500));
+  EXPECT_LT(sigma_m(*publisher_.published()), 0.1);
+  go_on_until(2600);
+  ASSERT_TRUE(at(2600));
+  EXPECT_LT(sigma_m(*publisher_.published()), 0.1);
+}
+
+TEST_F(TeamAndFilter, AFilterThatAgreesNowAndThenGoesOn) {
+  const Pose elsewhere{{kDistance + 0.8, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
+  for (int ms = 1000; ms <= 3000; ms += 100) {
+    go_on_until(ms);
+    EXPECT_TRUE(with_filter_at(ms % 500 == 0 ? kTruth : elsewhere, ms - 100, ms)) << ms;
+    EXPECT_FALSE(publisher_.must_filter_restart()) << ms;
+  }
 }
 
 // A team pose without a witness does not make a filter doubtful either.

@@ -17,11 +17,14 @@ using test::error_of;
 using test::fault_of;
 using test::find;
 using test::kIntervalSeconds;
+using test::kProbation;
 using test::kSelf;
 using test::nees_of;
 using test::position_nees_of;
 using test::SimulatedTeam;
 using test::solution_after;
+
+constexpr double kRefused_s = 1.0;  // after a gyroscope was last found false
 
 /// Its gyroscope reads nearly twice its rate.
 void scale_gyro(TeamInterval& interval, RobotId robot) {
@@ -90,6 +93,25 @@ TEST(TeamFaults, RecoversFromItsOwnFalseGyroscope) {
   }
 }
 
+// The false rates have moved everything that is known of its gyroscope, and more so from when it
+// was found false until it was right again.
+TEST(TeamFaults, WhatWasLearnedWhileItsOwnGyroscopeWasFalseIsForgotten) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 10.0));
+    const auto own = [&] { return filter.belief().robots.at(kSelf).bias; };
+    const ImuBias before = own();
+    team.damage = [](TeamInterval& interval) { scale_gyro(interval, kSelf); };
+    ASSERT_NE(fault_of(solution_after(team, filter, 1.0), kSelf), nullptr) << seed;
+    team.damage = [](TeamInterval&) {};
+    for (TeamSolution solution = filter.step(team.next()); fault_of(solution, kSelf) != nullptr;)
+      solution = filter.step(team.next());
+    EXPECT_LT((own().gyro_radps - before.gyro_radps).norm(), 0.004) << seed;
+    EXPECT_LT((own().accel_mps2 - before.accel_mps2).norm(), 0.02) << seed;
+  }
+}
+
 double camera_sigma_of(const TeamSolution& solution, RobotId robot) {
   const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
   if (found == solution.calibrations.end() || found->cameras.empty()) return 1.0;
@@ -106,7 +128,8 @@ TEST(TeamFaults, AFalseGyroscopeCostsNobodyWhatWasLearnedOfHisCamera) {
       team.damage = [&](TeamInterval& interval) { scale_gyro(interval, liar); };
       static_cast<void>(solution_after(team, filter, 1.0));
       team.damage = [](TeamInterval&) {};
-      const TeamSolution after = solution_after(team, filter, 1.0);
+      // After its refusal the robot itself starts anew, and the others are on probation.
+      const TeamSolution after = solution_after(team, filter, kRefused_s + kProbation + 0.2);
       for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
         EXPECT_LT(camera_sigma_of(after, robot), 1.1 * camera_sigma_of(before, robot))
             << "liar " << liar.value << ", seed " << seed;

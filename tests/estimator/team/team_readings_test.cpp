@@ -100,6 +100,31 @@ TEST_F(TeamReadingsTest, AnImageAloneIsRefusedAndSpeaksAgainstTheCamera) {
   EXPECT_EQ(agreement().gated, 4.0);
 }
 
+// It may be far off and yet within the gate, where the pair's distance is known to a meter only.
+TEST(TeamRanges, OneThatIsMoreLikelyFalseIsRefusedAndSpeaksAgainstItsPair) {
+  SimulatedTeam team(1);
+  const test::TrueMotions before = test::motions_of(team);
+  for (const double error_m : {0.5, 3.0}) {
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamRange& z : interval.ranges) z.reading.range_m += error_m;
+    };
+    const TeamInterval interval = SimulatedTeam(team).next();
+    TeamBelief belief = test::true_belief(before, interval);
+    belief.P.diagonal().segment<3>(belief.robots.at(kNeighbor).motion_index).setConstant(1.0);
+    const TeamTrajectories paths = belief.trajectories(interval);
+    TeamReadings readings = TeamReadings::of(interval, belief, TeamReadings::Stage::kTrusted);
+    const TeamInstant instant(belief, paths, readings.time_s(interval));
+    std::vector<TeamResidual> residuals;
+    gate(interval, paths, instant, belief, readings, residuals);
+    const auto& by_observer = belief.ranges.at(ordered(kObserver, kNeighbor)).agreement;
+    ASSERT_FALSE(by_observer.empty());
+    for (const auto& [observer, agreement] : by_observer) {
+      EXPECT_EQ(agreement.fused > 0.0, error_m < 1.0) << error_m;
+      EXPECT_EQ(agreement.gated > 0.0, error_m > 1.0) << error_m;
+    }
+  }
+}
+
 TEST(TeamRows, ARangeIsAsLikelyToBeTrueInEveryIteration) {
   SimulatedTeam team(7, 4);
   const test::TrueMotions before = test::motions_of(team);

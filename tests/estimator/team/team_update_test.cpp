@@ -105,6 +105,58 @@ TEST(TeamUpdate, StatesThatAreNotCorrectedCountAllTheSame) {
   }
 }
 
+// Joseph's form for a smaller gain: that of one error, and of what goes with it, is missing.
+TEST(TeamUpdate, AnErrorThatIsWithheldKeepsItsVariance) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    RandomGeometry random(seed);
+    Eigen::MatrixXd P = random_covariance(random);
+    const Eigen::MatrixXd before = P;
+    const std::vector<TeamRow> rows = random_rows(random, 6);
+    const Dense all = dense(rows);
+    std::vector<bool> corrected(kStates, true);
+    const Eigen::MatrixXd S =
+        all.H * P * all.H.transpose() + Eigen::MatrixXd(all.variance.asDiagonal());
+    Eigen::MatrixXd K = P * all.H.transpose() * S.inverse();
+    Eigen::VectorXd error = Eigen::VectorXd::Zero(kStates);
+    error.segment<3>(4) = random.normal_vector<3>(1.0);
+    K -= (P * error / error.dot(P * error) * (error.transpose() * K)).eval();
+    if (seed > 10) {
+      for (int i = 0; i < 4; ++i) {
+        corrected[static_cast<std::size_t>(i)] = false;
+        K.row(i).setZero();
+      }
+    }
+    const Eigen::MatrixXd rest = Eigen::MatrixXd::Identity(kStates, kStates) - K * all.H;
+    const Eigen::MatrixXd expected =
+        rest * P * rest.transpose() + K * all.variance.asDiagonal() * K.transpose();
+    const Eigen::VectorXd expected_dx = K * all.r;
+
+    TeamUpdate update(rows, Eigen::VectorXd::Zero(kStates), P, P);
+    update.withhold(error, 1e12, P);
+    update.correct(corrected, P);
+
+    EXPECT_LT((P - expected).norm(), 1e-8 * expected.norm()) << seed;
+    EXPECT_EQ(P, P.transpose().eval());
+    EXPECT_NEAR(error.dot(P * error), error.dot(before * error), 1e-8 * error.dot(before * error));
+    for (int i = 0; i < kStates; ++i) {
+      if (corrected[static_cast<std::size_t>(i)])
+        EXPECT_NEAR(update.correction()(i), expected_dx(i), 1e-8 * expected_dx.norm());
+    }
+  }
+}
+
+TEST(TeamUpdate, AnErrorThatIsSeenClearlyIsCorrected) {
+  RandomGeometry random(1);
+  const Eigen::MatrixXd P = random_covariance(random);
+  std::vector<TeamRow> rows = random_rows(random, 6);
+  Eigen::VectorXd error = Eigen::VectorXd::Zero(kStates);
+  error(4) = 1.0;
+  const TeamUpdate whole(rows, Eigen::VectorXd::Zero(kStates), P, P);
+  TeamUpdate part(rows, Eigen::VectorXd::Zero(kStates), P, P);
+  part.withhold(error, 1e-9, P);
+  EXPECT_LT((part.correction() - whole.correction()).norm(), 1e-6 * whole.correction().norm());
+}
+
 // Ten times as many readings as they depend on states, of which two are redundant, and states that
 // they depend on through others.
 TEST(TeamUpdate, ManyReadingsOfFewStatesCorrectAllStates) {
