@@ -148,13 +148,18 @@ void PosePublisher::compare() {
   const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
   if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return dispute_.reset();
   const Timestamp now = team_pose_->stamp;
-  if (!dispute_) dispute_ = Dispute{.since = now, .last = now, .difference = d};
+  if (!dispute_ || now - dispute_->last > kRestart)
+    dispute_ = Dispute{.since = now, .last = now, .difference = d};
   dispute_->last = now;
   dispute_->difference = d;
 }
 
+bool PosePublisher::is_disputed() const {
+  return team_pose_ && dispute_ && dispute_->last == team_pose_->stamp;
+}
+
 bool PosePublisher::must_filter_restart() {
-  if (!dispute_ || dispute_->last - dispute_->since < kDispute || team_->pose.needs_witness ||
+  if (!is_disputed() || dispute_->last - dispute_->since < kDispute || team_->pose.needs_witness ||
       is_by_imus_)
     return false;
   dispute_->since = dispute_->restarted = dispute_->last;
@@ -166,10 +171,10 @@ std::optional<NeighborPose> PosePublisher::published() const {
   const bool needs_witness = team_->pose.needs_witness;
   if (!pose_ || pose_->mode == PoseMode::kPredicted) {
     if (needs_witness) return graph_corrected_pose();
-    const bool is_disputed = dispute_ && team_pose_->stamp - dispute_->restarted <= kRestart;
-    return is_disputed ? doubtful(*team_pose_, dispute_->difference) : team_pose_;
+    const bool restarts = dispute_ && team_pose_->stamp - dispute_->restarted <= kRestart;
+    return restarts ? doubtful(*team_pose_, dispute_->difference) : team_pose_;
   }
-  if (!dispute_ || dispute_->last != team_pose_->stamp) return team_pose_;
+  if (!is_disputed()) return team_pose_;
   if (needs_witness) return graph_corrected_pose();
   // One of the two is wrong, and what shows which is how the pair knows its distance.
   return is_by_imus_ ? team_pose_ : doubtful(*pose_, dispute_->difference);

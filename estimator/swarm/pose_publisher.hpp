@@ -67,6 +67,7 @@ class PosePublisher {
 
  private:
   void compare();
+  [[nodiscard]] bool is_disputed() const;  ///< at the last tick
   [[nodiscard]] std::optional<NeighborPose> graph_corrected_pose() const;
 
   /// Difference of the graph's pose to the published one at the same instant.

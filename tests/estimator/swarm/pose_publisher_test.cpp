@@ -177,6 +177,16 @@ TEST_F(TeamAndFilter, AFilterThatTheTeamContradictsForASecondStartsAnew) {
   EXPECT_LT(sigma_m(*publisher_.published()), 0.1);
 }
 
+// Out of sight it contradicts nothing, and a later contradiction is another one.
+TEST_F(TeamAndFilter, AFilterThatIsContradictedNowAndLongAgoGoesOn) {
+  const Pose elsewhere{{kDistance + 0.8, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
+  for (const int ms : {1000, 1900, 4200, 5100}) {
+    go_on_until(ms);
+    EXPECT_TRUE(with_filter_at(elsewhere, ms - 100, ms)) << ms;
+    EXPECT_FALSE(publisher_.must_filter_restart()) << ms;
+  }
+}
+
 TEST_F(TeamAndFilter, AFilterThatAgreesNowAndThenGoesOn) {
   const Pose elsewhere{{kDistance + 0.8, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
   for (int ms = 1000; ms <= 3000; ms += 100) {
