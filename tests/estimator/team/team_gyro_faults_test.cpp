@@ -93,25 +93,6 @@ TEST(TeamFaults, RecoversFromItsOwnFalseGyroscope) {
   }
 }
 
-// The false rates have moved everything that is known of its gyroscope, and more so from when it
-// was found false until it was right again.
-TEST(TeamFaults, WhatWasLearnedWhileItsOwnGyroscopeWasFalseIsForgotten) {
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    SimulatedTeam team(seed);
-    TeamFilter filter;
-    static_cast<void>(solution_after(team, filter, 10.0));
-    const auto own = [&] { return filter.belief().robots.at(kSelf).bias; };
-    const ImuBias before = own();
-    team.damage = [](TeamInterval& interval) { scale_gyro(interval, kSelf); };
-    ASSERT_NE(fault_of(solution_after(team, filter, 1.0), kSelf), nullptr) << seed;
-    team.damage = [](TeamInterval&) {};
-    for (TeamSolution solution = filter.step(team.next()); fault_of(solution, kSelf) != nullptr;)
-      solution = filter.step(team.next());
-    EXPECT_LT((own().gyro_radps - before.gyro_radps).norm(), 0.004) << seed;
-    EXPECT_LT((own().accel_mps2 - before.accel_mps2).norm(), 0.02) << seed;
-  }
-}
-
 double camera_sigma_of(const TeamSolution& solution, RobotId robot) {
   const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
   if (found == solution.calibrations.end() || found->cameras.empty()) return 1.0;
