@@ -13,6 +13,7 @@
 #include "estimator/team/belief/sight_places.hpp"
 #include "estimator/team/keyframe_pose.hpp"
 #include "estimator/team/readings/reading_rows.hpp"
+#include "estimator/team/readings/team_scale.hpp"
 #include "estimator/team/readings/team_update.hpp"
 #include "estimator/team/trust/team_faults.hpp"
 
@@ -24,7 +25,6 @@ constexpr double kLinear = 0.01;           // rad, and relative to the distance
 constexpr int kMaxIterations = 4;
 constexpr double kSignificant = 4.0;      // sigmas of the directions: a parallax
 constexpr double kAgreementMemory = 0.5;  // s
-constexpr double kOneOfLate = 0.35;       // a range within that time
 constexpr std::size_t kMaxCameras = 4;    // of a robot, whatever it reports
 
 /// Whether this robot itself has an estimate of the other one, or is estimated by it.
@@ -47,39 +47,6 @@ double largest_step(const std::map<RobotId, TeamRobot>& robots, const Eigen::Vec
   }
   return largest;
 }
-
-/// Whether ranges to this robot came of late, and agree. Else its distance follows from bearings.
-bool has_range(const TeamBelief& belief, RobotId id) {
-  return std::ranges::any_of(belief.ranges, [&](const auto& entry) {
-    const auto& [pair, range] = entry;
-    if (pair.first != id && pair.second != id) return false;
-    return std::ranges::any_of(range.agreement, [](const auto& observed) {
-      const Agreement& agreement = observed.second;
-      return agreement.fused > std::max(kOneOfLate, agreement.gated);
-    });
-  });
-}
-
-/// The mean relative error of the distances that ranges hold, weighed by their squares, by the
-/// states: the team's scale, of which bearings at rest say nothing. `count` robots are meant.
-struct TeamScale {
-  Eigen::VectorXd by_states;
-  int count = 0;
-
-  TeamScale(const TeamBelief& belief, const std::vector<bool>& corrected)
-      : by_states(Eigen::VectorXd::Zero(std::ssize(corrected))) {
-    double sum_m2 = 0.0;
-    for (const auto& [id, robot] : belief.robots) {
-      const int index = robot.motion_index;
-      if (index < 0 || !corrected[static_cast<std::size_t>(index)] || !has_range(belief, id))
-        continue;
-      by_states.segment<3>(index) = robot.motion.p_F;
-      sum_m2 += robot.motion.p_F.squaredNorm();
-      ++count;
-    }
-    if (sum_m2 > 0.0) by_states /= sum_m2;
-  }
-};
 
 }  // namespace
 

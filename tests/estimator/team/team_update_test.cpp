@@ -59,6 +59,19 @@ Dense dense(const std::vector<TeamRow>& rows) {
   return all;
 }
 
+/// The gain of a Kalman filter.
+Eigen::MatrixXd gain_of(const Dense& all, const Eigen::MatrixXd& P) {
+  const Eigen::MatrixXd S =
+      all.H * P * all.H.transpose() + Eigen::MatrixXd(all.variance.asDiagonal());
+  return P * all.H.transpose() * S.inverse();
+}
+
+/// The covariance after a correction with any gain K.
+Eigen::MatrixXd josephs_form(const Dense& all, const Eigen::MatrixXd& K, const Eigen::MatrixXd& P) {
+  const Eigen::MatrixXd rest = Eigen::MatrixXd::Identity(kStates, kStates) - K * all.H;
+  return rest * P * rest.transpose() + K * all.variance.asDiagonal() * K.transpose();
+}
+
 TEST(TeamUpdate, IsThatOfTheInformationFilter) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     RandomGeometry random(seed);
@@ -88,16 +101,12 @@ TEST(TeamUpdate, StatesThatAreNotCorrectedCountAllTheSame) {
     const std::vector<TeamRow> rows = random_rows(random, 6);
     const Dense all = dense(rows);
     std::vector<bool> corrected(kStates, true);
-    const Eigen::MatrixXd S =
-        all.H * P * all.H.transpose() + Eigen::MatrixXd(all.variance.asDiagonal());
-    Eigen::MatrixXd K = P * all.H.transpose() * S.inverse();
+    Eigen::MatrixXd K = gain_of(all, P);
     for (int i = 0; i < kStates; i += 3) {
       corrected[static_cast<std::size_t>(i)] = false;
       K.row(i).setZero();
     }
-    const Eigen::MatrixXd rest = Eigen::MatrixXd::Identity(kStates, kStates) - K * all.H;
-    const Eigen::MatrixXd expected =
-        rest * P * rest.transpose() + K * all.variance.asDiagonal() * K.transpose();
+    const Eigen::MatrixXd expected = josephs_form(all, K, P);
     TeamUpdate(rows, Eigen::VectorXd::Zero(kStates), P, P).correct(corrected, P);
     EXPECT_LT((P - expected).norm(), 1e-8 * expected.norm());
     for (int i = 0; i < kStates; i += 3) EXPECT_EQ(P(i, i), before(i, i));
@@ -114,9 +123,7 @@ TEST(TeamUpdate, AnErrorThatIsWithheldKeepsItsVariance) {
     const std::vector<TeamRow> rows = random_rows(random, 6);
     const Dense all = dense(rows);
     std::vector<bool> corrected(kStates, true);
-    const Eigen::MatrixXd S =
-        all.H * P * all.H.transpose() + Eigen::MatrixXd(all.variance.asDiagonal());
-    Eigen::MatrixXd K = P * all.H.transpose() * S.inverse();
+    Eigen::MatrixXd K = gain_of(all, P);
     Eigen::VectorXd error = Eigen::VectorXd::Zero(kStates);
     error.segment<3>(4) = random.normal_vector<3>(1.0);
     K -= (P * error / error.dot(P * error) * (error.transpose() * K)).eval();
@@ -126,9 +133,7 @@ TEST(TeamUpdate, AnErrorThatIsWithheldKeepsItsVariance) {
         K.row(i).setZero();
       }
     }
-    const Eigen::MatrixXd rest = Eigen::MatrixXd::Identity(kStates, kStates) - K * all.H;
-    const Eigen::MatrixXd expected =
-        rest * P * rest.transpose() + K * all.variance.asDiagonal() * K.transpose();
+    const Eigen::MatrixXd expected = josephs_form(all, K, P);
     const Eigen::VectorXd expected_dx = K * all.r;
 
     TeamUpdate update(rows, Eigen::VectorXd::Zero(kStates), P, P);
