@@ -9,6 +9,7 @@
 
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/signal_model.hpp"
+#include "estimator/core/vibration_level.hpp"
 
 namespace crepes {
 
@@ -29,6 +30,9 @@ struct ImuMean {
   /// Variance of the velocity after the interval by forces that were refused, but may be real; body
   /// axes. Those of parts add up to that of the whole.
   Eigen::Vector3d blow_variance_m2ps2 = Eigen::Vector3d::Zero();
+  /// Variance by which each axis of the accelerometer's bias may have changed, because the airframe
+  /// began to vibrate or ceased to. Those of parts add up to that of the whole.
+  double bias_variance_m2ps4 = 0.0;
 };
 
 /// Finite, and within 100 rad/s and 1000 m/s^2 an axis.
@@ -52,9 +56,7 @@ class ImuHistory {
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] std::size_t size() const { return size_; }
   /// Counted from the oldest.
-  [[nodiscard]] const ImuSample& operator[](std::size_t i) const {
-    return kept_[(first_ + i) % kCapacity].sample;
-  }
+  [[nodiscard]] const ImuSample& operator[](std::size_t i) const { return kept(i).sample; }
   [[nodiscard]] const ImuSample& newest() const { return (*this)[size_ - 1]; }
 
   /// Mean over [from, to], from < to; there must be a sample.
@@ -72,12 +74,11 @@ class ImuHistory {
   struct Kept {
     ImuSample sample;
     Eigen::Vector3d blow_mps = Eigen::Vector3d::Zero();
+    double bias_variance_m2ps4 = 0.0;
   };
 
   Kept& slot(std::size_t i) { return kept_[(first_ + i) % kCapacity]; }
-  [[nodiscard]] const Eigen::Vector3d& blow_mps(std::size_t i) const {
-    return kept_[(first_ + i) % kCapacity].blow_mps;
-  }
+  [[nodiscard]] const Kept& kept(std::size_t i) const { return kept_[(first_ + i) % kCapacity]; }
   [[nodiscard]] std::size_t first_after(Timestamp t) const;
   /// The newest samples, if they are equally spaced.
   template <class Samples>
@@ -98,6 +99,7 @@ class ImuHistory {
   std::size_t size_ = 0;
   SignalModel gyro_;
   SignalModel accel_;
+  VibrationLevel vibration_;
 };
 
 }  // namespace crepes

@@ -37,11 +37,15 @@ auto interpolated(double strides, ValueAt value_at) {
 
 }  // namespace
 
+// White noise of variance s^2 has second differences of variance 6 s^2, on each of three axes.
+double SignalModel::newest_noise_density2(const Past& past, double period_s) {
+  const Eigen::Vector3d second = past.col(0) - 2.0 * past.col(1) + past.col(2);
+  return period_s * second.squaredNorm() / 18.0;
+}
+
 void SignalModel::observe(const Past& past, double period_s) {
   const auto smooth = [](double value, double& mean) { mean += kNoiseShare * (value - mean); };
-  // White noise of variance s^2 has second differences of variance 6 s^2, on each of three axes.
-  const Eigen::Vector3d second = past.col(0) - 2.0 * past.col(1) + past.col(2);
-  smooth(period_s * second.squaredNorm() / 18.0, noise_density2_);
+  smooth(newest_noise_density2(past, period_s), noise_density2_);
 
   for (int i = 0; i < kHorizons; ++i) {
     Horizon& horizon = horizons_.at(static_cast<std::size_t>(i));

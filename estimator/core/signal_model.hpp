@@ -21,6 +21,8 @@ class SignalModel {
   /// Those that the model learns from.
   using Past = Eigen::Matrix<double, 3, kStride*(kChanges + kHorizons) + 1>;
 
+  /// White noise in the newest three samples alone, `period_s` apart, as a density squared.
+  [[nodiscard]] static double newest_noise_density2(const Past& past, double period_s);
   /// Updates the model with samples `period_s` apart.
   void observe(const Past& past, double period_s);
 

@@ -183,6 +183,8 @@ void propagate(const ImuHistory& imu_B, const ImuHistory& imu_N, Timestamp from,
     state.range_bias_m *= range_bias_decay(noise, dt);
     propagate_covariance(propagation_jacobian(before, state.motion, body, neighbor, dt), body,
                          neighbor, rate_variance(mean_B, mean_N, noise, dt), noise, dt, P);
+    P.diagonal().segment<3>(ErrorState::kAccelB).array() += mean_B.bias_variance_m2ps4;
+    P.diagonal().segment<3>(ErrorState::kAccelN).array() += mean_N.bias_variance_m2ps4;
     t = next;
   }
 }

@@ -33,6 +33,13 @@ double turn_rate(const TeamMember& member) {
   return sum / static_cast<double>(std::max<std::size_t>(1, member.imu.size()));
 }
 
+/// By which the bias of the accelerometer may have changed within an interval.
+double vibration_variance(const TeamMember& member) {
+  double sum = 0.0;
+  for (const ImuMean& mean : member.imu) sum += mean.bias_variance_m2ps4;
+  return sum;
+}
+
 }  // namespace
 
 double accel_bias_variance(const Priors& priors) {
@@ -272,7 +279,8 @@ void TeamBelief::add_drift(const TeamInterval& interval, double dt) {
     const double turning =
         interval.settings.priors.accel_scale * kGravityMps2 * turn_rate(*interval.member(id));
     P.diagonal().segment<3>(robot.bias_index + 3).array() +=
-        noise.accel_walk * noise.accel_walk * dt + turning * turning * kTurnMemory * dt;
+        noise.accel_walk * noise.accel_walk * dt + turning * turning * kTurnMemory * dt +
+        vibration_variance(*interval.member(id));
     if (id != self) P(robot.clock_index(), robot.clock_index()) += kClockWalk * kClockWalk * dt;
   }
   const double kept_bias = std::exp(-noise.range_bias_return / (1.0 - kShareOfModules) * dt);

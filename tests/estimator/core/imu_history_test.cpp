@@ -173,6 +173,21 @@ TEST(ImuHistory, PartsOfABlowAddUpToIt) {
             1e-12);
 }
 
+// Rotors start: the bias may change by some tens of mm/s^2.
+TEST(ImuHistory, PartsOfWhatVibrationDoesToTheBiasAddUpToIt) {
+  RandomGeometry random(4);
+  ImuHistory imu;
+  for (int i = 1; i <= 500; ++i)
+    imu.push({Timestamp{i * 10ms}, random.vector(0.01), random.vector(i < 250 ? 0.02 : 1.0)});
+  double sum = 0.0;
+  for (Timestamp t{2400ms}; t < Timestamp{5s}; t += 4ms)
+    sum += imu.mean(t, t + 4ms).bias_variance_m2ps4;
+  EXPECT_NEAR(sum, imu.mean(Timestamp{2400ms}, Timestamp{5s}).bias_variance_m2ps4, 1e-12);
+  EXPECT_GT(std::sqrt(sum), 0.04);
+  EXPECT_LT(std::sqrt(sum), 0.09);
+  EXPECT_EQ(imu.mean(Timestamp{1s}, Timestamp{2500ms}).bias_variance_m2ps4, 0.0);
+}
+
 TEST(ImuHistory, RotationBackUndoesRotationForth) {
   RandomGeometry random(2);
   ImuHistory imu;

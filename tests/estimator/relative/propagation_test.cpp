@@ -260,6 +260,24 @@ TEST(Propagation, WhiteNoiseGivesTheSameVarianceInManyStepsAsInFew) {
               0.02);
 }
 
+TEST(Propagation, TheBiasOfAnAccelerometerThatBeginsToVibrateBecomesUncertain) {
+  using E = ErrorState;
+  RandomGeometry random(7);
+  ImuHistory steady;
+  ImuHistory shaken;
+  for (int i = 0; i <= 500; ++i) {
+    steady.push({Timestamp{i * 10ms}, random.vector(0.01), random.vector(0.02)});
+    shaken.push({Timestamp{i * 10ms}, random.vector(0.01), random.vector(i < 250 ? 0.02 : 1.0)});
+  }
+  NominalState state;
+  E::Covariance P;
+  propagate(steady, shaken, Timestamp{2s}, Timestamp{5s}, ProcessNoise{}, state, P);
+  EXPECT_EQ(P.diagonal()(E::kAccelB), 0.0);
+  EXPECT_NEAR(P.diagonal()(E::kAccelN),
+              shaken.mean(Timestamp{2s}, Timestamp{5s}).bias_variance_m2ps4, 1e-12);
+  EXPECT_GT(P.diagonal()(E::kAccelN), 0.001);
+}
+
 TEST(Propagation, TrustsAGapFarLessThanSamples) {
   ImuHistory steady;
   for (int i = 0; i <= 200; ++i)
