@@ -27,6 +27,9 @@ struct TeamPose {
   Timestamp since = kNever;    ///< it was placed anew then
   Duration clock_ahead{};      ///< its sensors' stamps are so much ahead of this robot's
   bool needs_witness = false;  ///< not to be used unless another estimate of it agrees
+  /// A camera of one of the two was knocked out of its calibration, and their pair's filter does
+  /// not know that.
+  bool has_no_witness = false;
 
   [[nodiscard]] Matrix6d pose_covariance() const {
     Matrix6d of_pose;

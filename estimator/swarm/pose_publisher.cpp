@@ -144,6 +144,7 @@ void PosePublisher::update_team(Timestamp now, const RobotState& self, const Rob
 /// What a filter out of sight predicts disputes nothing.
 void PosePublisher::compare() {
   if (!pose_ || pose_->mode == PoseMode::kPredicted) return;
+  if (team_->pose.has_no_witness) return dispute_.reset();
   const Vector6d d = pose_difference(pose_->T_B_N.pose, team_pose_->T_B_N.pose);
   const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
   if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return dispute_.reset();

@@ -65,7 +65,11 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
     trust_.end_probations(belief_);
     append_cameras(interval);
     belief_.append_range_biases(interval);
-    if (!correct(interval)) begin_anew(interval);
+    if (correct(interval)) {
+      trust_.note_leaps(interval, belief_, residuals_);
+    } else {
+      begin_anew(interval);
+    }
   }
   unseen_.add(interval, belief_);
   belief_.advance(interval);
@@ -106,6 +110,11 @@ bool TeamFilter::remove_members(const TeamInterval& interval) {
     remove(id);
   }
   for (const RobotId id : trust_.turned(interval, belief_)) {
+    if (trust_.is_knocked(id)) {
+      belief_.realign(id, trust_.turn_covariance(id).value());
+      memory_.clear();
+      continue;
+    }
     has_strained = has_strained || belief_.robots.at(id).is_trusted;
     remove(id);
   }
@@ -372,6 +381,7 @@ void TeamFilter::report(const TeamInterval& interval, bool are_placed,
     TeamPose& pose = solution.poses.emplace_back(keyframe_pose(belief_, id, *interval.member(id)));
     // The estimate that it started from may be false.
     pose.needs_witness = !robot.is_trusted && !is_plausible(belief_, id);
+    pose.has_no_witness = trust_.is_knocked(id) || trust_.is_knocked(belief_.self);
   }
   std::ranges::sort(solution.poses, {}, &TeamPose::neighbor);
   solution.calibrations = calibrations_of(belief_, interval.settings.priors);

@@ -103,6 +103,15 @@ void TeamBelief::doubt_imu(RobotId id, const Priors& priors) {
   set_imu_prior(index, priors);
 }
 
+void TeamBelief::realign(RobotId id, const Eigen::Matrix3d& covariance) {
+  for (TeamCamera& camera : robots.at(id).cameras) {
+    forget(camera.index, 3);
+    P.block<3, 3>(camera.index, camera.index) = covariance;
+    camera.is_free = true;
+    camera.agreement.clear();
+  }
+}
+
 TeamBelief TeamBelief::calibrations_at(const TeamInterval& interval) const {
   TeamBelief belief = *this;
   for (const auto& [id, robot] : robots)

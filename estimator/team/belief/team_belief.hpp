@@ -45,6 +45,8 @@ struct TeamBelief {
   /// Makes a robot's IMU as uncertain as one that was never calibrated. Its errors stay the best
   /// guess.
   void doubt_imu(RobotId id, const Priors& priors);
+  /// Makes the misalignment of a robot's cameras as uncertain as this, and free of its prior.
+  void realign(RobotId id, const Eigen::Matrix3d& covariance);
   /// Removes a robot and its states.
   void remove(RobotId id);
 

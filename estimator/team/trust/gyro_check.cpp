@@ -51,6 +51,7 @@ struct Change {
   Eigen::Matrix2d first_covariance;  ///< of the first's residual
   Eigen::Matrix2d covariance;        ///< of the difference of the residuals
   double time_s = 0.0;               ///< between the halves
+  bool may_be_leap = false;          ///< it is clear, and may have happened at once
 
   [[nodiscard]] Eigen::Vector2d residual(const Eigen::Matrix3d& R) const {
     return turn * second.residual(R) - first.residual(R);
@@ -128,6 +129,27 @@ Eigen::Matrix3d rate_covariance(const TeamBelief& belief, const TeamRobot& robot
   return covariance;
 }
 
+/// Whether a change at this rate would be clear from one bearing to the next, and none is there or
+/// one of them stands still.
+bool may_be_leap(const TeamPair& pair, const TeamCamera& camera, const SightModel& model,
+                 std::span<const Bearing* const> bearings, double rate_radps, Timestamp from) {
+  constexpr double kClear = 8.0;  // sigmas
+  constexpr double kStill = 0.5;  // of what the rate turns
+  bool is_clear = false;
+  bool is_gradual = bearings.size() > 2;
+  for (std::size_t i = 1; i < bearings.size(); ++i) {
+    const Bearing& before = *bearings[i - 1];
+    const Bearing& after = *bearings[i];
+    const double expected = rate_radps * to_seconds(after.stamp - before.stamp);
+    if (expected < kClear * after.sigma_rad) continue;
+    const auto r1 = model.residual(pair, camera, before.u_B, to_seconds(before.stamp - from));
+    const auto r2 = model.residual(pair, camera, after.u_B, to_seconds(after.stamp - from));
+    is_clear = true;
+    is_gradual = is_gradual && r1 && r2 && (*r2 - *r1).norm() > kStill * expected;
+  }
+  return is_clear && !is_gradual;
+}
+
 std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajectories& paths,
                                 const TeamInstant& instant, const TeamBelief& belief,
                                 const Sight& sight) {
@@ -167,6 +189,8 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
                 .first_covariance = before->row().covariance(instant.covariance()),
                 .covariance = row.covariance(instant.covariance()),
                 .time_s = t2_s - t1_s};
+  const double rate_radps = change.residual(Eigen::Matrix3d::Identity()).norm() / change.time_s;
+  change.may_be_leap = may_be_leap(pair, camera, *before, all, rate_radps, interval.from);
   // The instant has no part of the gyroscope's errors from the first half to the second.
   change.covariance += change.by_rate() *
                        rate_covariance(belief, pair.observer, pair.observer_arms) *
@@ -199,6 +223,7 @@ struct Evidence {
   double rate_radps = 0.0;
   std::ptrdiff_t sights = 0;
   std::ptrdiff_t unlikely = 0;  ///< of the sights
+  std::ptrdiff_t leaps = 0;     ///< of these, as it seems
 
   [[nodiscard]] bool is_explained() const { return explained > kExplained * chi2; }
 };
@@ -213,6 +238,7 @@ Evidence evidence_of(std::span<const Change> changes) {
     const Eigen::Matrix2d S = change.covariance + by_turn * turn.covariance * by_turn.transpose();
     const double chi2 = residual.dot(S.llt().solve(residual));
     evidence.unlikely += chi2 > kUnlikely ? 1 : 0;
+    evidence.leaps += chi2 > kUnlikely && change.may_be_leap ? 1 : 0;
     evidence.chi2 += chi2;
     rate.add(residual, S, change.by_rate());
   }
@@ -300,8 +326,9 @@ std::map<RobotId, GyroCheck> gyro_checks(const TeamInterval& interval,
         evidence.unlikely == 0 && seen.are_trusted && belief.robots.at(robot).is_trusted;
     const bool is_only_one = is_single(belief, all, robot);
     if (evidence.is_explained() && (is_common(evidence) || is_only_one)) {
-      check.contradiction = {
-          .chi2 = evidence.explained, .rate_radps = evidence.rate_radps, .is_single = is_only_one};
+      check.contradiction = {.chi2 = evidence.explained,
+                             .rate_radps = evidence.rate_radps,
+                             .may_be_leap = is_only_one || 2 * evidence.leaps > evidence.unlikely};
     }
   }
   return checks;

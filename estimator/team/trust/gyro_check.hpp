@@ -13,7 +13,9 @@ namespace crepes {
 struct GyroContradiction {
   double chi2 = 0.0;        ///< improvement by that rate; three degrees of freedom
   double rate_radps = 0.0;  ///< the difference
-  bool is_single = false;   ///< one robot alone shows it: a leap of its light would, too
+  /// One robot alone shows it, as a leap of its light would; or all directions may have leapt at
+  /// once, as they do when the camera is knocked.
+  bool may_be_leap = false;
 };
 
 /// How well a gyroscope agrees with what its cameras see.

@@ -29,7 +29,9 @@ constexpr Duration kGyroRefusal = std::chrono::seconds{1};
 constexpr Duration kGyroRecord = std::chrono::seconds{60};  // then it is as good as any other
 constexpr Duration kStrained = std::chrono::seconds{2};     // by a false gyroscope
 constexpr Duration kUnconfirmed = std::chrono::seconds{2};  // a gyroscope may go on being false
-constexpr int kLeastRefused = 3;                            // pairs
+constexpr double kLeap = 400.0;  // chi-square of two degrees of freedom: 20 sigma
+constexpr Duration kKnock = std::chrono::seconds{1};  // then its bearings contradict
+constexpr int kLeastRefused = 3;                      // pairs
 
 /// Whether a camera contradicts a robot and agrees with none.
 bool contradicts_all(const TeamCamera& camera) {
@@ -57,7 +59,7 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
     }
     GyroDoubt& doubt = gyro_doubts_[id];
     // A leap ends within an interval; a rate goes on.
-    if (check.contradiction->is_single && std::exchange(doubt.single, interval.to) < interval.from)
+    if (check.contradiction->may_be_leap && std::exchange(doubt.leap, interval.to) < interval.from)
       continue;
     doubt.chi2 += check.contradiction->chi2;
     if (doubt.chi2 <= kFalseGyro) continue;
@@ -82,6 +84,30 @@ std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const 
       robots.push_back(id);
   }
   return robots;
+}
+
+void TeamTrust::note_leaps(const TeamInterval& interval, const TeamBelief& belief,
+                           const std::vector<TeamResidual>& residuals) {
+  struct Sights {
+    int seen = 0;
+    int leapt = 0;
+  };
+  std::map<std::pair<RobotId, int>, Sights> cameras;
+  for (const TeamResidual& residual : residuals) {
+    if (residual.kind != TeamResidual::Kind::kBearing || residual.dimension == 0) continue;
+    Sights& sights = cameras[{residual.observer, residual.camera}];
+    ++sights.seen;
+    sights.leapt += residual.fused == 0 && residual.nis > kLeap ? 1 : 0;
+  }
+  for (const auto& [key, sights] : cameras) {
+    const auto& [id, index] = key;
+    if (sights.leapt < 2 || 2 * sights.leapt <= sights.seen || !belief.robots.at(id).is_trusted)
+      continue;
+    const TeamCamera& camera = belief.robots.at(id).cameras.at(static_cast<std::size_t>(index));
+    const bool agreed_until_now = std::ranges::none_of(
+        camera.agreement, [](const auto& entry) { return entry.second.is_contradiction(); });
+    if (agreed_until_now) leaps_[id] = interval.to;
+  }
 }
 
 /// Whether its gyroscope was recently false, so that the states that it has disturbed may still
@@ -124,6 +150,7 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
   std::erase_if(losses_, is_away);
   std::erase_if(restarts_, is_away);
   std::erase_if(misled_by_, is_away);
+  std::erase_if(leaps_, is_away);
   review_verdicts(interval, belief);
   const auto is_turned_of = [&](RobotId id, const TeamCamera& camera) {
     return looks_turned(belief, id, camera, verdicts_.contains(id));
@@ -171,7 +198,10 @@ std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamB
           is_settling ? MisalignmentCheck{}
                       : misalignment_check(belief, camera, interval.settings.priors);
       if (!contradicts && check.chi2 <= kTurnedChi2) continue;
-      convict(id, belief.stamp, turned_covariance(check.turn));
+      // Since a leap its bearings were refused, and say nothing of the axis.
+      const bool has_axis = !has_leapt(id, belief.stamp);
+      convict(id, belief.stamp,
+              turned_covariance(has_axis ? check.turn : Eigen::Vector3d::Zero().eval()));
       turned.push_back(id);
       break;
     }
@@ -202,6 +232,7 @@ void TeamTrust::convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& cov
   ++verdict.count;
   verdict.is_refused = was_realigned && verdict.count >= kRefusedAt;
   verdict.is_withdrawn = was_realigned && !verdict.is_refused;
+  verdict.is_knocked = has_leapt(robot, now);
   verdict.shown = now;
   verdict.covariance = covariance;
   for (auto& [id, other] : verdicts_)
@@ -305,6 +336,15 @@ bool TeamTrust::is_gyro_false(RobotId robot, Timestamp now) const {
   const auto doubt = gyro_doubts_.find(robot);
   return doubt != gyro_doubts_.end() && doubt->second.found &&
          now - *doubt->second.found < kGyroRefusal;
+}
+
+bool TeamTrust::is_knocked(RobotId robot) const {
+  return is_realigned(robot) && verdicts_.at(robot).is_knocked;
+}
+
+bool TeamTrust::has_leapt(RobotId robot, Timestamp now) const {
+  const auto leap = leaps_.find(robot);
+  return leap != leaps_.end() && now - leap->second < kKnock && !is_gyro_false(robot, now);
 }
 
 bool is_plausible(const TeamBelief& belief, RobotId id) {

@@ -28,6 +28,11 @@ class TeamTrust {
                                                  const TeamBelief& belief,
                                                  const std::map<RobotId, GyroCheck>& checks);
 
+  /// Notices the cameras to which most robots that they see were, within this interval, suddenly
+  /// far from where they should be: they may have been knocked.
+  void note_leaps(const TeamInterval& interval, const TeamBelief& belief,
+                  const std::vector<TeamResidual>& residuals);
+
   /// Robots of which a camera was newly found turned. Their attitude is wrong too. They must be
   /// restarted with an uncertain misalignment, so that the others' measurements determine it. If
   /// the camera contradicts the others again, it is refused.
@@ -50,6 +55,10 @@ class TeamTrust {
   /// disturbed.
   [[nodiscard]] bool is_everybody_strained(Timestamp now) const;
 
+  /// Whether its camera was found turned soon after all that it sees had leapt at once, as when
+  /// something hits the camera. Until then it was as calibrated, and from then to the verdict its
+  /// bearings were refused.
+  [[nodiscard]] bool is_knocked(RobotId robot) const;
   /// Covariance of the misalignment of its cameras, which is also that of its attitude, in body
   /// axes [rad^2]. Empty if its cameras are as calibrated.
   [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot) const;
@@ -70,7 +79,7 @@ class TeamTrust {
     std::optional<Timestamp> unconfirmed;
     std::optional<Timestamp> confirmed;  ///< when its cameras first agreed with it after that
     double rate_radps = 0.0;             ///< how wrong the gyroscope was then
-    Timestamp single = kNever;           ///< when it was last contradicted by a single robot
+    Timestamp leap = kNever;             ///< when it was last contradicted by what may be a leap
     Losses as_trusted;                   ///< when it was found although the robot was trusted
   };
   struct Verdict {
@@ -80,6 +89,7 @@ class TeamTrust {
     int count = 0;  ///< how often its cameras were found turned
     bool is_refused = false;
     bool is_withdrawn = false;
+    bool is_knocked = false;
   };
   void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
   void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
@@ -87,6 +97,7 @@ class TeamTrust {
   [[nodiscard]] bool may_be_disoriented(RobotId robot, Timestamp now) const;
   [[nodiscard]] bool is_disoriented(const TeamBelief& belief, RobotId id) const;
   [[nodiscard]] bool is_realigned(RobotId robot) const;
+  [[nodiscard]] bool has_leapt(RobotId robot, Timestamp now) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] Duration probation(RobotId robot, Timestamp now) const;
   [[nodiscard]] static int recent(const std::map<RobotId, Losses>& all, RobotId robot,
@@ -97,6 +108,7 @@ class TeamTrust {
   std::map<RobotId, Losses> restarts_;  ///< with a wrong attitude
   std::map<RobotId, Verdict> verdicts_;
   std::map<RobotId, GyroDoubt> gyro_doubts_;
+  std::map<RobotId, Timestamp> leaps_;      ///< of what a camera sees
   std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
 };
 

@@ -18,12 +18,14 @@ class TeamPublisher : public testing::Test {
   TeamPublisher() { self_.imu = neighbor_.imu = imu_at_rest(1000); }
 
   /// The team's pose at `ms`, seen by anybody at `sighted_ms`.
-  void add(int ms, int sighted_ms, double sigma_m = 0.05, bool needs_witness = false) {
+  void add(int ms, int sighted_ms, double sigma_m = 0.05, bool needs_witness = false,
+           bool has_no_witness = false) {
     TeamPose pose{.neighbor = kNeighbor, .T_B_N = kTruth};
     pose.covariance.diagonal().head<3>().setConstant(sigma_m * sigma_m);
     pose.covariance.diagonal().segment<6>(3).setConstant(1e-4);
     pose.last_sighting = at_ms(sighted_ms);
     pose.needs_witness = needs_witness;
+    pose.has_no_witness = has_no_witness;
     publisher_.add_team_pose({at_ms(ms), pose, {}, {}});
   }
   [[nodiscard]] std::optional<NeighborPose> at(int now_ms, const LastContact& last = {}) {
@@ -136,6 +138,20 @@ TEST_F(TeamAndFilter, AFilterThatAgreesIsAWitness) {
   const auto pose = with_filter_at({{kDistance + 0.1, 0.0, 0.0}, Eigen::Quaterniond::Identity()});
   ASSERT_TRUE(pose);
   EXPECT_LT((pose->T_B_N.pose.p - kTruth.p).norm(), 1e-6);
+}
+
+// As it takes a knocked camera to be calibrated.
+TEST_F(TeamAndFilter, AFilterThatIsNoWitnessContradictsNothing) {
+  const Pose elsewhere{{kDistance + 0.8, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
+  for (int ms = 1000; ms <= 2500; ms += 100) {
+    self_.imu = neighbor_.imu = imu_at_rest(ms);
+    add(ms - 100, ms - 100, 0.05, false, true);
+    const auto pose = with_filter_at(elsewhere, ms - 100, ms);
+    ASSERT_TRUE(pose) << ms;
+    EXPECT_LT((pose->T_B_N.pose.p - kTruth.p).norm(), 1e-6) << ms;
+    EXPECT_LT(sigma_m(*pose), 0.1) << ms;
+    EXPECT_FALSE(publisher_.must_filter_restart()) << ms;
+  }
 }
 
 // Without ranges a filter's distance is by the IMUs alone. While many are refused, either of the

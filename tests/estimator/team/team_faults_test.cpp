@@ -65,6 +65,52 @@ TEST(TeamFaults, ATurnedCameraHarmsNobody) {
   }
 }
 
+double camera_sigma_rad(const TeamSolution& solution, RobotId id) {
+  const auto found = std::ranges::find(solution.calibrations, id, &RobotCalibration::robot);
+  return found == solution.calibrations.end() ? 1.0 : found->cameras.front().angle_sigma_rad();
+}
+
+// Between two intervals, or within one. What was known before goes on: only the camera's
+// calibration is lost, and is there again at once.
+TEST(TeamFaults, ACameraThatIsKnockedIsRealignedInPlace) {
+  const Eigen::Quaterniond turn = so3_exp(radians(2.0) * Eigen::Vector3d(0.6, 0.0, 0.8));
+  for (const RobotId knocked : {RobotId{4}, kSelf}) {
+    for (const double within_s : {0.0, 0.06}) {
+      for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+        const auto label = testing::Message()
+                           << "robot " << knocked.value << ", " << within_s << " s, seed " << seed;
+        SimulatedTeam team(seed);
+        TeamFilter filter;
+        const TeamSolution before = solution_after(team, filter, 8.0);
+        const Timestamp hit = filter.belief().stamp + from_seconds(within_s);
+        team.damage = [&](TeamInterval& interval) {
+          for (TeamBearing& b : interval.bearings)
+            if (b.observer == knocked && b.bearing.stamp >= hit)
+              b.bearing.u_B = turn * b.bearing.u_B;
+        };
+        TeamSolution solution;
+        for (double t = 0.0; t < 3.0; t += kIntervalSeconds) {
+          solution = filter.step(team.next());
+          for (const RobotId robot : {RobotId{2}, RobotId{3}, RobotId{4}}) {
+            const TeamPose* pose = find(solution, robot);
+            ASSERT_NE(pose, nullptr) << label << " at " << t;
+            EXPECT_LT(nees_of(*pose, team.truth(robot)), 40.0) << label << " at " << t;
+          }
+        }
+        const TeamFault* fault = fault_of(solution, knocked);
+        ASSERT_NE(fault, nullptr) << label;
+        EXPECT_EQ(fault->kind, TeamFault::Kind::kCameraTurned) << label;
+        EXPECT_NEAR(fault->size, radians(2.0), radians(0.5)) << label;
+        EXPECT_EQ(find(solution, RobotId{4})->has_no_witness, true) << label;
+        EXPECT_EQ(find(solution, RobotId{2})->has_no_witness, knocked == kSelf) << label;
+        for (const RobotId robot : {RobotId{2}, RobotId{3}})
+          EXPECT_LT(camera_sigma_rad(solution, robot), 1.05 * camera_sigma_rad(before, robot))
+              << label;
+      }
+    }
+  }
+}
+
 // Robots that start from what a turned camera sees take its carrier to be turned. Then only motion
 // contradicts it, little by little. It is found before the others are wrong beyond their
 // covariance.
