@@ -225,18 +225,19 @@ void TeamTrust::review_verdicts(const TeamInterval& interval, const TeamBelief& 
 /// A realigned camera that contradicts the others again may be as calibrated again: repaired, or
 /// its robot has ceased to lie. So its verdict is withdrawn before it is refused. Also withdraws
 /// the verdict of robots that were convicted once before: this robot had disturbed the states on
-/// which they were judged.
+/// which they were judged. A camera that is knocked, or knocked back, has disturbed none.
 void TeamTrust::convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance) {
   Verdict& verdict = verdicts_[robot];
   const bool was_realigned = verdict.count > 0 && !verdict.is_withdrawn;
   ++verdict.count;
-  verdict.is_refused = was_realigned && verdict.count >= kRefusedAt;
-  verdict.is_withdrawn = was_realigned && !verdict.is_refused;
   verdict.is_knocked = has_leapt(robot, now);
+  verdict.is_refused = was_realigned && verdict.count >= kRefusedAt;
+  verdict.is_withdrawn = was_realigned && !verdict.is_refused && !verdict.is_knocked;
   verdict.shown = now;
   verdict.covariance = covariance;
+  if (verdict.is_knocked) return;
   for (auto& [id, other] : verdicts_)
-    if (id != robot && other.count == 1) other.is_withdrawn = true;
+    if (id != robot && other.count == 1 && !other.is_knocked) other.is_withdrawn = true;
 }
 
 std::optional<Eigen::Matrix3d> TeamTrust::turn_covariance(RobotId robot) const {
@@ -339,7 +340,7 @@ bool TeamTrust::is_gyro_false(RobotId robot, Timestamp now) const {
 }
 
 bool TeamTrust::is_knocked(RobotId robot) const {
-  return is_realigned(robot) && verdicts_.at(robot).is_knocked;
+  return is_realigned(robot) && !is_refused(robot) && verdicts_.at(robot).is_knocked;
 }
 
 bool TeamTrust::has_leapt(RobotId robot, Timestamp now) const {
