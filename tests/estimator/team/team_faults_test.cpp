@@ -71,7 +71,7 @@ double camera_sigma_rad(const TeamSolution& solution, RobotId id) {
 }
 
 // Between two intervals, or within one. What was known before goes on: only the camera's
-// calibration is lost, and is there again at once.
+// calibration is lost, and is there again at once. Later it is knocked back.
 TEST(TeamFaults, ACameraThatIsKnockedIsRealignedInPlace) {
   const Eigen::Quaterniond turn = so3_exp(radians(2.0) * Eigen::Vector3d(0.6, 0.0, 0.8));
   for (const RobotId knocked : {RobotId{4}, kSelf}) {
@@ -83,29 +83,35 @@ TEST(TeamFaults, ACameraThatIsKnockedIsRealignedInPlace) {
         TeamFilter filter;
         const TeamSolution before = solution_after(team, filter, 8.0);
         const Timestamp hit = filter.belief().stamp + from_seconds(within_s);
+        const Timestamp hit_back = hit + from_seconds(3.0);
         team.damage = [&](TeamInterval& interval) {
           for (TeamBearing& b : interval.bearings)
-            if (b.observer == knocked && b.bearing.stamp >= hit)
+            if (b.observer == knocked && b.bearing.stamp >= hit && b.bearing.stamp < hit_back)
               b.bearing.u_B = turn * b.bearing.u_B;
         };
-        TeamSolution solution;
-        for (double t = 0.0; t < 3.0; t += kIntervalSeconds) {
-          solution = filter.step(team.next());
+        const auto next = [&] {
+          TeamSolution solution = filter.step(team.next());
           for (const RobotId robot : {RobotId{2}, RobotId{3}, RobotId{4}}) {
             const TeamPose* pose = find(solution, robot);
-            ASSERT_NE(pose, nullptr) << label << " at " << t;
-            EXPECT_LT(nees_of(*pose, team.truth(robot)), 40.0) << label << " at " << t;
+            EXPECT_NE(pose, nullptr) << label;
+            if (pose != nullptr) EXPECT_LT(nees_of(*pose, team.truth(robot)), 40.0) << label;
           }
-        }
+          return solution;
+        };
+        TeamSolution solution;
+        while (filter.belief().stamp < hit_back) solution = next();
         const TeamFault* fault = fault_of(solution, knocked);
         ASSERT_NE(fault, nullptr) << label;
         EXPECT_EQ(fault->kind, TeamFault::Kind::kCameraTurned) << label;
         EXPECT_NEAR(fault->size, radians(2.0), radians(0.5)) << label;
-        EXPECT_EQ(find(solution, RobotId{4})->has_no_witness, true) << label;
+        EXPECT_TRUE(find(solution, RobotId{4})->has_no_witness) << label;
         EXPECT_EQ(find(solution, RobotId{2})->has_no_witness, knocked == kSelf) << label;
         for (const RobotId robot : {RobotId{2}, RobotId{3}})
           EXPECT_LT(camera_sigma_rad(solution, robot), 1.05 * camera_sigma_rad(before, robot))
               << label;
+
+        while (filter.belief().stamp < hit_back + from_seconds(2.0)) solution = next();
+        EXPECT_EQ(fault_of(solution, knocked), nullptr) << label;
       }
     }
   }
