@@ -9,11 +9,11 @@
 namespace crepes {
 namespace {
 
-constexpr Duration kRotationStep = std::chrono::milliseconds{5};
 // An accelerometer's bias moves with the vibration that it rectifies: one sigma of that, over the
 // density of the vibration [m/s^2 / (m/s^2/sqrt(Hz))]. 0.15 m/s^2, that is 15 mg, for rotors that
 // shake it by 2.5 m/s^2 at 100 samples a second.
 constexpr double kBiasByVibration = 0.6;
+constexpr Duration kRotationStep = std::chrono::milliseconds{5};
 constexpr std::int64_t kMaxRotationSteps = 400;  // longer intervals are cut into longer steps
 
 void add(const ImuSample& sample, double dt, ImuMean& sum) {

@@ -7,7 +7,8 @@
 namespace crepes {
 
 /// The level of the white noise in a signal. A blow hardly counts: one sample raises the level by a
-/// fifth at most. So does a start of the rotors, which takes half a second to be known.
+/// fifth at most. So a start of the rotors takes half a second to be known, at 100 samples a
+/// second.
 class VibrationLevel {
  public:
   /// `noise2` is the noise in the latest samples alone, as a density squared. Returns by how much
@@ -20,7 +21,7 @@ class VibrationLevel {
       noticed2_ = level2_;
       return 0.0;
     }
-    level2_ += kShare * (std::min(noise2, kMost * level2_) - level2_);
+    level2_ += kShare * (std::min(noise2, kMost * std::max(level2_, kLeast2)) - level2_);
     const double change2 = std::abs(level2_ - noticed2_);
     if (change2 <= kClear * std::max(level2_, noticed2_)) return 0.0;
     noticed2_ = level2_;
@@ -30,7 +31,8 @@ class VibrationLevel {
  private:
   static constexpr double kShare = 0.02;  // of one sample: the level's own noise is a seventh
   static constexpr int kLearning = 50;
-  static constexpr double kMost = 10.0;  // times the level; white noise exceeds it once in 10^6
+  static constexpr double kMost = 10.0;    // times the level; white noise exceeds it once in 10^6
+  static constexpr double kLeast2 = 1e-6;  // a coarse sensor at rest shows no noise at all
   static constexpr double kClear = 0.5;
 
   int count_ = 0;

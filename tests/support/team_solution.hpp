@@ -30,6 +30,13 @@ inline double position_nees_of(const TeamPose& pose, const Pose& truth) {
   return e.dot(pose.covariance.topLeftCorner<3, 3>().llt().solve(e));
 }
 
+/// How well the angle of its first camera is known [rad]; 1 if it has none.
+inline double camera_sigma_rad(const TeamSolution& solution, RobotId robot) {
+  const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
+  if (found == solution.calibrations.end() || found->cameras.empty()) return 1.0;
+  return found->cameras.front().angle_sigma_rad();
+}
+
 inline TeamSolution solution_after(SimulatedTeam& team, TeamFilter& filter, double seconds) {
   TeamSolution solution;
   for (double t = 0.0; t < seconds; t += kIntervalSeconds) solution = filter.step(team.next());

@@ -28,8 +28,8 @@ class TeamTrust {
                                                  const TeamBelief& belief,
                                                  const std::map<RobotId, GyroCheck>& checks);
 
-  /// Notices the cameras to which most robots that they see were, within this interval, suddenly
-  /// far from where they should be: they may have been knocked.
+  /// Notices cameras that may have been knocked: they agreed until now, and within this interval
+  /// most robots that they see were far from where they should be.
   void note_leaps(const TeamInterval& interval, const TeamBelief& belief,
                   const std::vector<TeamResidual>& residuals);
 

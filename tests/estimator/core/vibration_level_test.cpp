@@ -41,6 +41,16 @@ TEST(VibrationLevel, ThePartsOfAStartAndOfAnEndAddUp) {
   }
 }
 
+// Its values repeat while it is at rest, perhaps for minutes.
+TEST(VibrationLevel, ACoarseSensorThatShowedNoNoiseStartsToVibrate) {
+  RandomGeometry random(1);
+  VibrationLevel level;
+  for (int i = 0; i < 100'000; ++i) EXPECT_EQ(level.observe(0.0), 0.0);
+  double start2 = 0.0;
+  for (int i = 0; i < 150; ++i) start2 += level.observe(noise2_of(random, 0.02));
+  EXPECT_GT(start2, 0.006);
+}
+
 // Each sample is in three differences.
 TEST(VibrationLevel, ABlowIsNoVibration) {
   RandomGeometry random(1);

@@ -18,6 +18,7 @@
 namespace crepes::team_faults_test {
 namespace {
 
+using test::camera_sigma_rad;
 using test::error_of;
 using test::fault_of;
 using test::find;
@@ -63,11 +64,6 @@ TEST(TeamFaults, ATurnedCameraHarmsNobody) {
     EXPECT_LT(std::sqrt(turned), 1.2 * std::sqrt(alone)) << turn_deg;
     EXPECT_LT(std::sqrt(turned), 1.5 * std::sqrt(healthy)) << turn_deg;
   }
-}
-
-double camera_sigma_rad(const TeamSolution& solution, RobotId id) {
-  const auto found = std::ranges::find(solution.calibrations, id, &RobotCalibration::robot);
-  return found == solution.calibrations.end() ? 1.0 : found->cameras.front().angle_sigma_rad();
 }
 
 // Between two intervals, or within one. What was known before goes on: only the camera's

@@ -13,6 +13,7 @@
 namespace crepes::team_gyro_faults_test {
 namespace {
 
+using test::camera_sigma_rad;
 using test::error_of;
 using test::fault_of;
 using test::find;
@@ -93,12 +94,6 @@ TEST(TeamFaults, RecoversFromItsOwnFalseGyroscope) {
   }
 }
 
-double camera_sigma_of(const TeamSolution& solution, RobotId robot) {
-  const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
-  if (found == solution.calibrations.end() || found->cameras.empty()) return 1.0;
-  return found->cameras.front().angle_sigma_rad();
-}
-
 // Whoever had the false gyroscope.
 TEST(TeamFaults, AFalseGyroscopeCostsNobodyWhatWasLearnedOfHisCamera) {
   for (const RobotId liar : {kSelf, RobotId{4}}) {
@@ -112,7 +107,7 @@ TEST(TeamFaults, AFalseGyroscopeCostsNobodyWhatWasLearnedOfHisCamera) {
       // After its refusal the robot itself starts anew, and the others are on probation.
       const TeamSolution after = solution_after(team, filter, kRefused_s + kProbation + 0.2);
       for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
-        EXPECT_LT(camera_sigma_of(after, robot), 1.1 * camera_sigma_of(before, robot))
+        EXPECT_LT(camera_sigma_rad(after, robot), 1.1 * camera_sigma_rad(before, robot))
             << "liar " << liar.value << ", seed " << seed;
         const TeamPose* pose = find(after, robot);
         ASSERT_NE(pose, nullptr) << "liar " << liar.value << ", seed " << seed;
@@ -156,7 +151,7 @@ TEST(TeamFaults, AGyroscopeThatIsFalseNowAndThenForAMinuteCostsTheOthersLittle) 
       TeamFilter unharmed;
       const TeamSolution alone = solution_after(others, unharmed, 5.0 + kMinute);
       for (const RobotId robot : {RobotId{2}, RobotId{3}})
-        EXPECT_LT(camera_sigma_of(solution, robot), 1.1 * camera_sigma_of(alone, robot)) << label;
+        EXPECT_LT(camera_sigma_rad(solution, robot), 1.1 * camera_sigma_rad(alone, robot)) << label;
     }
   }
 }
