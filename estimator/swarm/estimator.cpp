@@ -16,6 +16,7 @@
 #include "estimator/swarm/neighbor.hpp"
 #include "estimator/swarm/report_composer.hpp"
 #include "estimator/swarm/robot_state.hpp"
+#include "estimator/swarm/swapped_modules.hpp"
 #include "estimator/swarm/team_intake.hpp"
 #include "estimator/swarm/team_log.hpp"
 #include "estimator/vision/blink_tracker.hpp"
@@ -146,6 +147,7 @@ struct Estimator::State {
   [[nodiscard]] std::optional<TeamInterval> team_interval(Timestamp now);
   [[nodiscard]] Bearing with_stamp_error(Bearing bearing) const;
   [[nodiscard]] ExpectedBoard expected_board(const NeighborPose& pose) const;
+  [[nodiscard]] std::vector<TeamFault> faults_of(RobotId robot) const;
 
   RobotId id;
   RobotState self;
@@ -169,6 +171,7 @@ struct Estimator::State {
   VisionConfig vision;
   bool keeps_records = false;
   TeamLog team_log;
+  SwappedModules swapped_modules;
   std::uint64_t unknown_senders = 0;
   std::uint64_t used_samples = 0;
   std::uint64_t refused_samples = 0;
@@ -203,6 +206,7 @@ void Estimator::State::reconfigure(const EstimatorSettings& settings) {
   tilt_filter.set_noise(settings.imu);
   if (!(now == before && settings.vision == vision)) trackers = make_trackers(settings);
   vision = settings.vision;
+  swapped_modules = {};
   graph_enabled = settings.solves_graph;
   uses_team_filter = settings.uses_team_filter;
   team_size = settings.team_size;
@@ -225,8 +229,13 @@ Outputs Estimator::State::handle(const ImuSample& sample) {
 }
 
 Outputs Estimator::State::handle(const UwbRange& range) {
+  if (range.neighbor == id && std::isfinite(range.range_m)) {
+    swapped_modules.add(id, range);
+    composer.add(range);  // the others must know
+  }
   const auto neighbor = neighbors.find(range.neighbor);
-  if (neighbor == neighbors.end() || !std::isfinite(range.range_m)) {
+  if (neighbor == neighbors.end() || !std::isfinite(range.range_m) ||
+      swapped_modules.contains(range.neighbor, range.stamp)) {
     ++refused_samples;
     return {};
   }
@@ -282,11 +291,27 @@ ExpectedBoard Estimator::State::expected_board(const NeighborPose& pose) const {
           .covariance_m2 = pose.T_B_N.covariance.topLeftCorner<3, 3>()};
 }
 
+std::vector<TeamFault> Estimator::State::faults_of(RobotId robot) const {
+  std::vector<TeamFault> faults = team_log.faults_of(robot);
+  if (const auto module = swapped_modules.fault_of(robot, last_tick)) faults.push_back(*module);
+  return faults;
+}
+
 Outputs Estimator::State::handle(const ReceivedReport& received) {
   const auto neighbor = neighbors.find(received.report.sender);
   if (neighbor == neighbors.end()) {
     ++unknown_senders;
     return {};
+  }
+  for (const UwbRange& range : received.report.ranges)
+    swapped_modules.add(received.report.sender, range);
+  const auto ends_elsewhere = [this](const UwbRange& range) {
+    return swapped_modules.contains(range.neighbor, range.stamp);
+  };
+  if (std::ranges::any_of(received.report.ranges, ends_elsewhere)) {
+    ReceivedReport rest = received;
+    refused_samples += std::erase_if(rest.report.ranges, ends_elsewhere);
+    return handle(rest);
   }
   neighbor->second.add_report(received, self);
   graph_builder.add_report(received.report, swarm);
@@ -332,8 +357,11 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
   }
   Outputs outputs;
   if (keeps_records) {
-    outputs.records.team.push_back(
-        {solution.stamp, solution.residuals, solution.calibrations, solution.faults});
+    TeamRecord record{solution.stamp, solution.residuals, solution.calibrations, solution.faults};
+    for (const MemberConfig& member : swarm.members)
+      if (const auto module = swapped_modules.fault_of(member.id, last_tick))
+        record.faults.push_back(*module);
+    outputs.records.team.push_back(std::move(record));
   }
   return outputs;
 }
@@ -420,8 +448,12 @@ std::uint64_t Estimator::used_samples() const { return state_->used_samples; }
 
 EstimatorStatus Estimator::status() const {
   EstimatorStatus status;
-  status.faults = state_->team_log.faults_of(state_->id);
+  status.faults = state_->faults_of(state_->id);
   status.team = state_->team_log.status();
+  if (status.team) {
+    for (TeamRobotStatus& robot : status.team->robots)
+      robot.faults = state_->faults_of(robot.calibration.robot);
+  }
   for (const auto& [robot, neighbor] : state_->neighbors) {
     NeighborStatus one = neighbor.status();
     for (const BlinkTracker& tracker : state_->trackers) {
@@ -430,7 +462,7 @@ EstimatorStatus Estimator::status() const {
       if (found != decodes.end()) one.id_decodes += found->second;
     }
     one.name = member_of(state_->swarm, robot).name;
-    one.faults = state_->team_log.faults_of(robot);
+    one.faults = state_->faults_of(robot);
     status.neighbors.push_back(std::move(one));
   }
   for (const BlinkTracker& tracker : state_->trackers) {

@@ -34,6 +34,12 @@ std::string text_of(const TeamFault& fault) {
       return fmt::format(
           "the poses that it broadcasts are {:.2f} m off and are not used; look at its status",
           fault.size);
+    case TeamFault::Kind::kModule:
+      return fmt::format(
+          "its UWB module measures the distance to the module of its own id, {:.2f} m, which "
+          "another robot carries; ranges to it are not used; set the module's id, or uwb_id in "
+          "swarm.members",
+          fault.size);
   }
   return {};
 }

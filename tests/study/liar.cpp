@@ -1,5 +1,7 @@
 #include "tests/study/liar.hpp"
 
+#include <algorithm>
+
 #include "estimator/core/constants.hpp"
 
 namespace crepes::study {
@@ -32,10 +34,20 @@ void lengthen(RobotRecording& robot, RobotId liar) {
     if (robot.robot.id == liar || range.neighbor == liar) range.range_m += kTooLong;
 }
 
+/// To the others, each is where the other one's module is.
+void swap_modules(SwarmDataset& dataset, RobotId a, RobotId b) {
+  for (RobotRecording& robot : dataset.robots) {
+    for (UwbRange& range : robot.ranges) {
+      if (range.neighbor == a || range.neighbor == b) range.neighbor = range.neighbor == a ? b : a;
+    }
+  }
+}
+
 void corrupt(Lie lie, RobotRecording& robot) {
   switch (lie) {
     case Lie::kEstimates:
     case Lie::kAntennaDelay:
+    case Lie::kModules:
       return;
     case Lie::kCamera5:
       return turn_camera(robot.config, radians(5.0));
@@ -55,6 +67,10 @@ void corrupt(Lie lie, RobotId robot, SwarmDataset& dataset) {
     if (recording.robot.id == robot) corrupt(lie, recording);
     if (lie == Lie::kAntennaDelay) lengthen(recording, robot);
   }
+  if (lie != Lie::kModules) return;
+  const auto is_other = [robot](const RobotRecording& r) { return r.robot.id != robot; };
+  const auto other = std::ranges::find_if(dataset.robots, is_other);
+  if (other != dataset.robots.end()) swap_modules(dataset, robot, other->robot.id);
 }
 
 std::function<void(Report&)> corrupted_reports(Lie lie, RobotId robot) {

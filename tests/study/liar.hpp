@@ -17,6 +17,7 @@ enum class Lie : std::uint8_t {
   kClock,         ///< its sensors are stamped 20 ms late
   kRanges,        ///< its module's readings are 1 m too long
   kAntennaDelay,  ///< all readings to and from its module are 1 m too long
+  kModules,       ///< it carries another robot's module, and that robot its own
 };
 
 struct Liar {
@@ -26,7 +27,8 @@ struct Liar {
 inline constexpr std::array kLiars{
     Liar{"estimates", Lie::kEstimates}, Liar{"camera-5", Lie::kCamera5},
     Liar{"camera-20", Lie::kCamera20},  Liar{"clock", Lie::kClock},
-    Liar{"ranges", Lie::kRanges},       Liar{"antenna-delay", Lie::kAntennaDelay}};
+    Liar{"ranges", Lie::kRanges},       Liar{"antenna-delay", Lie::kAntennaDelay},
+    Liar{"modules", Lie::kModules}};
 
 /// Makes `robot` a liar: what it records, and what it believes of its sensors.
 void corrupt(Lie lie, RobotId robot, SwarmDataset& dataset);

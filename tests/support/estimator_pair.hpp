@@ -36,6 +36,7 @@ struct Conditions {
   std::function<ImuSample(const ImuSample&)> own_imu{};    ///< what the IMU makes of the truth
   std::function<ImuSample(const ImuSample&)> peer_imu{};
   std::function<void(UwbRange&)> range{};
+  std::function<void(const Report&)> own_report{};                  ///< what we send
   std::function<void(Report&)> peer_report{};                       ///< what the neighbor sends
   std::function<void(std::vector<std::uint8_t>&)> peer_datagram{};  ///< as it is on the air
 };
@@ -81,6 +82,9 @@ class EstimatorPair {
 
   /// Our estimator receives what its team's filter found.
   void solve(const TeamSolution& solution) { (void)estimator_.step(solution); }
+
+  /// Our module reports one range more.
+  void measure(const UwbRange& range) { (void)estimator_.step(range); }
 
   /// Our estimator goes on with other settings.
   void reconfigure(const std::function<void(EstimatorSettings&)>& change) {
@@ -201,7 +205,7 @@ class EstimatorPair {
                                        z.sigma_rad});
     }
     if (with.peer_is_on && now_ % with.report_period == Duration{}) report_for_peer(with);
-    if (now_ % kTick == Duration{}) tick();
+    if (now_ % kTick == Duration{}) tick(with);
   }
 
   void deliver(const Conditions& with) {
@@ -300,9 +304,10 @@ class EstimatorPair {
     peer_report_ = {};
   }
 
-  void tick() {
+  void tick(const Conditions& with) {
     last_tick_ = now_;
     const Outputs outputs = step(Tick{own_time(now_)});
+    if (outputs.report && with.own_report) with.own_report(*outputs.report);
     if (outputs.report)
       in_flight_to_peer_.push_back({now_, own_link_.compose(*outputs.report, own_time(now_))});
     for (const NeighborPose& pose : outputs.poses) {

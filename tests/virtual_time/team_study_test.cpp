@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "estimator/core/constants.hpp"
 #include "tests/study/load_swarm.hpp"
@@ -206,6 +207,13 @@ TEST(Liars, ChangeWhatTheyRecordOrSend) {
     EXPECT_NEAR(others[i].range_m - true_ones[i].range_m, others[i].neighbor == liar ? 1.0 : 0.0,
                 1e-12);
   }
+  const auto neighbors = [](const RobotRecording& recording) {
+    std::set<int> ids;
+    for (const UwbRange& range : recording.ranges) ids.insert(range.neighbor.value);
+    return ids;
+  };
+  EXPECT_EQ(neighbors(was), (std::set{1, 2, 3}));
+  EXPECT_EQ(neighbors(now(Lie::kModules)), (std::set{2, 3, 4})) << "its own id is the other's";
   Report report;
   report.sender = liar;
   report.estimates.resize(1);

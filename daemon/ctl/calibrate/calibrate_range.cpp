@@ -51,6 +51,7 @@ SwarmRanges ranges_of(const SwarmDataset& swarm) {
     if (!robot.ranges.empty()) begin(robot.ranges.front().stamp);
     const RobotId self = robot.robot.id;
     for (const UwbRange& range : robot.ranges) {
+      if (range.neighbor == self) continue;
       all.ranges.push_back({robot.robot.clock.true_s(range.stamp),
                             {std::min(self, range.neighbor), std::max(self, range.neighbor)},
                             range});
@@ -335,6 +336,7 @@ Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options) 
     return fail(ErrorCode::kUsage, "no distances: give --tape, or --distance r1,r2=5.00");
   const auto swarm = load_swarm(options.swarm_dir);
   if (!swarm) return tl::unexpected(swarm.error());
+  if (const auto checked = check_modules(*swarm); !checked) return tl::unexpected(checked.error());
   const auto tape = tape_of(options, *swarm);
   if (!tape) return tl::unexpected(tape.error());
   if (options.on_progress) options.on_progress(0.7);

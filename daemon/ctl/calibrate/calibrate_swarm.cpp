@@ -31,6 +31,8 @@ Result<void> write_robots(const SwarmBatchResult& found, const SwarmDataset& dat
 Result<CalibrationReport> calibrate_swarm(const CalibrateSwarmOptions& options) {
   const auto dataset = load_swarm(options.swarm_dir);
   if (!dataset) return tl::unexpected(dataset.error());
+  if (const auto checked = check_modules(*dataset); !checked)
+    return tl::unexpected(checked.error());
   const auto progress = [&](double done) {
     if (options.on_progress) options.on_progress(done);
   };

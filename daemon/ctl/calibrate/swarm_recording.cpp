@@ -124,7 +124,9 @@ std::vector<RobotRange> direct_ranges(const RobotRecording& robot,
   for (const UwbRange& range : robot.ranges) {
     const auto other = index_of.find(range.neighbor);
     const bool is_late = range.received_dbm - range.first_path_dbm > noise.late_path_db;
-    if (other == index_of.end() || is_late || range.range_m > noise.max_range_m) continue;
+    if (other == index_of.end() || range.neighbor == robot.robot.id || is_late ||
+        range.range_m > noise.max_range_m)
+      continue;
     ranges.push_back({clock.reference_time(range.stamp), other->second, range.range_m});
   }
   return ranges;

@@ -1,4 +1,3 @@
-#include <cstdio>
 #include <filesystem>
 #include <utility>
 
@@ -23,8 +22,7 @@ Result<void> finish(const Result<CalibrationReport>& report, bool json) {
       if (auto printed = print_result(failed_report(report.error())); !printed) return printed;
     return tl::unexpected(report.error());
   }
-  for (const std::string& fault : report->faults.list())
-    std::fprintf(stderr, "skipped: %s\n", fault.c_str());
+  print_skipped(report->faults);
   if (auto printed = print_result(report->text); !printed) return printed;
   if (report->reasons.empty()) return {};
   std::string message;

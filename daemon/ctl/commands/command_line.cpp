@@ -55,6 +55,18 @@ void add_json_flag(CLI::App* sub, bool& json, const std::string& which) {
   sub->add_flag("--json", json, "JSON on standard output instead of text: " + which);
 }
 
+void print_skipped(const DatasetFaults& faults) {
+  constexpr std::size_t kListed = 20;
+  const std::size_t listed = std::min(faults.list().size(), kListed);
+  for (std::size_t i = 0; i < listed; ++i)
+    std::fprintf(stderr, "skipped: %s\n", faults.list()[i].c_str());
+  if (faults.total() == listed) return;
+  std::string reasons;
+  for (const auto& [reason, count] : faults.counts())
+    reasons += fmt::format("{}{}: {}", reasons.empty() ? "" : ", ", reason, count);
+  fmt::print(stderr, "skipped: {} rows in all ({})\n", faults.total(), reasons);
+}
+
 Result<void> print_result(const Result<std::string>& text) {
   if (!text) return tl::unexpected(text.error());
   if (print(*text)) return {};

@@ -14,6 +14,7 @@
 #include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/progress_bar.hpp"
 #include "drivers/base/monotonic_clock.hpp"
+#include "drivers/dataset/dataset_faults.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
@@ -74,6 +75,9 @@ void add_daemon_options(CLI::App* sub, DaemonAddress& daemon);
 /// --json, which means the same for all subcommands: see `daemon/ctl/json_line.hpp`. `which`
 /// describes the objects.
 void add_json_flag(CLI::App* sub, bool& json, const std::string& which = "one object");
+
+/// Lists the first refused rows of a recording on standard error, and counts the others by reason.
+void print_skipped(const DatasetFaults& faults);
 
 /// Prints the text, or returns its error. A failure to write is an error, too.
 [[nodiscard]] Result<void> print_result(const Result<std::string>& text);

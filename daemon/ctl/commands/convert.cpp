@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "daemon/ctl/commands/command_line.hpp"
@@ -31,8 +30,7 @@ Result<void> run_convert(ConvertOptions options, bool json) {
   if (options.out.empty()) options.out = options.source / "swarm.mcap";
   const Result<ConvertSummary> summary = convert_with_progress(options);
   if (!summary) return tl::unexpected(summary.error());
-  for (const std::string& fault : summary->faults.list())
-    std::fprintf(stderr, "skipped: %s\n", fault.c_str());
+  print_skipped(summary->faults);
   const std::string out = options.out.string();
   return print_result(json ? json_line({{"out", out},
                                         {"topics", summary->topics},

@@ -1,6 +1,5 @@
 #include <fmt/core.h>
 
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "daemon/ctl/commands/command_line.hpp"
@@ -35,8 +34,7 @@ Result<void> run_replay(const ReplayOptions& options, bool json) {
   if (options.out_dir.empty()) return fail(ErrorCode::kUsage, "--out: names no directory");
   const Result<ReplaySummary> summary = replay_with_progress(options);
   if (!summary) return tl::unexpected(summary.error());
-  for (const std::string& fault : summary->faults.list())
-    std::fprintf(stderr, "skipped: %s\n", fault.c_str());
+  print_skipped(summary->faults);
   const std::string out = options.out_dir.string();
   return print_result(json ? json_of(*summary, out) : text_of(*summary, out));
 }

@@ -25,7 +25,7 @@ struct DatasetRow {
 struct Context {
   Timestamp first;
   Timestamp last;
-  std::vector<RobotId> neighbors;
+  std::vector<RobotId> members;
   DatasetFaults& faults;
 };
 
@@ -139,9 +139,9 @@ Result<std::vector<UwbRange>> read_ranges(const fs::path& file, const Context& c
         !csv.read(3, range.first_path_dbm, context.faults) ||
         !csv.read(4, range.received_dbm, context.faults))
       return false;
-    const auto known = std::find_if(context.neighbors.begin(), context.neighbors.end(),
-                                    [neighbor](RobotId id) { return id.value == neighbor; });
-    if (known == context.neighbors.end()) {
+    // A range to itself tells that another robot carries its module.
+    const auto known = std::ranges::find(context.members, neighbor, &RobotId::value);
+    if (known == context.members.end()) {
       context.faults.add(csv.path(), csv.line(), "unknown peer", csv.field(1));
       return false;
     }
@@ -223,11 +223,10 @@ Result<Config> read_config(const fs::path& file, const SwarmRobot& robot) {
   return config;
 }
 
-std::vector<RobotId> neighbors_of(const Config& config) {
-  std::vector<RobotId> neighbors;
-  for (const MemberConfig& member : config.swarm.members)
-    if (member.id != config.robot.id) neighbors.push_back(member.id);
-  return neighbors;
+std::vector<RobotId> members_of(const Config& config) {
+  std::vector<RobotId> members;
+  for (const MemberConfig& member : config.swarm.members) members.push_back(member.id);
+  return members;
 }
 
 /// Reads the robot's files into `recording`, whose configuration has been read.
@@ -271,7 +270,7 @@ Result<RobotRecording> load_swarm_robot(const fs::path& root, const SwarmRobot& 
   if (!config) return tl::unexpected(config.error());
   recording.config = std::move(*config);
   const Context context{robot.clock.local(-kMargin), robot.clock.local(duration_s + kMargin),
-                        neighbors_of(recording.config), faults};
+                        members_of(recording.config), faults};
   if (auto read = read_sensors(dir, {}, context, recording); !read)
     return tl::unexpected(read.error());
   return recording;
@@ -292,6 +291,19 @@ Result<SwarmDataset> load_swarm(const fs::path& dir) {
   return swarm;
 }
 
+Result<void> check_modules(const SwarmDataset& swarm) {
+  constexpr std::ptrdiff_t kByMistake = 2;
+  for (const RobotRecording& robot : swarm.robots) {
+    const auto to_itself = std::ranges::count(robot.ranges, robot.robot.id, &UwbRange::neighbor);
+    if (to_itself <= kByMistake) continue;
+    return fail(ErrorCode::kFormat,
+                fmt::format("{}: {} of its {} ranges are to itself, so another robot carried its "
+                            "UWB module; record again with each module on its robot",
+                            robot.robot.name, to_itself, robot.ranges.size()));
+  }
+  return {};
+}
+
 Result<RobotRecording> load_robot(const fs::path& dir, const RecordedSensors& sensors,
                                   DatasetFaults& faults) {
   std::error_code status;
@@ -310,7 +322,7 @@ Result<RobotRecording> load_robot(const fs::path& dir, const RecordedSensors& se
   if (!config) return tl::unexpected(config.error());
   recording.config = std::move(*config);
   recording.robot.id = recording.config.robot.id;
-  const Context context{Timestamp::min(), Timestamp::max(), neighbors_of(recording.config), faults};
+  const Context context{Timestamp::min(), Timestamp::max(), members_of(recording.config), faults};
   if (auto read = read_sensors(dir, sensors, context, recording); !read)
     return tl::unexpected(read.error());
   return recording;

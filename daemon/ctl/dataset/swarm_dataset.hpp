@@ -45,6 +45,10 @@ struct SwarmDataset {
 /// is refused that leaves the others in order.
 [[nodiscard]] Result<SwarmDataset> load_swarm(const std::filesystem::path& dir);
 
+/// Refuses recordings in which robots carried another's UWB module: they have ranges to themselves.
+/// Estimators need not be protected from them, calibrations do.
+[[nodiscard]] Result<void> check_modules(const SwarmDataset& swarm);
+
 /// Which files of a robot are read.
 struct RecordedSensors {
   bool imu = true;

@@ -124,11 +124,21 @@ TEST(SwarmDataset, RefusesAnUnknownPeer) {
   expect_sizes(swarm.robots[0], kImu, kRanges - 1, kFrames);
 }
 
-TEST(SwarmDataset, RefusesARangeToItself) {
+TEST(SwarmDataset, KnowsARobotThatCarriesAnothersModuleByRangesToItself) {
   const TinySwarm files;
-  files.replace_line("r1/uwb0/data.csv", 3, "10020000000,1,5.5,-80,-80");
+  const auto set_range = [&](std::size_t line, const std::string& row) {
+    files.replace_line("r1/uwb0/data.csv", line, row);
+  };
+  set_range(3, "10020000000,1,5.5,-80,-80");
+  const SwarmDataset once = load_swarm(files.dir()).value();
+  EXPECT_EQ(once.faults.total(), 0U);
+  EXPECT_TRUE(check_modules(once));
 
-  expect_one_fault(load_swarm(files.dir()).value(), "uwb0/data.csv:3", "unknown peer");
+  set_range(4, "10040000000,1,5.5,-80,-80");
+  set_range(5, "10060000000,1,5.5,-80,-80");
+  const auto checked = check_modules(load_swarm(files.dir()).value());
+  ASSERT_FALSE(checked);
+  EXPECT_NE(checked.error().message.find("r1: 3 of its"), std::string::npos);
 }
 
 TEST(SwarmDataset, RefusesAStampThatGoesBack) {
