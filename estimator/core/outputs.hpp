@@ -204,7 +204,7 @@ using VerdictCounts = std::array<std::uint64_t, kVerdictCount>;
 
 /// Why an inertial sample was refused.
 enum class ImuFault : std::uint8_t {
-  kImplausible,  ///< NaN or out of range
+  kImplausible,  ///< NaN, out of range, or for seconds without gravity, as in another unit
   kSpike,        ///< its predecessors and its successors agree without it
   kJump,         ///< a change that no robot makes within a sample, and what followed it
   kHangs,        ///< the sensor, or one of its axes, repeats its value

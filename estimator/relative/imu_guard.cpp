@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/quantile.hpp"
@@ -88,7 +89,7 @@ void InnovationScale::add(double size) {
 
 std::span<const ImuSample> ImuGuard::accept(const ImuSample& sample) {
   believed_count_ = 0;
-  if (!is_plausible(sample)) {
+  if (!is_plausible(sample) || !shows_gravity(sample)) {
     count(ImuFault::kImplausible);
     has_refused_ = true;
   } else if (is_late(sample)) {
@@ -101,6 +102,20 @@ std::span<const ImuSample> ImuGuard::accept(const ImuSample& sample) {
     compare(sample);
   }
   return {believed_.data(), believed_count_};
+}
+
+/// False for samples in another unit: no robot falls freely for seconds, or bears ten times its
+/// weight.
+bool ImuGuard::shows_gravity(const ImuSample& sample) {
+  constexpr double kMemory = 2.0;  // s
+  constexpr double kLeastMean = 0.3 * kGravityMps2;
+  constexpr double kMostMean = 20.0 * kGravityMps2;
+  if (sample.stamp > weighed_) {
+    const double passed_s = to_seconds(sample.stamp - std::exchange(weighed_, sample.stamp));
+    const double weight = 1.0 - std::exp(-passed_s / kMemory);  // the first sample: 1
+    mean_force_ += weight * (sample.accel_mps2.norm() - mean_force_);
+  }
+  return mean_force_ >= kLeastMean && mean_force_ <= kMostMean;
 }
 
 bool ImuGuard::is_late(const ImuSample& sample) const {

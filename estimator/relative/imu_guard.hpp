@@ -84,6 +84,7 @@ class ImuGuard {
     refused_.at(static_cast<std::size_t>(fault)) += samples;
   }
   [[nodiscard]] bool is_late(const ImuSample& sample) const;
+  [[nodiscard]] bool shows_gravity(const ImuSample& sample);
   [[nodiscard]] PerSensor limit() const;
   [[nodiscard]] PerSensor largest_change() const;
   [[nodiscard]] PerSensor excess(const ImuSample& sample, const Reference& reference) const;
@@ -109,6 +110,8 @@ class ImuGuard {
   [[nodiscard]] bool held_are_plausible() const;
 
   ImuWatch watch_;
+  Timestamp weighed_ = kNever;  ///< the latest sample whose force is in the mean
+  double mean_force_ = 0.0;     ///< of the last seconds [m/s^2]
   std::optional<Reference> reference_;
   InnovationScale gyro_;
   InnovationScale accel_;

@@ -24,6 +24,8 @@ struct Priors {
   double range_bias_m = 0.0;
   double misalignment_rad = 0.0;
   double lens_rad = 0.0;  ///< of a camera's directions, besides a rotation
+
+  [[nodiscard]] bool operator==(const Priors&) const = default;
 };
 
 /// The direction of an LED ring in the body of the robot whose camera sees it.

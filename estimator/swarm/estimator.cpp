@@ -60,6 +60,25 @@ SwarmConfig unnamed(SwarmConfig swarm) {
   return swarm;
 }
 
+/// What the tracks of lights depend on.
+SwarmConfig as_seen(SwarmConfig swarm) {
+  for (MemberConfig& member : swarm.members) {
+    member.name.clear();
+    member.uwb_id.reset();
+    member.range_delay_m = 0.0;
+    member.p_body_led = member.p_body_uwb = Eigen::Vector3d::Zero();
+  }
+  return swarm;
+}
+
+/// Whether a robot that is a member of both is mounted otherwise.
+bool is_mounted_otherwise(const SwarmConfig& before, const SwarmConfig& now) {
+  return std::ranges::any_of(before.members, [&](const MemberConfig& was) {
+    const auto is = std::ranges::find(now.members, was.id, &MemberConfig::id);
+    return is != now.members.end() && !(*is == was);
+  });
+}
+
 /// What clients have received of a neighbor, whatever filters it had.
 struct PublishedPoses {
   Timestamp newest = kNever;
@@ -138,6 +157,7 @@ struct Estimator::State {
   Outputs handle(const TeamSolution& solution);
   Outputs handle(const Tick& tick);
 
+  void accept(const ReceivedReport& received, Neighbor& sender);
   [[nodiscard]] bool runs_team_filter() const {
     return graph_enabled && uses_team_filter && filters.traits.has_team_filter;
   }
@@ -158,6 +178,7 @@ struct Estimator::State {
   std::map<RobotId, PublishedPoses> published;
   GraphProblemBuilder graph_builder;
   TeamIntake team_intake;
+  Timestamp last_team = kNever;  ///< an interval of three robots
   ReportComposer composer;
   bool graph_enabled;
   bool uses_team_filter;
@@ -192,7 +213,10 @@ void Estimator::State::reconfigure(const EstimatorSettings& settings) {
                 "robot and cameras stay the same");
   const SwarmConfig before = unnamed(std::exchange(swarm, settings.swarm));
   const SwarmConfig now = unnamed(swarm);
+  const Priors priors = filters.priors;
   filters = filter_settings(settings.filters, settings.imu, settings.range);
+  // What the team has learned of a module holds no longer after a calibration.
+  if (is_mounted_otherwise(before, now) || !(priors == filters.priors)) team_intake = {};
   const bool own_is_same = member_of(before, id) == member_of(now, id);
   std::erase_if(neighbors, [&](const auto& entry) {
     const RobotId robot = entry.first;
@@ -204,13 +228,17 @@ void Estimator::State::reconfigure(const EstimatorSettings& settings) {
   add_new_members();
 
   tilt_filter.set_noise(settings.imu);
-  if (!(now == before && settings.vision == vision)) trackers = make_trackers(settings);
+  if (!(as_seen(now) == as_seen(before) && settings.vision == vision))
+    trackers = make_trackers(settings);
   vision = settings.vision;
   swapped_modules = {};
   graph_enabled = settings.solves_graph;
   uses_team_filter = settings.uses_team_filter;
   team_size = settings.team_size;
-  if (!runs_team_filter()) team_log.clear();
+  if (!runs_team_filter()) {
+    team_log.clear();
+    for (auto& [robot, neighbor] : neighbors) neighbor.end_team_pose();
+  }
   report_timer = PeriodicTimer(period_of(settings.report_rate_hz));
   graph_timer = PeriodicTimer(period_of(settings.graph_rate_hz));
 }
@@ -234,9 +262,12 @@ Outputs Estimator::State::handle(const UwbRange& range) {
     composer.add(range);  // the others must know
   }
   const auto neighbor = neighbors.find(range.neighbor);
-  if (neighbor == neighbors.end() || !std::isfinite(range.range_m) ||
-      swapped_modules.contains(range.neighbor, range.stamp)) {
+  if (neighbor == neighbors.end() || !std::isfinite(range.range_m)) {
     ++refused_samples;
+    return {};
+  }
+  if (swapped_modules.contains(range.neighbor, range.stamp)) {
+    neighbor->second.refuse(range, MeasurementKind::kRange);
     return {};
   }
   UwbRange corrected = range;
@@ -309,17 +340,25 @@ Outputs Estimator::State::handle(const ReceivedReport& received) {
     return swapped_modules.contains(range.neighbor, range.stamp);
   };
   if (std::ranges::any_of(received.report.ranges, ends_elsewhere)) {
+    for (const UwbRange& range : received.report.ranges)
+      if (range.neighbor == id && ends_elsewhere(range))
+        neighbor->second.refuse(range, MeasurementKind::kPeerRange);
     ReceivedReport rest = received;
-    refused_samples += std::erase_if(rest.report.ranges, ends_elsewhere);
-    return handle(rest);
+    std::erase_if(rest.report.ranges, ends_elsewhere);
+    accept(rest, neighbor->second);
+  } else {
+    accept(received, neighbor->second);
   }
-  neighbor->second.add_report(received, self);
+  return {};
+}
+
+void Estimator::State::accept(const ReceivedReport& received, Neighbor& sender) {
+  sender.add_report(received, self);
   graph_builder.add_report(received.report, swarm);
-  if (!runs_team_filter()) return {};
-  const ImuHistory& imu = neighbor->second.robot_state().imu;
+  if (!runs_team_filter()) return;
+  const ImuHistory& imu = sender.robot_state().imu;
   const double w = imu.empty() ? 0.0 : imu.newest().gyro_radps.norm();
   team_intake.add_report(received.report, w * received.clock_sigma_s, swarm, filters);
-  return {};
 }
 
 Outputs Estimator::State::handle(const GraphSolution& solution) {
@@ -332,12 +371,14 @@ Outputs Estimator::State::handle(const GraphSolution& solution) {
 
 Outputs Estimator::State::handle(const TeamSolution& solution) {
   constexpr Duration kRefusal = std::chrono::milliseconds{300};  // some solutions
+  if (!runs_team_filter()) return {};                            // it was asked for before a reload
   team_log.add(solution);
   for (const TeamFault& fault : solution.faults) {
     if (fault.kind != TeamFault::Kind::kGyro) continue;
     if (fault.robot == id) {
-      self.refused_until = last_tick + kRefusal;
+      // Without a tilt this robot reports nothing either, until its gyroscope is right again.
       tilt_filter.restart();
+      self.refused_until = last_tick + kRefusal;
     } else if (const auto neighbor = neighbors.find(fault.robot); neighbor != neighbors.end()) {
       neighbor->second.refuse_imu_until(last_tick + kRefusal);
     }
@@ -379,11 +420,15 @@ GraphProblem Estimator::State::graph_problem(const std::vector<NeighborEstimate>
   return graph_builder.build(stamp, id, own, [this](RobotId robot) { return imu_of(robot); });
 }
 
-/// What was measured until a lag before `now`. Empty for a team of two: it has nothing to share.
+/// What was measured until a lag before `now`. Empty for a team of two, which has nothing to share,
+/// unless a third robot was there of late: it may come back, and what was learned be needed.
 std::optional<TeamInterval> Estimator::State::team_interval(Timestamp now) {
+  constexpr Duration kTeamMemory = std::chrono::seconds{5};
   const auto imus = [this](RobotId robot) { return imu_of(robot); };
   auto interval = team_intake.drain(id, now, swarm, filters, imus);
-  if (!interval || interval->members.size() < 3) return std::nullopt;
+  if (!interval || interval->members.size() < 2) return std::nullopt;
+  if (interval->members.size() > 2) last_team = interval->to;
+  if (interval->to - last_team > kTeamMemory) return std::nullopt;
   interval->settings.max_robots = team_size;
   interval->edges = graph_builder.build(interval->to, id, {}, imus).edges;
   return interval;

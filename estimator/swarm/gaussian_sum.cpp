@@ -1,5 +1,6 @@
 #include "estimator/swarm/gaussian_sum.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -109,7 +110,13 @@ GaussianPose GaussianSum::mean(const GaussianPose& heaviest) const {
     mean += weight * step;
     moment += weight * (step * step.transpose() + pose.covariance - center.covariance);
   }
-  return {perturbed(heaviest.pose, mean), heaviest.covariance + moment - mean * mean.transpose()};
+  // Where the other parts know more than the heaviest one did, readings since then may have told as
+  // much: only what the sum is more uncertain by counts.
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> excess(moment - mean * mean.transpose());
+  const Matrix6d axes = excess.eigenvectors();
+  const Vector6d more = excess.eigenvalues().cwiseMax(0.0);
+  return {perturbed(heaviest.pose, mean),
+          heaviest.covariance + axes * more.asDiagonal() * axes.transpose()};
 }
 
 }  // namespace crepes

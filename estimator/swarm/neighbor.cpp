@@ -50,6 +50,10 @@ void Neighbor::add_input(const UwbRange& range) {
     initiator_.add_range(range.stamp, range.range_m);
 }
 
+void Neighbor::refuse(const UwbRange& range, MeasurementKind kind) {
+  outcomes().add(range.stamp, kind, {.verdict = Verdict::kGated}, {range.range_m});
+}
+
 void Neighbor::add_report(const ReceivedReport& received, const RobotState& self) {
   const Report& report = received.report;
   intake_.add_report_stamp(report.stamp);

@@ -34,6 +34,8 @@ class Neighbor {
 
   /// Our own measurements of it, and its pose by the team's estimate.
   void add(const NeighborInput& input);
+  /// Counts a range, ours or the neighbor's, that does not end where it says.
+  void refuse(const UwbRange& range, MeasurementKind kind);
   /// A report of the neighbor; `self` is the state of our robot.
   void add_report(const ReceivedReport& received, const RobotState& self);
 

@@ -13,6 +13,7 @@ constexpr Duration kCorrectionLife = std::chrono::milliseconds{400};
 constexpr Duration kUnranged = std::chrono::seconds{1};  // so long a distance stays certain
 constexpr Duration kRareRanges = std::chrono::milliseconds{200};  // more are refused, not rare
 constexpr Duration kDispute = std::chrono::seconds{1};
+constexpr Duration kPause = std::chrono::milliseconds{200};     // between comparisons
 constexpr Duration kRestart = std::chrono::seconds{2};          // until a filter is there again
 constexpr Duration kTeamLife = std::chrono::milliseconds{800};  // the longest lag, and a solution
 
@@ -52,7 +53,9 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
     ++starts_;
     started_ = stamp;
     correction_.reset();
+    recent_poses_ = {};
   }
+  recent_poses_.add({stamp, T_B_N.pose});
 
   const auto is_recent = [&](Timestamp t) { return stamp - t <= recent_; };
   const Timestamp graph = track.last(MeasurementKind::kGraphPose);
@@ -81,9 +84,10 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
 }
 
 void PosePublisher::add_graph_correction(Timestamp stamp, const GraphPose& pose) {
-  if (!pose_ || pose_->stamp < stamp) return;
+  const auto then = std::ranges::find(recent_poses_.all(), stamp, &StampedPose::stamp);
+  if (then == recent_poses_.all().end()) return;
   correction_ =
-      Correction{stamp, pose_difference(pose_->T_B_N.pose, pose.T_B_N.pose), pose.T_B_N.covariance};
+      Correction{stamp, pose_difference(then->T_B_N, pose.T_B_N.pose), pose.T_B_N.covariance};
 }
 
 std::optional<NeighborEstimate> PosePublisher::estimate() const {
@@ -149,8 +153,8 @@ void PosePublisher::compare() {
   const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
   if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return dispute_.reset();
   const Timestamp now = team_pose_->stamp;
-  if (!dispute_ || now - dispute_->last > kRestart)
-    dispute_ = Dispute{.since = now, .last = now, .difference = d};
+  if (!dispute_ || now - dispute_->last > kRestart) dispute_ = Dispute{.since = now};
+  if (now - dispute_->last > kPause) dispute_->since = now;
   dispute_->last = now;
   dispute_->difference = d;
 }

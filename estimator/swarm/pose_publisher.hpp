@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "estimator/swarm/bounded_fifo.hpp"
 #include "estimator/swarm/output_predictor.hpp"
 #include "estimator/swarm/reading_intake.hpp"
 #include "estimator/swarm/robot_state.hpp"
@@ -36,7 +37,7 @@ class PosePublisher {
   /// Requires samples of both IMUs and an unambiguous leader.
   void update(Timestamp now, const RobotState& self, const RobotState& neighbor,
               const HypothesisSet& hypotheses, ReadingIntake& intake);
-  /// Ignored without a pose at or after `stamp`.
+  /// Ignored without a pose of that time.
   void add_graph_correction(Timestamp stamp, const GraphPose& pose);
   /// Replaces the former one.
   void add_team_pose(TeamEstimate estimate) { team_ = std::move(estimate); }
@@ -70,7 +71,12 @@ class PosePublisher {
   [[nodiscard]] bool is_disputed() const;  ///< at the last tick
   [[nodiscard]] std::optional<NeighborPose> graph_corrected_pose() const;
 
-  /// Difference of the graph's pose to the published one at the same instant.
+  struct StampedPose {
+    Timestamp stamp;
+    Pose T_B_N;
+  };
+
+  /// Difference of the graph's pose to the filter's at the same instant.
   struct Correction {
     Timestamp stamp;
     Vector6d step;
@@ -79,9 +85,9 @@ class PosePublisher {
 
   /// The team's pose contradicts the filter's.
   struct Dispute {
-    Timestamp since;  ///< or since the filter last restarted
-    Timestamp last;
-    Vector6d difference;
+    Timestamp since;  ///< or since the filter last restarted; of comparisons without a pause
+    Timestamp last = kNever;
+    Vector6d difference = Vector6d::Zero();
     Timestamp restarted = kNever;
   };
 
@@ -93,8 +99,9 @@ class PosePublisher {
   std::uint32_t starts_ = 0;
   Timestamp started_ = kNever;  ///< the latest of these
   std::optional<NeighborPose> pose_;
-  double speed_sigma_ = 0.0;  ///< of `pose_` [m/s]
-  bool is_by_imus_ = false;   ///< the distance in `pose_`
+  double speed_sigma_ = 0.0;                    ///< of `pose_` [m/s]
+  bool is_by_imus_ = false;                     ///< the distance in `pose_`
+  BoundedFifo<StampedPose, 128> recent_poses_;  ///< of this hypothesis: half a second at 200 Hz
   std::optional<Correction> correction_;
   ProcessNoise noise_;
   double pose_gate_ = 0.0;

@@ -59,11 +59,13 @@ void ReadingIntake::enqueue(Measurement measurement) {
   const SensorReading reading = reading_of(measurement);
   const bool is_pose = kind == MeasurementKind::kRawPose || kind == MeasurementKind::kGraphPose;
   if (!is_pose && !settings_.traits.fuses_single_readings) return;
+  const std::uint64_t dropped = buffer_.dropped();
   if (!buffer_.push(std::move(measurement))) {
     outcomes_.add(stamp, kind, {.verdict = Verdict::kLate}, reading);
   } else {
     earliest_new_ = std::min(earliest_new_.value_or(stamp), stamp);
   }
+  if (buffer_.dropped() > dropped) outcomes_.add(stamp, kind, {.verdict = Verdict::kSkipped});
 }
 
 }  // namespace crepes

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "estimator/team/belief/team_state.hpp"
+
 namespace crepes {
 namespace {
 
@@ -15,10 +17,6 @@ constexpr Duration kImuSilence = std::chrono::milliseconds{500};
 bool is_other_member(RobotId robot, RobotId sender, const SwarmConfig& swarm) {
   return robot != sender &&
          std::ranges::find(swarm.members, robot, &MemberConfig::id) != swarm.members.end();
-}
-
-std::pair<RobotId, RobotId> pair_of(RobotId a, RobotId b) {
-  return a < b ? std::pair(a, b) : std::pair(b, a);
 }
 
 // Moves the measurements until `to` into the result, ordered by stamp; drops those before `from`.
@@ -97,7 +95,7 @@ void TeamIntake::add_range(RobotId observer, const UwbRange& range,
                            const FilterSettings& settings) {
   record_delay(range.stamp);
   if (ranges_.size() >= kMaxWaiting) return;
-  if (!screens_[pair_of(observer, range.neighbor)].accepts(range, settings)) return;
+  if (!screens_[ordered(observer, range.neighbor)].accepts(range, settings)) return;
   ranges_.push_back(
       {observer, range.neighbor, range.stamp, {range.range_m, settings.range_sigma_m}});
 }

@@ -74,6 +74,7 @@ std::optional<PeerView::View> PeerView::step(const TeamInterval& interval, const
     pose.covariance.topLeftCorner<3, 3>() += bent_by_turn(turn, pose.T_B_N.p);
     pose.last_sighting = std::max(self->second.last_sighting, self->second.last_fix);
     pose.needs_witness = needs_witness;
+    pose.has_no_witness = filter_.is_knocked(id) || filter_.is_knocked(interval.self);
   }
   if (solution.poses.empty()) return std::nullopt;
   solution.calibrations = calibrations_of(seen, interval.settings.priors);

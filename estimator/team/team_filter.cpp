@@ -23,9 +23,8 @@ namespace {
 constexpr double kUnknownDistance = 0.10;  // m; the least by which a step is judged
 constexpr double kLinear = 0.01;           // rad, and relative to the distance
 constexpr int kMaxIterations = 4;
-constexpr double kSignificant = 4.0;      // sigmas of the directions: a parallax
-constexpr double kAgreementMemory = 0.5;  // s
-constexpr std::size_t kMaxCameras = 4;    // of a robot, whatever it reports
+constexpr double kSignificant = 4.0;    // sigmas of the directions: a parallax
+constexpr std::size_t kMaxCameras = 4;  // of a robot, whatever it reports
 
 /// Whether this robot itself has an estimate of the other one, or is estimated by it.
 bool has_own_edge(const TeamInterval& interval, RobotId id) {
@@ -57,8 +56,9 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
     return {.stamp = interval.to, .poses = {}, .calibrations = {}, .residuals = {}, .faults = {}};
   }
   residuals_.clear();
-  if (belief_.robots.empty() || interval.self != belief_.self || interval.from != belief_.stamp)
-    begin_anew(interval);
+  const bool goes_on = interval.self == belief_.self && interval.from == belief_.stamp &&
+                       belief_.robots.size() <= interval.settings.max_robots;
+  if (belief_.robots.empty() || !goes_on) begin_anew(interval);
   append_cameras(interval);  // before their first interval corrects anything, it is checked
   const bool are_placed = !remove_members(interval);
   if (are_placed) {
@@ -73,6 +73,7 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
   }
   unseen_.add(interval, belief_);
   belief_.advance(interval);
+  memory_.add_vibration(interval);
   if (are_placed) {
     estimates_.add(interval, belief_);
     if (!trust_.is_everybody_strained(belief_.stamp)) memory_.add(belief_);
@@ -110,8 +111,8 @@ bool TeamFilter::remove_members(const TeamInterval& interval) {
     remove(id);
   }
   for (const RobotId id : trust_.turned(interval, belief_)) {
-    if (trust_.is_knocked(id)) {
-      belief_.realign(id, trust_.turn_covariance(id).value());
+    if (const auto camera = trust_.knocked_camera(id)) {
+      belief_.realign(id, *camera, trust_.turn_covariance(id).value());
       memory_.clear();
       continue;
     }
@@ -210,13 +211,13 @@ void TeamFilter::append_cameras(const TeamInterval& interval) {
 }
 
 bool TeamFilter::correct(const TeamInterval& interval) {
-  const double kept = std::exp(-to_seconds(interval.to - interval.from) / kAgreementMemory);
+  const double dt_s = to_seconds(interval.to - interval.from);
   for (auto& [id, robot] : belief_.robots) {
     for (TeamCamera& camera : robot.cameras)
-      for (auto& [neighbor, agreement] : camera.agreement) agreement.fade(kept);
+      for (auto& [neighbor, agreement] : camera.agreement) agreement.pass(dt_s);
   }
   for (auto& [pair, range] : belief_.ranges)
-    for (auto& [observer, agreement] : range.agreement) agreement.fade(kept);
+    for (auto& [observer, agreement] : range.agreement) agreement.pass(dt_s);
 
   // Bearings come first: ranges may have gone through or around something, so that they are gated
   // by what the bearings leave open.
@@ -226,7 +227,8 @@ bool TeamFilter::correct(const TeamInterval& interval) {
         !correct(interval, stage, {.sights = {}, .rangings = all.rangings}))
       return false;
   }
-  return belief_.P.diagonal().minCoeff() > 0.0;
+  const auto variances = belief_.P.diagonal();
+  return variances.allFinite() && variances.minCoeff() > 0.0;
 }
 
 bool TeamFilter::correct(const TeamInterval& interval, Stage stage, TeamReadings readings) {
@@ -381,7 +383,7 @@ void TeamFilter::report(const TeamInterval& interval, bool are_placed,
     TeamPose& pose = solution.poses.emplace_back(keyframe_pose(belief_, id, *interval.member(id)));
     // The estimate that it started from may be false.
     pose.needs_witness = !robot.is_trusted && !is_plausible(belief_, id);
-    pose.has_no_witness = trust_.is_knocked(id) || trust_.is_knocked(belief_.self);
+    pose.has_no_witness = is_knocked(id) || is_knocked(belief_.self);
   }
   std::ranges::sort(solution.poses, {}, &TeamPose::neighbor);
   solution.calibrations = calibrations_of(belief_, interval.settings.priors);

@@ -21,11 +21,11 @@ namespace crepes {
 /// the team's common motion are no states.
 ///
 /// States: each other robot's [p, v, theta]; every robot's gyroscope and accelerometer bias, its
-/// gyroscope's scale and axis errors and its antenna delay; every camera's misalignment and lens
-/// error; a range bias a pair. All pairs of a robot share its states, so that the team calibrates
-/// itself. The bearings of the interval are linearized at their mean time, through the IMUs, and
-/// correct it together (iterated least squares); then its ranges do. Then all motions advance to
-/// the end of the interval, the next keyframe.
+/// gyroscope's scale and axis errors, its antenna delay and its clock; every camera's misalignment
+/// and lens error; a range bias a pair. All pairs of a robot share its states, so that the team
+/// calibrates itself. The bearings of the interval are linearized at their mean time, through the
+/// IMUs, and correct it together (iterated least squares); then its ranges do. Then all motions
+/// advance to the end of the interval, the next keyframe.
 ///
 /// A new robot is on probation for a second: until its measurements agree with the others, they
 /// correct nobody but itself, and while they contradict it, it has no pose. A camera that
@@ -48,6 +48,11 @@ class TeamFilter {
   [[nodiscard]] const TeamBelief& belief() const { return belief_; }
   /// Goes on from another belief of that time.
   void replace(TeamBelief belief) { belief_ = std::move(belief); }
+  /// Whether one of its cameras was knocked out of its calibration, of which filters of pairs know
+  /// nothing.
+  [[nodiscard]] bool is_knocked(RobotId robot) const {
+    return trust_.knocked_camera(robot).has_value();
+  }
 
  private:
   using Stage = TeamReadings::Stage;

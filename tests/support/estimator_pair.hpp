@@ -82,6 +82,8 @@ class EstimatorPair {
 
   /// Our estimator receives what its team's filter found.
   void solve(const TeamSolution& solution) { (void)estimator_.step(solution); }
+  /// Our estimator receives what its pose graph found.
+  void solve(const GraphSolution& solution) { (void)estimator_.step(solution); }
 
   /// Our module reports one range more.
   void measure(const UwbRange& range) { (void)estimator_.step(range); }
@@ -186,7 +188,7 @@ class EstimatorPair {
     settings.range.bias_sigma_m = n.priors.range_bias_m;
     settings.vision.bearing_sigma_px = n.bearing * 316.9;
     settings.filters.camera_misalignment_deg = kDegPerRad * n.priors.misalignment_rad;
-    settings.solves_graph = false;
+    settings.solves_graph = true;
     alter(settings);
     return settings;
   }

@@ -103,13 +103,12 @@ void TeamBelief::doubt_imu(RobotId id, const Priors& priors) {
   set_imu_prior(index, priors);
 }
 
-void TeamBelief::realign(RobotId id, const Eigen::Matrix3d& covariance) {
-  for (TeamCamera& camera : robots.at(id).cameras) {
-    forget(camera.index, 3);
-    P.block<3, 3>(camera.index, camera.index) = covariance;
-    camera.is_free = true;
-    camera.agreement.clear();
-  }
+void TeamBelief::realign(RobotId id, std::size_t camera, const Eigen::Matrix3d& covariance) {
+  TeamCamera& knocked = robots.at(id).cameras.at(camera);
+  forget(knocked.index, 3);
+  P.block<3, 3>(knocked.index, knocked.index) = covariance;
+  knocked.is_free = true;
+  knocked.agreement.clear();
 }
 
 TeamBelief TeamBelief::calibrations_at(const TeamInterval& interval) const {
@@ -276,7 +275,16 @@ void TeamBelief::reset_attitude(int index, const Eigen::VectorXd& dx) {
 void TeamBelief::advance(const TeamInterval& interval) {
   change_frame(trajectories(interval), *this);
   add_drift(interval, to_seconds(interval.to - interval.from));
+  add_vibration(interval);
   stamp = interval.to;
+}
+
+void TeamBelief::add_vibration(const TeamInterval& interval) {
+  for (const auto& [id, robot] : robots) {
+    const TeamMember* const member = interval.member(id);
+    if (member == nullptr) continue;
+    P.diagonal().segment<3>(robot.bias_index + 3).array() += vibration_variance(*member);
+  }
 }
 
 /// What changes by itself: the IMUs' biases, and the pairs' range biases, which return to zero.
@@ -288,8 +296,7 @@ void TeamBelief::add_drift(const TeamInterval& interval, double dt) {
     const double turning =
         interval.settings.priors.accel_scale * kGravityMps2 * turn_rate(*interval.member(id));
     P.diagonal().segment<3>(robot.bias_index + 3).array() +=
-        noise.accel_walk * noise.accel_walk * dt + turning * turning * kTurnMemory * dt +
-        vibration_variance(*interval.member(id));
+        noise.accel_walk * noise.accel_walk * dt + turning * turning * kTurnMemory * dt;
     if (id != self) P(robot.clock_index(), robot.clock_index()) += kClockWalk * kClockWalk * dt;
   }
   const double kept_bias = std::exp(-noise.range_bias_return / (1.0 - kShareOfModules) * dt);

@@ -45,8 +45,8 @@ struct TeamBelief {
   /// Makes a robot's IMU as uncertain as one that was never calibrated. Its errors stay the best
   /// guess.
   void doubt_imu(RobotId id, const Priors& priors);
-  /// Makes the misalignment of a robot's cameras as uncertain as this, and free of its prior.
-  void realign(RobotId id, const Eigen::Matrix3d& covariance);
+  /// Makes the misalignment of a robot's camera as uncertain as this, and free of its prior.
+  void realign(RobotId id, std::size_t camera, const Eigen::Matrix3d& covariance);
   /// Removes a robot and its states.
   void remove(RobotId id);
 
@@ -64,6 +64,8 @@ struct TeamBelief {
   /// After the attitude's error at this index was injected, what is left of it is about the new
   /// attitude.
   void reset_attitude(int index, const Eigen::VectorXd& dx);
+  /// Adds what the IMUs' biases may have changed with the vibration over the interval.
+  void add_vibration(const TeamInterval& interval);
   /// Moves the keyframe to the end of the interval.
   void advance(const TeamInterval& interval);
 

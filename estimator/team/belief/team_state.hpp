@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <map>
 #include <utility>
 #include <vector>
@@ -21,18 +24,41 @@ using RobotPair = std::pair<RobotId, RobotId>;
   return a < b ? RobotPair(a, b) : RobotPair(b, a);
 }
 
-/// How many readings agreed with the filter of late, and how many its gate refused.
+/// How many readings of a source agreed with the filter of late, and how many its gate refused. The
+/// past is forgotten within half a second, or within eight readings where they are rarer, but two
+/// seconds at most.
 struct Agreement {
   double fused = 0.0;
   double gated = 0.0;
+  double passed_s = 0.0;              ///< since the readings before these
+  int readings = 0;                   ///< since then
+  std::array<double, 3> periods_s{};  ///< of the latest readings
 
-  /// Scales both counts, so that the past is forgotten.
+  /// A time passes; the readings of this time come after it.
+  void pass(double dt_s) {
+    constexpr double kMemory = 0.5;
+    constexpr double kLongestMemory = 2.0;
+    constexpr double kReadings = 8.0;
+    if (readings > 0) {
+      std::shift_right(periods_s.begin(), periods_s.end(), 1);
+      periods_s.front() = passed_s / readings;
+      passed_s = 0.0;
+      readings = 0;
+    }
+    passed_s += dt_s;
+    const double period_s = *std::ranges::min_element(periods_s);  // one gap says nothing
+    fade(std::exp(-dt_s / std::clamp(kReadings * period_s, kMemory, kLongestMemory)));
+  }
+  /// Scales both counts.
   void fade(double kept) {
     fused *= kept;
     gated *= kept;
   }
   /// Counts a reading.
-  void add(bool fits) { (fits ? fused : gated) += 1.0; }
+  void add(bool fits) {
+    (fits ? fused : gated) += 1.0;
+    ++readings;
+  }
   /// Most are refused, and not only a few outliers.
   [[nodiscard]] bool is_contradiction() const { return gated > 4.0 && gated > fused; }
 };
@@ -90,8 +116,9 @@ struct TeamRangeBias {
   void add(RobotId observer, bool fits, double residual_m) {
     constexpr double kWeight = 0.1;
     agreement[observer].add(fits);
-    const auto [mean_m, is_first] = refused_m.try_emplace(observer, residual_m);
-    if (!fits) mean_m->second += kWeight * (residual_m - mean_m->second);
+    if (fits) return;
+    double& mean_m = refused_m.try_emplace(observer, residual_m).first->second;
+    mean_m += kWeight * (residual_m - mean_m);
   }
 };
 

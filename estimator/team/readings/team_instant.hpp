@@ -36,7 +36,8 @@ struct InstantStates {
 /// information about them first, and the belief's whole covariance is corrected by that.
 class TeamInstant {
  public:
-  /// `paths` has all robots of the belief. `t_s` is moved to the nearest step.
+  /// `paths` has all robots of the belief. The instant is the step of the trajectories nearest to
+  /// `t_s`.
   TeamInstant(const TeamBelief& belief, const TeamTrajectories& paths, double t_s);
 
   /// Which they are.

@@ -126,7 +126,7 @@ TeamUpdate::TeamUpdate(const std::vector<TeamRow>& rows, const VectorXd& dy, con
   MatrixXd S = MatrixXd::Identity(r, r);
   add_large_product(root_P, by_y.root, S);
   const Eigen::LLT<MatrixXd> factors(S);
-  is_valid_ = factors.info() == Eigen::Success && by_y.root.allFinite();
+  is_valid_ = factors.info() == Eigen::Success && S.allFinite() && by_y.root.allFinite();
   if (!is_valid_) return;
   factor_ = factors.matrixL();
   gain_ = std::move(by_y.root);

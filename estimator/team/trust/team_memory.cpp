@@ -16,6 +16,10 @@ void TeamMemory::add(const TeamBelief& belief) {
   if (beliefs_.size() > kMaxBeliefs) beliefs_.pop_front();
 }
 
+void TeamMemory::add_vibration(const TeamInterval& interval) {
+  for (TeamBelief& belief : beliefs_) belief.add_vibration(interval);
+}
+
 void TeamMemory::remove(RobotId id) {
   for (TeamBelief& belief : beliefs_)
     if (belief.robots.contains(id)) belief.remove(id);

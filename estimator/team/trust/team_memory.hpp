@@ -14,6 +14,8 @@ class TeamMemory {
  public:
   /// Keeps a copy once a second, of a team.
   void add(const TeamBelief& belief);
+  /// What happens to the IMUs meanwhile: their biases may change with the vibration.
+  void add_vibration(const TeamInterval& interval);
   /// Forgets a robot, which may be another one when it comes back.
   void remove(RobotId id);
   void clear() { beliefs_.clear(); }

@@ -30,7 +30,7 @@ constexpr Duration kGyroRecord = std::chrono::seconds{60};  // then it is as goo
 constexpr Duration kStrained = std::chrono::seconds{2};     // by a false gyroscope
 constexpr Duration kUnconfirmed = std::chrono::seconds{2};  // a gyroscope may go on being false
 constexpr double kLeap = 400.0;  // chi-square of two degrees of freedom: 20 sigma
-constexpr Duration kKnock = std::chrono::seconds{1};  // then its bearings contradict
+constexpr Duration kKnock = std::chrono::seconds{2};  // then its bearings contradict
 constexpr int kLeastRefused = 3;                      // pairs
 
 /// Whether a camera contradicts a robot and agrees with none.
@@ -103,10 +103,11 @@ void TeamTrust::note_leaps(const TeamInterval& interval, const TeamBelief& belie
     const auto& [id, index] = key;
     if (sights.leapt < 2 || 2 * sights.leapt <= sights.seen || !belief.robots.at(id).is_trusted)
       continue;
-    const TeamCamera& camera = belief.robots.at(id).cameras.at(static_cast<std::size_t>(index));
-    const bool agreed_until_now = std::ranges::none_of(
-        camera.agreement, [](const auto& entry) { return entry.second.is_contradiction(); });
-    if (agreed_until_now) leaps_[id] = interval.to;
+    const auto camera = static_cast<std::size_t>(index);
+    const bool agreed_until_now =
+        std::ranges::none_of(belief.robots.at(id).cameras.at(camera).agreement,
+                             [](const auto& entry) { return entry.second.is_contradiction(); });
+    if (agreed_until_now) leaps_[{id, camera}] = interval.to;
   }
 }
 
@@ -146,11 +147,14 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
   // A robot that was away may have been repaired.
   const auto is_away = [&](const auto& entry) { return interval.member(entry.first) == nullptr; };
   std::erase_if(verdicts_, is_away);
-  std::erase_if(gyro_doubts_, is_away);
   std::erase_if(losses_, is_away);
   std::erase_if(restarts_, is_away);
   std::erase_if(misled_by_, is_away);
-  std::erase_if(leaps_, is_away);
+  std::erase_if(leaps_, [&](const auto& entry) { return is_away(entry.first); });
+  // A robot with a false gyroscope may be silent for that very reason.
+  std::erase_if(gyro_doubts_, [&](const auto& entry) {
+    return is_away(entry) && belief.stamp - entry.second.as_trusted.last >= kGyroRecord;
+  });
   review_verdicts(interval, belief);
   const auto is_turned_of = [&](RobotId id, const TeamCamera& camera) {
     return looks_turned(belief, id, camera, verdicts_.contains(id));
@@ -161,8 +165,14 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
     return id != belief.self && recent(restarts_, id, belief.stamp) < kMostRestarts &&
            is_alone(belief, id, camera) && !is_turned_of(id, camera);
   };
+  // All that a knocked camera sees would be lost before it is found out.
+  const auto has_leapt_of = [&](RobotId id, const TeamCamera& camera) {
+    const auto index = static_cast<std::size_t>(&camera - belief.robots.at(id).cameras.data());
+    return has_leapt(id, index, belief.stamp);
+  };
   const Witnesses all = witnesses_of(belief, [&](RobotId id, const TeamCamera& camera) {
-    return is_turned_of(id, camera) || is_alone_of(id, camera) || is_disoriented(belief, id);
+    return has_leapt_of(id, camera) || is_turned_of(id, camera) || is_alone_of(id, camera) ||
+           is_disoriented(belief, id);
   });
   std::vector<RobotId> lost;
   for (const auto& [id, robot] : belief.robots) {
@@ -190,7 +200,8 @@ std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamB
   if (is_strained(belief.self, belief.stamp)) return turned;
   for (const auto& [id, robot] : belief.robots) {
     if (is_strained(id, belief.stamp)) continue;
-    for (const TeamCamera& camera : robot.cameras) {
+    for (std::size_t i = 0; i < robot.cameras.size(); ++i) {
+      const TeamCamera& camera = robot.cameras[i];
       const bool contradicts = looks_turned(belief, id, camera, verdicts_.contains(id));
       // What a camera that may be turned has learned of late may be what strained the team.
       const bool is_settling = is_realigned(id) || (camera.is_free && verdicts_.contains(id));
@@ -198,10 +209,7 @@ std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamB
           is_settling ? MisalignmentCheck{}
                       : misalignment_check(belief, camera, interval.settings.priors);
       if (!contradicts && check.chi2 <= kTurnedChi2) continue;
-      // Since a leap its bearings were refused, and say nothing of the axis.
-      const bool has_axis = !has_leapt(id, belief.stamp);
-      convict(id, belief.stamp,
-              turned_covariance(has_axis ? check.turn : Eigen::Vector3d::Zero().eval()));
+      convict(id, i, belief.stamp, check.turn);
       turned.push_back(id);
       break;
     }
@@ -226,18 +234,21 @@ void TeamTrust::review_verdicts(const TeamInterval& interval, const TeamBelief& 
 /// its robot has ceased to lie. So its verdict is withdrawn before it is refused. Also withdraws
 /// the verdict of robots that were convicted once before: this robot had disturbed the states on
 /// which they were judged. A camera that is knocked, or knocked back, has disturbed none.
-void TeamTrust::convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance) {
+void TeamTrust::convict(RobotId robot, std::size_t camera, Timestamp now,
+                        const Eigen::Vector3d& turn) {
   Verdict& verdict = verdicts_[robot];
   const bool was_realigned = verdict.count > 0 && !verdict.is_withdrawn;
   ++verdict.count;
-  verdict.is_knocked = has_leapt(robot, now);
+  verdict.knocked = has_leapt(robot, camera, now) ? std::optional(camera) : std::nullopt;
   verdict.is_refused = was_realigned && verdict.count >= kRefusedAt;
-  verdict.is_withdrawn = was_realigned && !verdict.is_refused && !verdict.is_knocked;
+  verdict.is_withdrawn = was_realigned && !verdict.is_refused && !verdict.knocked;
   verdict.shown = now;
-  verdict.covariance = covariance;
-  if (verdict.is_knocked) return;
+  // Since a leap its bearings were refused, and say nothing of the axis.
+  verdict.covariance =
+      turned_covariance(verdict.knocked ? Eigen::Vector3d::Zero().eval() : turn.eval());
+  if (verdict.knocked) return;
   for (auto& [id, other] : verdicts_)
-    if (id != robot && other.count == 1 && !other.is_knocked) other.is_withdrawn = true;
+    if (id != robot && other.count == 1 && !other.knocked) other.is_withdrawn = true;
 }
 
 std::optional<Eigen::Matrix3d> TeamTrust::turn_covariance(RobotId robot) const {
@@ -339,12 +350,13 @@ bool TeamTrust::is_gyro_false(RobotId robot, Timestamp now) const {
          now - *doubt->second.found < kGyroRefusal;
 }
 
-bool TeamTrust::is_knocked(RobotId robot) const {
-  return is_realigned(robot) && !is_refused(robot) && verdicts_.at(robot).is_knocked;
+std::optional<std::size_t> TeamTrust::knocked_camera(RobotId robot) const {
+  if (!is_realigned(robot) || is_refused(robot)) return std::nullopt;
+  return verdicts_.at(robot).knocked;
 }
 
-bool TeamTrust::has_leapt(RobotId robot, Timestamp now) const {
-  const auto leap = leaps_.find(robot);
+bool TeamTrust::has_leapt(RobotId robot, std::size_t camera, Timestamp now) const {
+  const auto leap = leaps_.find({robot, camera});
   return leap != leaps_.end() && now - leap->second < kKnock && !is_gyro_false(robot, now);
 }
 

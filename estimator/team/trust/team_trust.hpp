@@ -2,8 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "estimator/team/belief/team_belief.hpp"
@@ -55,10 +57,10 @@ class TeamTrust {
   /// disturbed.
   [[nodiscard]] bool is_everybody_strained(Timestamp now) const;
 
-  /// Whether its camera was found turned soon after all that it sees had leapt at once, as when
-  /// something hits the camera. Until then it was as calibrated, and from then to the verdict its
-  /// bearings were refused.
-  [[nodiscard]] bool is_knocked(RobotId robot) const;
+  /// Its camera that was found turned soon after all that it sees had leapt at once, as when
+  /// something hits the camera; empty if there is none. Until then it was as calibrated, and from
+  /// then to the verdict its bearings were refused.
+  [[nodiscard]] std::optional<std::size_t> knocked_camera(RobotId robot) const;
   /// Covariance of the misalignment of its cameras, which is also that of its attitude, in body
   /// axes [rad^2]. Empty if its cameras are as calibrated.
   [[nodiscard]] std::optional<Eigen::Matrix3d> turn_covariance(RobotId robot) const;
@@ -89,15 +91,15 @@ class TeamTrust {
     int count = 0;  ///< how often its cameras were found turned
     bool is_refused = false;
     bool is_withdrawn = false;
-    bool is_knocked = false;
+    std::optional<std::size_t> knocked{};  ///< which of its cameras
   };
   void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
-  void convict(RobotId robot, Timestamp now, const Eigen::Matrix3d& covariance);
+  void convict(RobotId robot, std::size_t camera, Timestamp now, const Eigen::Vector3d& turn);
   [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
   [[nodiscard]] bool may_be_disoriented(RobotId robot, Timestamp now) const;
   [[nodiscard]] bool is_disoriented(const TeamBelief& belief, RobotId id) const;
   [[nodiscard]] bool is_realigned(RobotId robot) const;
-  [[nodiscard]] bool has_leapt(RobotId robot, Timestamp now) const;
+  [[nodiscard]] bool has_leapt(RobotId robot, std::size_t camera, Timestamp now) const;
   [[nodiscard]] bool has_misled(RobotId robot, Timestamp now) const;
   [[nodiscard]] Duration probation(RobotId robot, Timestamp now) const;
   [[nodiscard]] static int recent(const std::map<RobotId, Losses>& all, RobotId robot,
@@ -108,8 +110,8 @@ class TeamTrust {
   std::map<RobotId, Losses> restarts_;  ///< with a wrong attitude
   std::map<RobotId, Verdict> verdicts_;
   std::map<RobotId, GyroDoubt> gyro_doubts_;
-  std::map<RobotId, Timestamp> leaps_;      ///< of what a camera sees
-  std::map<RobotId, Timestamp> misled_by_;  ///< when that robot was found
+  std::map<std::pair<RobotId, std::size_t>, Timestamp> leaps_;  ///< of what a camera sees
+  std::map<RobotId, Timestamp> misled_by_;                      ///< when that robot was found
 };
 
 /// Whether the bearings of a robot and to it agree with its place, four in five of them, and its

@@ -335,6 +335,23 @@ TEST(ImuGuard, RefusesWhatNoSensorMeasures) {
   EXPECT_EQ(count(guard, ImuFault::kImplausible), 1U);
 }
 
+// In units of g from the beginning, where nothing changes. A fall of half a second is believed.
+TEST(ImuGuard, WithoutGravityNothingIsBelieved) {
+  const std::vector<ImuSample> samples = samples_of(kMotions[1], 1, 8 * kSecond);
+  const auto believed = [&](double scale, int from, int to) {
+    ImuGuard guard;
+    std::size_t count = 0;
+    for (int i = 0; i < static_cast<int>(samples.size()); ++i) {
+      ImuSample sample = samples[static_cast<std::size_t>(i)];
+      if (i >= from && i < to) sample.accel_mps2 *= scale;
+      count += guard.accept(sample).size();
+    }
+    return count;
+  };
+  EXPECT_EQ(believed(1.0 / kGravityMps2, 0, 8 * kSecond), 0U);
+  EXPECT_GT(believed(0.05, 4 * kSecond, 4 * kSecond + kSecond / 2), samples.size() - 25);
+}
+
 TEST(ImuGuard, PassesALateSampleOn) {
   const auto samples = samples_of(kMotions[1], 1, 2 * kSecond);
   ImuGuard guard;

@@ -98,6 +98,19 @@ TEST(EstimatorReconfigure, ForgetsANeighborWhoseMountingHasChanged) {
   EXPECT_GT(pair.latest()->pose.reset_counter, resets);
 }
 
+// Of an interval that was under way at the reload.
+TEST(EstimatorReconfigure, ALateAnswerOfTheTeamsFilterIsIgnoredOnceItIsOff) {
+  EstimatorPair pair(1);
+  pair.run_for(3s);
+  TeamSolution solution;
+  solution.stamp = pair.own_time(pair.now()) - 200ms;
+  pair.solve(solution);
+  EXPECT_TRUE(pair.estimator_status().team);
+  pair.reconfigure([](EstimatorSettings& settings) { settings.uses_team_filter = false; });
+  pair.solve(solution);
+  EXPECT_FALSE(pair.estimator_status().team);
+}
+
 TEST(EstimatorReconfigure, GoesOnUnderOtherNames) {
   EstimatorPair pair(6);
   pair.run_for(4s);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <vector>
 
@@ -48,6 +49,17 @@ TEST(GaussianSum, SplitsAWideAttitudeAndKeepsItsMeanAndCovariance) {
   EXPECT_NEAR(std::sqrt(mean.covariance(3, 3)), 0.2, 0.005);
   EXPECT_NEAR(mean.covariance(0, 0), wide(0, 0), 1e-9);
   EXPECT_LT(sum.heaviest().pose().covariance(3, 3), 0.25 * wide(3, 3));
+}
+
+// Readings since the sum was formed have told the heaviest part what others knew before.
+TEST(GaussianSum, IsNeverMoreCertainThanItsHeaviestPart) {
+  const Matrix6d certain = 0.01 * covariance();
+  std::vector<NeighborTrack> parts{track_at(at_ms(0)), track_at(at_ms(0)),
+                                   track_at(at_ms(0), {kTruth, certain})};
+  const GaussianSum sum(std::move(parts));
+  const GaussianPose mean = sum.mean({kTruth, certain});
+  const Matrix6d more = mean.covariance - certain;
+  EXPECT_GE(Eigen::SelfAdjointEigenSolver<Matrix6d>(more).eigenvalues().minCoeff(), -1e-12);
 }
 
 TEST(GaussianSum, PeerBearingsSelectTheHeading) {

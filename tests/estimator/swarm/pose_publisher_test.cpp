@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/estimator_pair.hpp"
 #include "tests/support/resting_pair.hpp"
 
 namespace crepes::pose_publisher_test {
@@ -193,6 +194,16 @@ TEST_F(TeamAndFilter, AFilterThatTheTeamContradictsForASecondStartsAnew) {
   EXPECT_LT(sigma_m(*publisher_.published()), 0.1);
 }
 
+// A second is one in which they were compared all the time.
+TEST_F(TeamAndFilter, AFilterThatIsContradictedNowAndThenGoesOn) {
+  const Pose elsewhere{{kDistance + 0.8, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
+  for (const int ms : {1000, 2500, 2900, 4200}) {
+    go_on_until(ms);
+    EXPECT_TRUE(with_filter_at(elsewhere, ms - 100, ms)) << ms;
+    EXPECT_FALSE(publisher_.must_filter_restart()) << ms;
+  }
+}
+
 // Out of sight it contradicts nothing, and a later contradiction is another one.
 TEST_F(TeamAndFilter, AFilterThatIsContradictedNowAndLongAgoGoesOn) {
   const Pose elsewhere{{kDistance + 0.8, 0.0, 0.0}, Eigen::Quaterniond::Identity()};
@@ -220,6 +231,26 @@ TEST_F(TeamAndFilter, AFilterThatContradictsAnUnwitnessedTeamPoseIsPublished) {
   ASSERT_TRUE(pose);
   EXPECT_LT((pose->T_B_N.pose.p - elsewhere.p).norm(), 1e-6);
   EXPECT_LT(std::sqrt(pose->T_B_N.covariance(0, 0)), 0.5);
+}
+
+// A graph that agrees with the filter corrects nothing, however long its answer takes.
+TEST(GraphCorrection, IsThatOfThePoseOfItsOwnInstant) {
+  for (const Duration delay : {0ms, 20ms, 60ms}) {
+    test::EstimatorPair with(1);
+    test::EstimatorPair without(1);
+    for (test::EstimatorPair* pair : {&with, &without}) pair->run_for(4s);
+    for (int i = 0; i < 20; ++i) {
+      const NeighborPose then = without.latest()->pose;
+      for (test::EstimatorPair* pair : {&with, &without}) pair->run_for(delay);
+      with.solve(
+          GraphSolution{then.stamp, {{test::EstimatorPair::kOther, then.T_B_N, then.v_B_N}}});
+      for (test::EstimatorPair* pair : {&with, &without}) pair->run_for(100ms - delay);
+      const Vector6d step =
+          pose_difference(with.latest()->pose.T_B_N.pose, without.latest()->pose.T_B_N.pose);
+      EXPECT_LT(step.norm(), 1e-9) << delay / 1ms << " ms";
+      EXPECT_TRUE(with.latest()->pose.sources.graph);
+    }
+  }
 }
 
 }  // namespace

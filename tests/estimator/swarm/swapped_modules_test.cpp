@@ -78,10 +78,38 @@ TEST(SwappedModules, OfANeighborCostOnlyTheRangesToIt) {
     ASSERT_EQ(pair.status().faults.size(), 1U);
     EXPECT_EQ(pair.status().faults[0].kind, TeamFault::Kind::kModule);
     EXPECT_TRUE(pair.estimator_status().faults.empty());
-    EXPECT_GT(pair.estimator_status().refused_samples, 200U) << "our ranges to it";
+    EXPECT_GT(pair.count(MeasurementKind::kRange, Verdict::kGated), 100U);
+    EXPECT_GT(pair.count(MeasurementKind::kPeerRange, Verdict::kFused), 50U);
     EXPECT_GT(pair.found().size(), 150U) << "the first ranges mislead the start";
     EXPECT_LT(worst_m(pair), 0.5);
   }
+}
+
+// Two damaged frames are no evidence, whatever else their reports contain.
+TEST(SwappedModules, AReportIsCountedOnce) {
+  EstimatorSettings settings = EstimatorPair(1).settings();
+  MemberConfig third = settings.swarm.members[1];
+  third.id = kRobot;
+  third.pattern = "000110111111111111";
+  settings.swarm.members.push_back(third);
+  Estimator estimator(settings);
+  Timestamp now{10s};
+  const auto hear = [&](RobotId sender, std::initializer_list<RobotId> measured) {
+    now += 100ms;
+    ReceivedReport received;
+    received.report.sender = sender;
+    received.report.stamp = now;
+    for (const RobotId neighbor : measured)
+      received.report.ranges.push_back({now, neighbor, kFar, -80.0, -79.0});
+    static_cast<void>(estimator.step(received));
+  };
+  const RobotId other = EstimatorPair::kOther;
+  for (int i = 0; i < 3; ++i) hear(other, {other});
+  for (int i = 0; i < 2; ++i) hear(kRobot, {kRobot, other});
+  static_cast<void>(estimator.step(Tick{now}));
+  const EstimatorStatus status = estimator.status();
+  EXPECT_EQ(status.neighbors.at(0).faults.size(), 1U);
+  EXPECT_TRUE(status.neighbors.at(1).faults.empty());
 }
 
 // Our own module is another's: the neighbor's ranges to us are to that robot.
@@ -102,6 +130,8 @@ TEST(SwappedModules, OfOursAreToldToTheOthers) {
     EXPECT_EQ(pair.estimator_status().faults[0].kind, TeamFault::Kind::kModule);
     EXPECT_TRUE(pair.status().faults.empty());
     EXPECT_GT(told, 200U);
+    EXPECT_GT(pair.count(MeasurementKind::kRange, Verdict::kFused), 50U);
+    EXPECT_GT(pair.count(MeasurementKind::kPeerRange, Verdict::kGated), 100U);
     EXPECT_GT(pair.found().size(), 200U);
     EXPECT_LT(worst_m(pair), 0.5);
   }

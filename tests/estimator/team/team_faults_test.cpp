@@ -4,9 +4,11 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <set>
+#include <utility>
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/so3.hpp"
@@ -110,6 +112,70 @@ TEST(TeamFaults, ACameraThatIsKnockedIsRealignedInPlace) {
         EXPECT_EQ(fault_of(solution, knocked), nullptr) << label;
       }
     }
+  }
+}
+
+// It sees one of the two less often, so that it contradicts the other one first.
+TEST(TeamFaults, AKnockedCameraOfATeamOfThreeTakesNobodysPlace) {
+  const auto direction = [](const TeamInterval& interval, RobotId neighbor) {
+    return std::ranges::find_if(interval.bearings,
+                                [&](const TeamBearing& b) {
+                                  return b.observer == kSelf && b.bearing.neighbor == neighbor;
+                                })
+        ->bearing.u_B;
+  };
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SimulatedTeam team(seed, 3);
+    TeamFilter filter;
+    static_cast<void>(solution_after(team, filter, 8.0));
+    int intervals = 0;
+    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+    team.damage = [&](TeamInterval& interval) {
+      if (intervals++ == 0) {  // across both directions
+        const Eigen::Vector3d across =
+            direction(interval, RobotId{2}).cross(direction(interval, RobotId{3}));
+        turn = so3_exp(radians(2.0) * across.normalized());
+      }
+      std::erase_if(interval.bearings, [&](const TeamBearing& b) {
+        return b.observer == kSelf && b.bearing.neighbor == RobotId{3} && intervals % 3 != 2;
+      });
+      for (TeamBearing& b : interval.bearings)
+        if (b.observer == kSelf) b.bearing.u_B = turn * b.bearing.u_B;
+    };
+    TeamSolution solution;
+    for (int i = 0; i < 40; ++i) {
+      solution = filter.step(team.next());
+      for (const RobotId robot : {RobotId{2}, RobotId{3}}) {
+        const TeamPose* pose = find(solution, robot);
+        ASSERT_NE(pose, nullptr) << seed << ", " << i;
+        EXPECT_LT(nees_of(*pose, team.truth(robot)), 40.0) << seed << ", " << i;
+      }
+    }
+    EXPECT_NE(fault_of(solution, kSelf), nullptr) << seed;
+  }
+}
+
+// A crowded mesh carries four bearings a second of each pair.
+TEST(TeamFaults, ATurnedCameraIsFoundHoweverRareItsBearingsAre) {
+  constexpr RobotId kTurned{4};
+  const Eigen::Quaterniond turn = so3_exp(radians(10.0) * Eigen::Vector3d::UnitX());
+  for (const int every : {1, 2, 3}) {
+    SimulatedTeam team(1);
+    TeamFilter filter;
+    int intervals = 0;
+    bool is_turned = false;
+    team.damage = [&](TeamInterval& interval) {
+      const bool is_silent = ++intervals % every != 0;
+      std::set<std::pair<RobotId, RobotId>> pairs;  // the first of each
+      std::erase_if(interval.bearings, [&](const TeamBearing& b) {
+        return is_silent || !pairs.insert({b.observer, b.bearing.neighbor}).second;
+      });
+      for (TeamBearing& b : interval.bearings)
+        if (is_turned && b.observer == kTurned) b.bearing.u_B = turn * b.bearing.u_B;
+    };
+    EXPECT_EQ(fault_of(solution_after(team, filter, 10.0), kTurned), nullptr) << every;
+    is_turned = true;
+    EXPECT_NE(fault_of(solution_after(team, filter, 4.0), kTurned), nullptr) << every;
   }
 }
 

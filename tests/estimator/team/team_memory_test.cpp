@@ -49,6 +49,21 @@ TEST(TeamMemory, ForgetsARobotThatLeft) {
   EXPECT_FALSE(recalled->robots.contains(kOther));
 }
 
+// What is recalled is older than the vibration.
+TEST(TeamMemory, RemembersHowTheImusVibratedSince) {
+  SimulatedTeam team(1);
+  TeamInterval interval = team.next();
+  TeamMemory memory;
+  memory.add(belief_at(kStart));
+  const double before = memory.recall(kStart + 3s)->P.diagonal().sum();
+  constexpr double kVariance = 1e-4;
+  for (ImuMean& mean : interval.members.at(1).imu) mean.bias_variance_m2ps4 = kVariance;
+  for (int i = 0; i < 2; ++i) memory.add_vibration(interval);
+  const auto recalled = memory.recall(kStart + 3s);
+  const auto steps = static_cast<double>(interval.members.at(1).imu.size());
+  EXPECT_NEAR(recalled->P.diagonal().sum() - before, 2.0 * 3.0 * steps * kVariance, 1e-9);
+}
+
 TEST(TeamMemory, OfABeliefKeepsTheCalibrationsAndNoPlace) {
   SimulatedTeam team(1);
   const test::TrueMotions motions = test::motions_of(team);

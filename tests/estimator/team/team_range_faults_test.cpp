@@ -131,6 +131,35 @@ TEST(TeamFaults, FalseRangesOfATrustedRobotKeepNobodyOnProbation) {
   }
 }
 
+// They are too long from a moment on, and a crowded mesh carries few of them.
+TEST(TeamFaults, NamesRangesThatAreTooLongHoweverRareTheyAre) {
+  constexpr RobotId kLiar{4};
+  for (const int every : {1, 2, 3}) {
+    SimulatedTeam team(1, 5);
+    TeamFilter filter;
+    int intervals = 0;
+    bool lies = false;
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamRange& r : interval.ranges) {
+        if (r.neighbor == kLiar) std::swap(r.observer, r.neighbor);
+        if (lies && r.observer == kLiar) r.reading.range_m += 1.0;
+      }
+      if (++intervals % every != 0) interval.ranges.clear();
+    };
+    EXPECT_EQ(fault_of(solution_after(team, filter, 15.0), kLiar), nullptr) << every;
+    lies = true;
+    const TeamFault* first = nullptr;
+    TeamSolution solution;
+    for (int i = 0; i < 40 && first == nullptr; ++i) {
+      solution = filter.step(team.next());
+      first = fault_of(solution, kLiar);
+    }
+    ASSERT_NE(first, nullptr) << every;
+    EXPECT_EQ(first->kind, TeamFault::Kind::kRanges) << every;
+    EXPECT_NEAR(first->size, 1.0, 0.15) << every;
+  }
+}
+
 TEST(TeamFaults, NamesRangesThatAreTooLong) {
   constexpr RobotId kLiar{4};
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {

@@ -80,6 +80,20 @@ TEST(TeamSize, EquallyConnectedRobotsKeepTheirPlaces) {
     ASSERT_EQ(estimated_jointly(filter.step(team.next())), first) << t;
 }
 
+TEST(TeamSize, ASmallerSizeHoldsFromTheNextIntervalOn) {
+  SimulatedTeam team(1, 6);
+  std::size_t size = 6;
+  team.damage = [&](TeamInterval& interval) { interval.settings.max_robots = size; };
+  TeamFilter filter;
+  static_cast<void>(solution_after(team, filter, 3.0));
+  EXPECT_EQ(filter.belief().robots.size(), 6U);
+  size = 3;
+  static_cast<void>(filter.step(team.next()));
+  EXPECT_LE(filter.belief().robots.size(), 3U);
+  static_cast<void>(solution_after(team, filter, 3.0));
+  EXPECT_EQ(filter.belief().robots.size(), 3U);
+}
+
 // A chain of estimates has the errors of the others' cameras, too, which the filter has used.
 TEST(TeamSize, RobotsBeyondItsSizeAreHonestOverSeeds) {
   static constexpr RobotId kHidden{6};
