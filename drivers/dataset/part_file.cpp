@@ -49,9 +49,12 @@ Result<void> publish_part(const fs::path& file) {
 
 Result<void> replace_text_file(const fs::path& file, std::string_view text) {
   const fs::path target = target_of(file);
-  return write_text(part_of(target), text, std::ios::trunc).and_then([&] {
-    return publish_part(target);
-  });
+  const fs::path part = part_of(target);
+  auto done = write_text(part, text, std::ios::trunc);
+  if (done) return publish_part(target);
+  std::error_code ignored;
+  if (part != target) fs::remove(part, ignored);
+  return done;
 }
 
 Result<PartFile> PartFile::create(fs::path file, std::string_view header) {

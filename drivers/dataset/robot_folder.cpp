@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "drivers/dataset/dataset_rows.hpp"
+#include "drivers/dataset/part_file.hpp"
 
 namespace crepes {
 namespace {
@@ -26,12 +27,9 @@ std::string_view header_of(const std::string& sensor) {
 
 Result<void> write_text_file(const fs::path& file, std::string_view text) {
   std::error_code status;
-  fs::create_directories(file.parent_path(), status);
-  std::ofstream out(file, std::ios::binary);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
-  out.close();
-  if (!out) return failure(file);
-  return {};
+  if (file.has_parent_path()) fs::create_directories(file.parent_path(), status);
+  if (status) return fail(ErrorCode::kIo, file.parent_path().string() + ": " + status.message());
+  return replace_text_file(file, text);
 }
 
 Result<void> RobotFolder::write_config(std::string_view text) {

@@ -7,6 +7,11 @@
 #include "estimator/core/constants.hpp"
 
 namespace crepes {
+namespace {
+
+constexpr double kSystematic = 0.1;  // m; less is no reason to refuse ranges
+
+}  // namespace
 
 std::string text_of(const TeamFault& fault) {
   switch (fault.kind) {
@@ -19,8 +24,12 @@ std::string text_of(const TeamFault& fault) {
       return "its camera contradicts what the others see and is left out; check its calibration "
              "and its clock";
     case TeamFault::Kind::kRanges:
-      return fmt::format("its ranges are {:.2f} m too {} and are left out; check its antenna delay",
-                         std::abs(fault.size), fault.size > 0.0 ? "long" : "short");
+      if (std::abs(fault.size) < kSystematic)
+        return "its ranges contradict the others' and are left out; check uwb_id in swarm.members";
+      return fmt::format(
+          "its ranges are {:.2f} m too {} and are left out; check its antenna delay, and uwb_id in "
+          "swarm.members",
+          std::abs(fault.size), fault.size > 0.0 ? "long" : "short");
     case TeamFault::Kind::kClock:
       return fmt::format(
           "its clock is {:.0f} +- {:.0f} ms {} of the others'; check what stamps its sensors",

@@ -2,6 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <cerrno>
+#include <csignal>
+#include <system_error>
 #include <utility>
 
 namespace crepes {
@@ -43,6 +46,12 @@ Error no_answer_from(const DaemonAddress& daemon, const std::string& send_fault)
   return {ErrorCode::kNotFound,
           fmt::format("no answer from {} port {}: {}", daemon.address, daemon.port,
                       send_fault.empty() ? "is crepesd running there?" : send_fault)};
+}
+
+Result<void> ask_to_reload(pid_t daemon) {
+  if (::kill(daemon, SIGHUP) == 0) return {};
+  return fail(ErrorCode::kIo,
+              fmt::format("process {}: {}", daemon, std::generic_category().message(errno)));
 }
 
 NeighborPose neighbor_pose_of(const client::Pose& pose) {

@@ -1,6 +1,8 @@
 /// The client library, as the tools use it: with their types and errors.
 #pragma once
 
+#include <sys/types.h>
+
 #include <string>
 
 #include "estimator/core/outputs.hpp"
@@ -17,6 +19,9 @@ using DaemonAddress = client::Address;
 
 /// The error for a daemon that did not answer. `send_fault` is why it could not even be asked.
 [[nodiscard]] Error no_answer_from(const DaemonAddress& daemon, const std::string& send_fault = "");
+
+/// Asks a daemon on this machine to read its configuration again.
+[[nodiscard]] Result<void> ask_to_reload(pid_t daemon);
 
 /// Without a covariance it is zero.
 [[nodiscard]] NeighborPose neighbor_pose_of(const client::Pose& pose);

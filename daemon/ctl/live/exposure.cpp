@@ -5,9 +5,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <csignal>
+#include <fstream>
 #include <nlohmann/json.hpp>
-#include <system_error>
 
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/live/camera_lights.hpp"
@@ -25,12 +24,20 @@ namespace {
 using namespace std::chrono_literals;
 using Json = nlohmann::ordered_json;
 
+/// The signal would end any other program.
+Result<void> refuse_other_program(pid_t process) {
+  std::string name;
+  std::ifstream(fmt::format("/proc/{}/comm", process)) >> name;
+  if (name == "crepesd") return {};
+  return fail(ErrorCode::kUsage,
+              name.empty() ? fmt::format("--pid: there is no process {}", process)
+                           : fmt::format("--pid: process {} is {}, not crepesd", process, name));
+}
+
 /// The daemon reads its files again.
 Result<void> request_reload(const ExposureOptions& options) {
   if (options.pid) {
-    if (::kill(*options.pid, SIGHUP) == 0) return {};
-    return fail(ErrorCode::kIo, fmt::format("process {}: {}", *options.pid,
-                                            std::generic_category().message(errno)));
+    return refuse_other_program(*options.pid).and_then([&] { return ask_to_reload(*options.pid); });
   }
   constexpr Duration kReloadTime = 10s;
   auto systemctl = ChildProcess::start("/usr/bin/systemctl", {"reload", "crepesd"}, "/dev/null");

@@ -22,12 +22,14 @@ class Wait {
       : options_(options), why_(no_answer_from(options.daemon).message) {}
 
   [[nodiscard]] const std::string& why() const { return why_; }
+  /// The daemon refuses, and would go on doing so.
+  [[nodiscard]] bool is_refused() const { return is_refused_; }
 
   /// The answer, once the pose is sufficient.
   [[nodiscard]] std::optional<std::string> handle(const client::Answer& answer) {
     if (const auto* status = std::get_if<client::Status>(&answer.message)) handle_status(*status);
     if (const auto* refusal = std::get_if<client::Error>(&answer.message))
-      why_ = "daemon: " + refusal->message;
+      refuse("daemon: " + refusal->message);
     const auto* heard = std::get_if<client::Pose>(&answer.message);
     if (heard == nullptr || heard->peer != options_.peer.value) return std::nullopt;
     const double sigma_m = sigma_of(neighbor_pose_of(*heard).T_B_N.covariance).position_m;
@@ -44,7 +46,12 @@ class Wait {
         std::ranges::find(status.neighbors, options_.peer.value, &client::Status::Neighbor::peer);
     const bool known = neighbor != status.neighbors.end();
     if (known && neighbor->state == "none") why_ = neighbor->reason;
-    if (!known && !status.neighbors.empty()) why_ = "it is no other robot of this swarm";
+    if (!known && !status.neighbors.empty()) refuse("it is no other robot of this swarm");
+  }
+
+  void refuse(std::string reason) {
+    why_ = std::move(reason);
+    is_refused_ = true;
   }
 
   static std::string line_of(const client::Pose& heard, double sigma_m) {
@@ -55,6 +62,7 @@ class Wait {
 
   const WaitposeOptions& options_;
   std::string why_;
+  bool is_refused_ = false;
 };
 
 }  // namespace
@@ -72,7 +80,10 @@ Result<std::string> wait_for_pose(const WaitposeOptions& options) {
     const auto answer = daemon->receive(50ms);
     if (!answer) continue;
     if (const auto found = wait.handle(*answer)) return *found + "\n";
+    if (wait.is_refused()) break;
   }
+  if (wait.is_refused())
+    return fail(ErrorCode::kUsage, fmt::format("robot {}: {}", options.peer.value, wait.why()));
   return fail(ErrorCode::kNotFound,
               fmt::format("no pose of robot {} within {} s: {}", options.peer.value,
                           fixed(options.timeout_s, 1), wait.why()));

@@ -147,7 +147,7 @@ std::string help_text(const ScreenFormat& format) {
 
 )" + toned("Columns", Tone::kTitle, format) +
          R"(
-  mode           direct: measured by this robot within the last second or so
+  mode           direct: seen by one of the two within the last half second
                  graph: located through other robots
                  predicted: carried on by both IMUs, nothing is measured
                  none: no pose, and why

@@ -58,6 +58,11 @@ Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
     return tl::unexpected(good.error());
   ReplayOutput::Names names;
   for (const RobotRecording& robot : dataset->robots) names[robot.robot.id] = robot.robot.name;
+  for (const std::string& delayed : options.delays.robots) {
+    if (std::ranges::none_of(names, [&](const auto& name) { return name.second == delayed; }))
+      return fail(ErrorCode::kUsage, fmt::format("--delayed: no robot \"{}\" in {}", delayed,
+                                                 options.swarm_dir.string()));
+  }
   std::optional<SwarmTruth> truth;  // judges IDs for the report; no estimator sees it
   if (std::filesystem::exists(options.swarm_dir / "truth")) {
     auto loaded = SwarmTruth::load(options.swarm_dir, dataset->manifest);

@@ -288,21 +288,32 @@ std::vector<PlannedFile> files_of(const RobotPlan& plan, const InitOptions& opti
   return files;
 }
 
-/// Refuses to replace files, or moves them away.
-Result<void> make_room(const std::vector<PlannedFile>& files, bool force) {
+fs::path with_suffix(fs::path file, const char* suffix) { return file += suffix; }
+
+Result<void> refuse_to_replace(const std::vector<PlannedFile>& files) {
   std::string taken_names;
   std::error_code error;
   for (const PlannedFile& file : files)
     if (fs::exists(file.path, error)) taken_names += "\n  " + file.path.string();
   if (taken_names.empty()) return {};
-  if (!force) {
-    return fail(ErrorCode::kConfig,
-                "these files exist and are not overwritten without --force:" + taken_names);
+  return fail(ErrorCode::kConfig,
+              "these files exist and are not overwritten without --force:" + taken_names);
+}
+
+/// Writes all under other names first: a full disk must not cost a configuration that works. What
+/// is replaced keeps a copy, NAME~.
+Result<void> write_files(const std::vector<PlannedFile>& files) {
+  constexpr auto kNew = ".new";
+  std::error_code error;
+  for (const PlannedFile& file : files) {
+    auto written = write_text_file(with_suffix(file.path, kNew), file.text);
+    if (written) continue;
+    for (const PlannedFile& one : files) fs::remove(with_suffix(one.path, kNew), error);
+    return written;
   }
   for (const PlannedFile& file : files) {
-    if (!fs::exists(file.path, error)) continue;
-    fs::path old = file.path;
-    fs::rename(file.path, old += "~", error);
+    if (fs::exists(file.path, error)) fs::rename(file.path, with_suffix(file.path, "~"), error);
+    if (!error) fs::rename(with_suffix(file.path, kNew), file.path, error);
     if (error) return fail(ErrorCode::kIo, file.path.string() + ": " + error.message());
   }
   return {};
@@ -351,11 +362,10 @@ Json json_of(const RobotPlan& plan, const std::vector<PlannedFile>& files,
 
 Result<InitReport> write_plan(const RobotPlan& plan, const InitOptions& options) {
   const std::vector<PlannedFile> files = files_of(plan, options);
-  if (auto room = make_room(files, options.force); !room) return tl::unexpected(room.error());
-  for (const PlannedFile& file : files) {
-    if (auto written = write_text_file(file.path, file.text); !written)
-      return tl::unexpected(written.error());
+  if (!options.force) {
+    if (auto free = refuse_to_replace(files); !free) return tl::unexpected(free.error());
   }
+  if (auto written = write_files(files); !written) return tl::unexpected(written.error());
   CheckedConfig checked = check_config(options.dir / "crepesd.yaml");
   InitReport report;
   report.text =

@@ -3,12 +3,11 @@
 #include <fmt/core.h>
 
 #include <cerrno>
-#include <csignal>
 #include <optional>
-#include <system_error>
 
 #include "config/reading/config_file.hpp"
 #include "daemon/ctl/live/camera_lights.hpp"
+#include "daemon/ctl/live/daemon_access.hpp"
 #include "drivers/base/number_text.hpp"
 
 namespace crepes {
@@ -24,12 +23,6 @@ Result<std::optional<Number>> number_in(const std::map<std::string, std::string>
   if (!parse_number(found->second, value).empty() || value < least || value > most)
     return fail(ErrorCode::kUsage, fmt::format("{}: {} to {}", key, least, most));
   return value;
-}
-
-Result<void> reload(pid_t daemon) {
-  if (::kill(daemon, SIGHUP) == 0) return {};
-  return fail(ErrorCode::kIo, fmt::format("the daemon cannot be asked to reload: {}",
-                                          std::generic_category().message(errno)));
 }
 
 /// The configuration that the page may change.
@@ -61,7 +54,7 @@ Result<void> change_camera(const CameraFeed& feed, const std::filesystem::path& 
   if (!lights) return tl::unexpected(lights.error());
   auto changed = lights->change({.exposure_us = *exposure_us, .gain = *gain}, *threshold);
   if (!changed) return changed;
-  return reload(*daemon);
+  return ask_to_reload(*daemon);
 }
 
 }  // namespace crepes

@@ -92,16 +92,17 @@ void check_board(const RobotObservation& seen, CheckSection section) {
 
 void check_calibration(const RobotObservation& seen, CheckSection section) {
   const std::string advice = "crepesctl calibrate, and see calibration.md";
+  const std::string as_it_says = "as it says; see troubleshooting.md";
   for (const client::Status::Sensor& sensor : seen.after.sensors)
     if (!sensor.calibrated) section.fault(sensor.name + ": " + sensor.message, advice);
   check_gravity(seen.after, section);
   for (const auto& neighbor : seen.after.neighbors) check_agreement(seen, neighbor, section);
   for (const std::string& fault : seen.after.faults)
-    section.fault("the team says of this robot: " + fault, advice);
+    section.fault("the team says of this robot: " + fault, as_it_says);
   for (const auto& neighbor : seen.after.neighbors) {
     for (const std::string& fault : neighbor.faults) {
       section.doubt(fmt::format("the team says of {}: {}", name_of_neighbor(neighbor), fault),
-                    "there: " + advice);
+                    "there: " + as_it_says);
     }
   }
 }
