@@ -1,11 +1,13 @@
 /// Whole swarms, recorded and replayed.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <tuple>
 
 #include "daemon/ctl/replay/swarm_replay.hpp"
 #include "daemon/ctl/score/swarm_score.hpp"
@@ -198,6 +200,35 @@ TEST_F(Replay, TheNetworksSeedChangesWhatArrivesAndNothingBreaks) {
     EXPECT_GT(done->poses, 500U);
   }
   EXPECT_NE(poses("seed1"), poses("seed2"));
+}
+
+// Two robots that carry each other's module have no range, and say what to mend.
+TEST_F(Replay, SaysWhoHasNoPoseAndWhatIsFaulty) {
+  record("two", {.seed = 6, .duration_s = 5.0});
+  ReplayOptions options;
+  options.swarm_dir = path("two");
+  options.out_dir = path("healthy");
+  ASSERT_TRUE(replay_swarm(options)->notes.empty());
+
+  for (const auto& [robot, was, is] :
+       {std::tuple("r1", ",2,", ",1,"), std::tuple("r2", ",1,", ",2,")}) {
+    const fs::path file = path("two") / robot / "uwb0" / "data.csv";
+    std::ifstream in(file);
+    std::string text{std::istreambuf_iterator<char>(in), {}};
+    for (std::size_t at = 0; (at = text.find(was, at)) != std::string::npos; ++at)
+      text.replace(at, std::string_view(was).size(), is);
+    std::ofstream(file) << text;
+  }
+  options.out_dir = path("swapped");
+  const auto done = replay_swarm(options);
+  ASSERT_TRUE(done);
+  const auto count = [&](std::string_view what) {
+    return std::ranges::count_if(
+        done->notes, [&](const std::string& n) { return n.find(what) != std::string::npos; });
+  };
+  EXPECT_EQ(done->poses, 0U);
+  EXPECT_EQ(count("no pose at any time"), 2) << testing::PrintToString(done->notes);
+  EXPECT_EQ(count("its UWB module measures"), 4) << testing::PrintToString(done->notes);
 }
 
 /// The independent recordings, where they are at hand.

@@ -21,7 +21,8 @@ std::string json_of(const ReplaySummary& summary, const std::string& out) {
                     {"robots", summary.robots},
                     {"duration_s", summary.duration_s},
                     {"poses", summary.poses},
-                    {"refused", summary.faults.counts()}});
+                    {"refused", summary.faults.counts()},
+                    {"notes", summary.notes}});
 }
 
 Result<ReplaySummary> replay_with_progress(ReplayOptions options) {
@@ -35,6 +36,8 @@ Result<void> run_replay(const ReplayOptions& options, bool json) {
   const Result<ReplaySummary> summary = replay_with_progress(options);
   if (!summary) return tl::unexpected(summary.error());
   print_skipped(summary->faults);
+  if (!json)
+    for (const std::string& note : summary->notes) fmt::print(stderr, "note: {}\n", note);
   const std::string out = options.out_dir.string();
   return print_result(json ? json_of(*summary, out) : text_of(*summary, out));
 }

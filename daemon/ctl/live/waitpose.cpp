@@ -83,7 +83,7 @@ Result<std::string> wait_for_pose(const WaitposeOptions& options) {
     if (wait.is_refused()) break;
   }
   if (wait.is_refused())
-    return fail(ErrorCode::kUsage, fmt::format("robot {}: {}", options.peer.value, wait.why()));
+    return fail(ErrorCode::kNotFound, fmt::format("robot {}: {}", options.peer.value, wait.why()));
   return fail(ErrorCode::kNotFound,
               fmt::format("no pose of robot {} within {} s: {}", options.peer.value,
                           fixed(options.timeout_s, 1), wait.why()));

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 #include <string>
 #include <utility>
 
 #include "daemon/ctl/dataset/truth.hpp"
 #include "daemon/ctl/replay/virtual_swarm.hpp"
+#include "net/subscription/fault_text.hpp"
 
 namespace crepes {
 namespace {
@@ -26,6 +28,27 @@ Result<void> check_imu(const SwarmDataset& dataset, const std::filesystem::path&
               fmt::format("{}: no samples, so there are no poses{}{}",
                           (dir / silent->robot.dir / "imu0" / "data.csv").string(),
                           last.empty() ? "" : "; refused: ", last));
+}
+
+using Pairs = std::set<std::pair<RobotId, RobotId>>;
+
+std::vector<std::string> notes_of(const ReplayReport& report, const ReplayOutput::Names& names,
+                                  const Pairs& with_poses) {
+  std::vector<std::string> notes;
+  for (const RobotReport& robot : report.robots) {
+    const std::string& observer = names.at(robot.robot);
+    for (const TeamFault& fault : robot.status.faults)
+      notes.push_back(fmt::format("{} of itself: {}", observer, text_of(fault)));
+    for (const NeighborStatus& neighbor : robot.status.neighbors) {
+      if (!with_poses.contains({robot.robot, neighbor.neighbor})) {
+        notes.push_back(fmt::format("{} -> {}: no pose at any time; at the end: {}", observer,
+                                    neighbor.name, name_of(neighbor.reason)));
+      }
+      for (const TeamFault& fault : neighbor.faults)
+        notes.push_back(fmt::format("{} of {}: {}", observer, neighbor.name, text_of(fault)));
+    }
+  }
+  return notes;
 }
 
 }  // namespace
@@ -76,17 +99,19 @@ Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
   if (options.reach_m > 0 && !truth)
     return fail(ErrorCode::kConfig, "who is in reach of whom is known by truth/, which is missing");
   auto output = ReplayOutput::create(
-      options.out_dir, std::move(names),
+      options.out_dir, names,
       options.records ? ReplayOutput::Detail::kRecords : ReplayOutput::Detail::kPoses);
   if (!output) return tl::unexpected(output.error());
 
   ReplaySummary summary{.robots = dataset->robots.size(),
                         .duration_s = dataset->manifest.duration_s,
                         .faults = dataset->faults};
+  Pairs with_poses;
   ReplaySinks sinks;
   sinks.on_pose = [&](RobotId observer, const NeighborPose& pose) {
     output->write(observer, pose);
     ++summary.poses;
+    with_poses.insert({observer, pose.neighbor});
   };
   if (options.records) {
     sinks.on_records = [&](RobotId observer, const Records& records) {
@@ -96,6 +121,7 @@ Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
   const auto report = replay_dataset(std::move(*dataset), truth, options, sinks);
   if (!report) return tl::unexpected(report.error());
   if (auto done = output->finish(*report); !done) return tl::unexpected(done.error());
+  summary.notes = notes_of(*report, names, with_poses);
   return summary;
 }
 

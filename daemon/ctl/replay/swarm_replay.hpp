@@ -66,6 +66,7 @@ struct ReplaySummary {
   std::uint64_t poses = 0;  ///< rows written
   double duration_s = 0.0;  ///< of the recording
   DatasetFaults faults;
+  std::vector<std::string> notes{};  ///< who never had a pose and why, and what robots found faulty
 };
 
 /// No threads, one queue in the order of true time: the same input and seed give the same poses to
