@@ -340,9 +340,10 @@ Outputs Estimator::State::handle(const ReceivedReport& received) {
     return swapped_modules.contains(range.neighbor, range.stamp);
   };
   if (std::ranges::any_of(received.report.ranges, ends_elsewhere)) {
-    for (const UwbRange& range : received.report.ranges)
+    for (const UwbRange& range : received.report.ranges) {
       if (range.neighbor == id && ends_elsewhere(range))
         neighbor->second.refuse(range, MeasurementKind::kPeerRange);
+    }
     ReceivedReport rest = received;
     std::erase_if(rest.report.ranges, ends_elsewhere);
     accept(rest, neighbor->second);
@@ -399,9 +400,10 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
   Outputs outputs;
   if (keeps_records) {
     TeamRecord record{solution.stamp, solution.residuals, solution.calibrations, solution.faults};
-    for (const MemberConfig& member : swarm.members)
+    for (const MemberConfig& member : swarm.members) {
       if (const auto module = swapped_modules.fault_of(member.id, last_tick))
         record.faults.push_back(*module);
+    }
     outputs.records.team.push_back(std::move(record));
   }
   return outputs;

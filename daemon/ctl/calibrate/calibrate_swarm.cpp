@@ -45,9 +45,10 @@ Result<CalibrationReport> calibrate_swarm(const CalibrateSwarmOptions& options) 
   for (const RobotRecording& robot : dataset->robots) settings.names.push_back(robot.robot.name);
   const SwarmBatchResult found =
       calibrate_swarm(std::move(measured->records), measured->guess, measured->start, settings);
-  if (found.refusals.empty())
+  if (found.refusals.empty()) {
     if (const auto written = write_robots(found, *dataset, options.out); !written)
       return tl::unexpected(written.error());
+  }
   CalibrationReport report{.text = {}, .reasons = found.refusals, .faults = dataset->faults};
   if (options.json) {
     report.text = swarm_json(found, *dataset);

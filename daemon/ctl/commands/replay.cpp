@@ -36,8 +36,9 @@ Result<void> run_replay(const ReplayOptions& options, bool json) {
   const Result<ReplaySummary> summary = replay_with_progress(options);
   if (!summary) return tl::unexpected(summary.error());
   print_skipped(summary->faults);
-  if (!json)
+  if (!json) {
     for (const std::string& note : summary->notes) fmt::print(stderr, "note: {}\n", note);
+  }
   const std::string out = options.out_dir.string();
   return print_result(json ? json_of(*summary, out) : text_of(*summary, out));
 }

@@ -27,9 +27,10 @@ PoseMode mode_of(client::Mode mode) {
 Matrix6d covariance_of(const std::array<double, 21>& upper) {
   const auto rows = client::matrix_of(upper);
   Matrix6d P;
-  for (Eigen::Index i = 0; i < 6; ++i)
+  for (Eigen::Index i = 0; i < 6; ++i) {
     P.row(i) =
         Eigen::Map<const Eigen::RowVector<double, 6>>(rows.at(static_cast<std::size_t>(i)).data());
+  }
   return P;
 }
 

@@ -82,9 +82,10 @@ Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
   ReplayOutput::Names names;
   for (const RobotRecording& robot : dataset->robots) names[robot.robot.id] = robot.robot.name;
   for (const std::string& delayed : options.delays.robots) {
-    if (std::ranges::none_of(names, [&](const auto& name) { return name.second == delayed; }))
+    if (std::ranges::none_of(names, [&](const auto& name) { return name.second == delayed; })) {
       return fail(ErrorCode::kUsage, fmt::format("--delayed: no robot \"{}\" in {}", delayed,
                                                  options.swarm_dir.string()));
+    }
   }
   std::optional<SwarmTruth> truth;  // judges IDs for the report; no estimator sees it
   if (std::filesystem::exists(options.swarm_dir / "truth")) {
