@@ -104,12 +104,13 @@ std::span<const ImuSample> ImuGuard::accept(const ImuSample& sample) {
   return {believed_.data(), believed_count_};
 }
 
-/// False for samples in another unit: no robot falls freely for seconds, or bears ten times its
+/// False for samples in another unit: no robot falls freely for seconds, or bears twenty times its
 /// weight.
 bool ImuGuard::shows_gravity(const ImuSample& sample) {
   constexpr double kMemory = 2.0;  // s
   constexpr double kLeastMean = 0.3 * kGravityMps2;
   constexpr double kMostMean = 20.0 * kGravityMps2;
+  if (to_seconds(weighed_ - sample.stamp) > kMemory) weighed_ = kNever;  // the clock went back
   if (sample.stamp > weighed_) {
     const double passed_s = to_seconds(sample.stamp - std::exchange(weighed_, sample.stamp));
     const double weight = 1.0 - std::exp(-passed_s / kMemory);  // the first sample: 1

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <tuple>
 #include <utility>
 #include <variant>
 
@@ -71,11 +72,14 @@ SwarmConfig as_seen(SwarmConfig swarm) {
   return swarm;
 }
 
-/// Whether a robot that is a member of both is mounted otherwise.
+/// Whether LEDs, antenna or module of a robot that is a member of both are others.
 bool is_mounted_otherwise(const SwarmConfig& before, const SwarmConfig& now) {
+  const auto mounting = [](const MemberConfig& member) {
+    return std::tuple(member.p_body_led, member.p_body_uwb, member.range_delay_m, member.uwb_id);
+  };
   return std::ranges::any_of(before.members, [&](const MemberConfig& was) {
     const auto is = std::ranges::find(now.members, was.id, &MemberConfig::id);
-    return is != now.members.end() && !(*is == was);
+    return is != now.members.end() && mounting(*is) != mounting(was);
   });
 }
 

@@ -38,8 +38,8 @@ class Estimator {
   [[nodiscard]] Outputs step(const Event& event);
   /// Applies other settings with the same `self` and `cameras`. Filters keep their state, unless
   /// the profile changes, or what is configured of a member; the team's begins anew with other
-  /// priors, too. Members may be added and removed. If `vision`, a code or a ring changes, all
-  /// tracks restart and decode their IDs again.
+  /// priors, and with other LEDs, antennas or modules of a member. Members may be added and
+  /// removed. If `vision`, a code or a ring changes, all tracks restart and decode their IDs again.
   void reconfigure(const EstimatorSettings& settings);
   /// From now on `Outputs::records` contains every measurement. Changes nothing else.
   void keep_records();
