@@ -134,12 +134,13 @@ struct TeamFault {
     kGyro,           ///< it reads other rates than its cameras show; the robot is left out
     kEstimates,      ///< it broadcasts poses of others that are wrong; nobody uses them
     kModule,         ///< another robot carries the UWB module of its id; ranges to it are refused
+    kMounting,       ///< its IMU is not mounted as configured; nothing of the robot is used
   };
   RobotId robot{};
   Kind kind = Kind::kCameraTurned;
   /// [rad] of a camera, [m] of ranges, positive if they are too long, [s] of a clock, positive if
   /// it is ahead, [rad/s] of a gyroscope, [m] of estimates, [m] to where the
-  /// module is.
+  /// module is, [rad] of a mounting.
   double size = 0.0;
   double sigma = 0.0;  ///< of a turned camera's and of a clock's size
 

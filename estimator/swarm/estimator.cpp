@@ -14,6 +14,7 @@
 #include "estimator/relative/tilt_filter.hpp"
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/graph_problem_builder.hpp"
+#include "estimator/swarm/imu_mounting.hpp"
 #include "estimator/swarm/neighbor.hpp"
 #include "estimator/swarm/report_composer.hpp"
 #include "estimator/swarm/robot_state.hpp"
@@ -171,7 +172,11 @@ struct Estimator::State {
   [[nodiscard]] std::optional<TeamInterval> team_interval(Timestamp now);
   [[nodiscard]] Bearing with_stamp_error(Bearing bearing) const;
   [[nodiscard]] ExpectedBoard expected_board(const NeighborPose& pose) const;
+  [[nodiscard]] std::vector<TeamFault> mounting_faults_of(RobotId robot) const;
   [[nodiscard]] std::vector<TeamFault> faults_of(RobotId robot) const;
+  void refuse_wrong_mountings();
+  void refuse_imu(RobotId robot);
+  void end_team();
 
   RobotId id;
   RobotState self;
@@ -197,6 +202,8 @@ struct Estimator::State {
   bool keeps_records = false;
   TeamLog team_log;
   SwappedModules swapped_modules;
+  ImuMounting imu_mounting;
+  std::set<RobotId> wrongly_mounted;  ///< at the last tick
   std::uint64_t unknown_senders = 0;
   std::uint64_t used_samples = 0;
   std::uint64_t refused_samples = 0;
@@ -239,10 +246,7 @@ void Estimator::State::reconfigure(const EstimatorSettings& settings) {
   graph_enabled = settings.solves_graph;
   uses_team_filter = settings.uses_team_filter;
   team_size = settings.team_size;
-  if (!runs_team_filter()) {
-    team_log.clear();
-    for (auto& [robot, neighbor] : neighbors) neighbor.end_team_pose();
-  }
+  if (!runs_team_filter()) end_team();
   report_timer = PeriodicTimer(period_of(settings.report_rate_hz));
   graph_timer = PeriodicTimer(period_of(settings.graph_rate_hz));
 }
@@ -289,11 +293,11 @@ Outputs Estimator::State::handle(const SpotFrame& frame) {
   Outputs outputs;
   BlinkTracker& tracker = trackers[frame.camera];
   outputs.bearings = tracker.step(frame, expected);
-  // IDs are read through any lens; a direction through a guessed one would be degrees off.
-  if (!is_calibrated[frame.camera]) return {};
   // A robot that sees its own code sees itself in a mirror.
   std::erase_if(outputs.bearings,
                 [&](const Bearing& bearing) { return !neighbors.contains(bearing.neighbor); });
+  // IDs are read through any lens; a direction through a guessed one would be degrees off.
+  if (!is_calibrated[frame.camera]) return outputs;
   // What was named because a pose expects it there says nothing about the pose until it is read.
   for (const Bearing& bearing : tracker.confirmed()) {
     if (neighbors.contains(bearing.neighbor))
@@ -303,6 +307,7 @@ Outputs Estimator::State::handle(const SpotFrame& frame) {
     bearing = with_stamp_error(bearing);
     if (bearing.how != Naming::kRead) continue;
     neighbors.at(bearing.neighbor).add(bearing);
+    imu_mounting.add(id, bearing, self.imu);
     composer.add(bearing);
   }
   return outputs;
@@ -326,10 +331,45 @@ ExpectedBoard Estimator::State::expected_board(const NeighborPose& pose) const {
           .covariance_m2 = pose.T_B_N.covariance.topLeftCorner<3, 3>()};
 }
 
+/// Those that need no team.
+std::vector<TeamFault> Estimator::State::mounting_faults_of(RobotId robot) const {
+  std::vector<TeamFault> faults;
+  if (const auto module = swapped_modules.fault_of(robot, last_tick)) faults.push_back(*module);
+  if (const auto imu = imu_mounting.fault_of(robot)) faults.push_back(*imu);
+  return faults;
+}
+
 std::vector<TeamFault> Estimator::State::faults_of(RobotId robot) const {
   std::vector<TeamFault> faults = team_log.faults_of(robot);
-  if (const auto module = swapped_modules.fault_of(robot, last_tick)) faults.push_back(*module);
+  std::ranges::copy(mounting_faults_of(robot), std::back_inserter(faults));
   return faults;
+}
+
+/// For the next ticks. What the team has learned from a wrong IMU until it was found is wrong too.
+void Estimator::State::refuse_wrong_mountings() {
+  std::set<RobotId> wrong;
+  for (const MemberConfig& member : swarm.members)
+    if (imu_mounting.is_wrong(member.id)) wrong.insert(member.id);
+  for (const RobotId robot : wrong) refuse_imu(robot);
+  if (!std::ranges::includes(wrongly_mounted, wrong)) end_team();
+  wrongly_mounted = std::move(wrong);
+}
+
+void Estimator::State::refuse_imu(RobotId robot) {
+  constexpr Duration kRefusal = std::chrono::milliseconds{300};  // some of the team's solutions
+  const Timestamp end = last_tick + kRefusal;
+  if (robot == id) {
+    self.refused_until = end;
+  } else if (const auto neighbor = neighbors.find(robot); neighbor != neighbors.end()) {
+    neighbor->second.refuse_imu_until(end);
+  }
+}
+
+/// It begins anew with the next measurements.
+void Estimator::State::end_team() {
+  team_intake = {};
+  team_log.clear();
+  for (auto& [robot, neighbor] : neighbors) neighbor.end_team_pose();
 }
 
 Outputs Estimator::State::handle(const ReceivedReport& received) {
@@ -358,7 +398,13 @@ Outputs Estimator::State::handle(const ReceivedReport& received) {
 }
 
 void Estimator::State::accept(const ReceivedReport& received, Neighbor& sender) {
+  const RobotId peer = received.report.sender;
   sender.add_report(received, self);
+  for (const Bearing& bearing : received.report.bearings) {
+    if (bearing.neighbor == id || neighbors.contains(bearing.neighbor))
+      imu_mounting.add(peer, bearing, sender.robot_state().imu);
+  }
+  if (imu_mounting.is_wrong(peer)) return;
   graph_builder.add_report(received.report, swarm);
   if (!runs_team_filter()) return;
   const ImuHistory& imu = sender.robot_state().imu;
@@ -375,18 +421,13 @@ Outputs Estimator::State::handle(const GraphSolution& solution) {
 }
 
 Outputs Estimator::State::handle(const TeamSolution& solution) {
-  constexpr Duration kRefusal = std::chrono::milliseconds{300};  // some solutions
-  if (!runs_team_filter()) return {};                            // it was asked for before a reload
+  if (!runs_team_filter()) return {};  // it was asked for before a reload
   team_log.add(solution);
   for (const TeamFault& fault : solution.faults) {
     if (fault.kind != TeamFault::Kind::kGyro) continue;
-    if (fault.robot == id) {
-      // Without a tilt this robot reports nothing either, until its gyroscope is right again.
-      tilt_filter.restart();
-      self.refused_until = last_tick + kRefusal;
-    } else if (const auto neighbor = neighbors.find(fault.robot); neighbor != neighbors.end()) {
-      neighbor->second.refuse_imu_until(last_tick + kRefusal);
-    }
+    // Without a tilt this robot reports nothing either, until its gyroscope is right again.
+    if (fault.robot == id) tilt_filter.restart();
+    refuse_imu(fault.robot);
   }
   const auto bias_of = [&](RobotId robot) {
     const auto found = std::ranges::find(solution.calibrations, robot, &RobotCalibration::robot);
@@ -404,10 +445,8 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
   Outputs outputs;
   if (keeps_records) {
     TeamRecord record{solution.stamp, solution.residuals, solution.calibrations, solution.faults};
-    for (const MemberConfig& member : swarm.members) {
-      if (const auto module = swapped_modules.fault_of(member.id, last_tick))
-        record.faults.push_back(*module);
-    }
+    for (const MemberConfig& member : swarm.members)
+      std::ranges::copy(mounting_faults_of(member.id), std::back_inserter(record.faults));
     outputs.records.team.push_back(std::move(record));
   }
   return outputs;
@@ -431,6 +470,7 @@ GraphProblem Estimator::State::graph_problem(const std::vector<NeighborEstimate>
 std::optional<TeamInterval> Estimator::State::team_interval(Timestamp now) {
   constexpr Duration kTeamMemory = std::chrono::seconds{5};
   const auto imus = [this](RobotId robot) { return imu_of(robot); };
+  if (imu_mounting.is_wrong(id)) return std::nullopt;
   auto interval = team_intake.drain(id, now, swarm, filters, imus);
   if (!interval || interval->members.size() < 2) return std::nullopt;
   if (interval->members.size() > 2) last_team = interval->to;
@@ -447,6 +487,7 @@ Outputs Estimator::State::handle(const Tick& tick) {
   }
   last_tick = tick.stamp;
   team_log.expire(tick.stamp);
+  refuse_wrong_mountings();
 
   Outputs outputs;
   std::vector<NeighborEstimate> estimates;

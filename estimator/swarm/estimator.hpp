@@ -17,8 +17,8 @@ struct Outputs {
   std::vector<NeighborPose> poses;          ///< to publish, ordered by neighbor
   std::optional<Report> report;             ///< to broadcast
   std::optional<TeamProblem> team_problem;  ///< to solve; the answer comes back as an Event
-  std::vector<Bearing> bearings;            ///< of the robots that the cameras identified
-  Records records;                          ///< at a Tick, if they are kept
+  std::vector<Bearing> bearings;  ///< of the robots that a camera identified, calibrated or not
+  Records records;                ///< at a Tick, if they are kept
 };
 
 /// Receives events in order of their arrival. Its outputs are a function of the events so far: the

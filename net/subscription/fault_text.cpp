@@ -49,6 +49,11 @@ std::string text_of(const TeamFault& fault) {
           "another robot carries; ranges to it are not used; set the module's id, or uwb_id in "
           "swarm.members",
           fault.size);
+    case TeamFault::Kind::kMounting:
+      return fmt::format(
+          "its IMU is turned by about {:.0f} deg against its cameras and is not used; correct "
+          "imu.T_body_imu, or T_cam_imu of its cameras, and restart it",
+          kDegPerRad * fault.size);
   }
   return {};
 }

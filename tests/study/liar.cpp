@@ -20,6 +20,12 @@ void turn_camera(Config& config, double angle_rad) {
     camera.calibration.T_cam_imu = camera.calibration.T_cam_imu * turn;
 }
 
+void turn_imu(RobotRecording& robot, double angle_rad) {
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitX()));
+  for (ImuSample& sample : robot.imu)
+    sample = {sample.stamp, turn * sample.gyro_radps, turn * sample.accel_mps2};
+}
+
 void stamp_late(RobotRecording& robot) {
   for (ImuSample& sample : robot.imu) sample.stamp += kStampedLate;
   for (UwbRange& range : robot.ranges) range.stamp += kStampedLate;
@@ -57,6 +63,10 @@ void corrupt(Lie lie, RobotRecording& robot) {
       return stamp_late(robot);
     case Lie::kRanges:
       return lengthen(robot, robot.robot.id);
+    case Lie::kUpsideDown:
+      return turn_imu(robot, radians(180.0));
+    case Lie::kOnItsSide:
+      return turn_imu(robot, radians(90.0));
   }
 }
 

@@ -18,6 +18,8 @@ enum class Lie : std::uint8_t {
   kRanges,        ///< its module's readings are 1 m too long
   kAntennaDelay,  ///< all readings to and from its module are 1 m too long
   kModules,       ///< it carries another robot's module, and that robot its own
+  kUpsideDown,    ///< its IMU is turned by 180 deg about x
+  kOnItsSide,     ///< by 90 deg about x
 };
 
 struct Liar {
@@ -25,10 +27,11 @@ struct Liar {
   Lie lie;
 };
 inline constexpr std::array kLiars{
-    Liar{"estimates", Lie::kEstimates}, Liar{"camera-5", Lie::kCamera5},
-    Liar{"camera-20", Lie::kCamera20},  Liar{"clock", Lie::kClock},
-    Liar{"ranges", Lie::kRanges},       Liar{"antenna-delay", Lie::kAntennaDelay},
-    Liar{"modules", Lie::kModules}};
+    Liar{"estimates", Lie::kEstimates},  Liar{"camera-5", Lie::kCamera5},
+    Liar{"camera-20", Lie::kCamera20},   Liar{"clock", Lie::kClock},
+    Liar{"ranges", Lie::kRanges},        Liar{"antenna-delay", Lie::kAntennaDelay},
+    Liar{"modules", Lie::kModules},      Liar{"upside-down", Lie::kUpsideDown},
+    Liar{"on-its-side", Lie::kOnItsSide}};
 
 /// Makes `robot` a liar: what it records, and what it believes of its sensors.
 void corrupt(Lie lie, RobotId robot, SwarmDataset& dataset);

@@ -214,6 +214,9 @@ TEST(Liars, ChangeWhatTheyRecordOrSend) {
   };
   EXPECT_EQ(neighbors(was), (std::set{1, 2, 3}));
   EXPECT_EQ(neighbors(now(Lie::kModules)), (std::set{2, 3, 4})) << "its own id is the other's";
+  const double up_mps2 = was.imu[0].accel_mps2.z();
+  EXPECT_NEAR(now(Lie::kUpsideDown).imu[0].accel_mps2.z(), -up_mps2, 1e-9);
+  EXPECT_NEAR(now(Lie::kOnItsSide).imu[0].accel_mps2.y(), -up_mps2, 1e-9);
   Report report;
   report.sender = liar;
   report.estimates.resize(1);
