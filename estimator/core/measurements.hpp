@@ -77,6 +77,10 @@ struct BasicTilt {
 /// One robot's own estimate of a neighbor, as it travels over the mesh.
 template <class Time>
 struct BasicNeighborEstimate {
+  /// One sigma of its velocity [m/s], of which it says nothing else: nobody sends one that is known
+  /// worse, and who starts from it assumes as much.
+  static constexpr double kSpeedSigma = 0.3;
+
   Time stamp{};
   RobotId neighbor{};
   GaussianPose T_B_N;

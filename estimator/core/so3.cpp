@@ -85,11 +85,6 @@ double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-double yaw_of(const Eigen::Quaterniond& q) {
-  return std::atan2(2.0 * (q.w() * q.z() + q.x() * q.y()),
-                    1.0 - 2.0 * (q.y() * q.y() + q.z() * q.z()));
-}
-
 Eigen::Vector3d roll_pitch_yaw_of(const Eigen::Quaterniond& q) {
   const Eigen::Matrix3d R = q.toRotationMatrix();
   return {std::atan2(R(2, 1), R(2, 2)), std::asin(std::clamp(-R(2, 0), -1.0, 1.0)),
@@ -105,6 +100,13 @@ Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& u) {
       sign * b, sign + u.y() * u.y() * a,      //
       -sign * u.x(), -u.y();
   return basis;
+}
+
+Eigen::Vector2d angles_across(const Eigen::Vector3d& predicted,
+                              const Eigen::Matrix<double, 3, 2>& across, const Eigen::Vector3d& u) {
+  const double sine = predicted.cross(u).norm();
+  const double stretch = sine < 1e-9 ? 1.0 : std::atan2(sine, predicted.dot(u)) / sine;
+  return stretch * (across.transpose() * u);
 }
 
 }  // namespace crepes

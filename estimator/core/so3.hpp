@@ -30,14 +30,19 @@ namespace crepes {
 /// The angle between two directions [rad], also where it is small or almost pi.
 [[nodiscard]] double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
-/// Heading of `q` about z, the first angle of Z-Y-X Euler angles [rad].
-[[nodiscard]] double yaw_of(const Eigen::Quaterniond& q);
-
 /// Roll, pitch and yaw of `q` [rad]: the angles about x, y and z of R = Rz Ry Rx.
 [[nodiscard]] Eigen::Vector3d roll_pitch_yaw_of(const Eigen::Quaterniond& q);
 
 /// Two unit vectors that complete the unit vector `u` to a right-handed orthonormal basis
 /// (columns), a smooth function of u almost everywhere (Duff et al. 2017).
 [[nodiscard]] Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& u);
+
+/// The log of the shortest rotation between two directions, in the plane across the first: the
+/// components of `u` along `across`, stretched to the angle [rad]. So nothing is flattened where
+/// the angle is large. `predicted` and `u` are unit vectors with the same axes, and `across` is
+/// `tangent_basis(predicted)`.
+[[nodiscard]] Eigen::Vector2d angles_across(const Eigen::Vector3d& predicted,
+                                            const Eigen::Matrix<double, 3, 2>& across,
+                                            const Eigen::Vector3d& u);
 
 }  // namespace crepes

@@ -23,13 +23,13 @@ struct TeamPose {
   Eigen::Vector3d v_B_N = Eigen::Vector3d::Zero();  ///< R_W_B^T (v_W_N - v_W_B) [m/s]
   /// Of the motion, and of the IMUs' biases: gyroscope and accelerometer of B, then of N.
   Covariance covariance = Covariance::Zero();
-  Timestamp last_sighting{};   ///< when anybody saw it, or it anybody, or ranges located it
-  Timestamp since = kNever;    ///< it was placed anew then
-  Duration clock_ahead{};      ///< its sensors' stamps are so much ahead of this robot's
-  bool needs_witness = false;  ///< not to be used unless another estimate of it agrees
-  /// A camera of one of the two was knocked out of its calibration, and their pair's filter does
-  /// not know that.
-  bool has_no_witness = false;
+  Timestamp last_sighting = kNever;  ///< when anybody saw it, or it anybody, or ranges located it
+  Timestamp since = kNever;          ///< it was placed anew then
+  Duration clock_ahead{};            ///< its sensors' stamps are so much ahead of this robot's
+  bool needs_confirmation = false;   ///< not to be used unless another estimate of it agrees
+  /// A camera of one of the two was knocked out of its calibration. Their pair's filter does not
+  /// know that, so it says nothing against this pose.
+  bool was_knocked = false;
 
   [[nodiscard]] Matrix6d pose_covariance() const {
     Matrix6d of_pose;

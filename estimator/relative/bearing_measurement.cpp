@@ -25,17 +25,12 @@ std::optional<BearingInnovation> linearize(const Line& line, const Eigen::Vector
   const Eigen::Vector3d predicted = M * direction;
   if (predicted.dot(u) <= 0.0) return std::nullopt;
 
-  // The residual is the log of the rotation from `predicted` to `u`, in the plane across
-  // it: no flattening at large angles, where the filter starts.
   const Eigen::Matrix<double, 3, 2> across = tangent_basis(predicted);
-  const Eigen::Vector3d axis = predicted.cross(u);
-  const double sine = axis.norm();
-  const double stretch = sine < 1e-9 ? 1.0 : std::atan2(sine, predicted.dot(u)) / sine;
   const Eigen::Matrix3d u_by_d =
       M * (Eigen::Matrix3d::Identity() - direction * direction.transpose()) / distance;
 
   BearingInnovation z;
-  z.residual = stretch * (across.transpose() * u);
+  z.residual = angles_across(predicted, across, u);
   z.H.setZero();
   z.H.middleCols<3>(ErrorState::kP) = across.transpose() * u_by_d * line.by_p;
   z.H.middleCols<3>(ErrorState::kTheta) = across.transpose() * u_by_d * line.by_theta;

@@ -24,6 +24,15 @@ struct ImuBias {
   Eigen::Matrix3d accel_scale = Eigen::Matrix3d::Zero();
 };
 
+/// What a sensor of an IMU measured, without its errors: it reads (I + scale) x + bias. First order
+/// in `scale`. All are in the sensor's unit, body axes.
+[[nodiscard]] inline Eigen::Vector3d without_errors(const Eigen::Vector3d& measured,
+                                                    const Eigen::Vector3d& bias,
+                                                    const Eigen::Matrix3d& scale) {
+  const Eigen::Vector3d unbiased = measured - bias;
+  return unbiased - scale * unbiased;
+}
+
 /// Everything that the tight filter estimates.
 struct NominalState {
   RelativeMotion motion;

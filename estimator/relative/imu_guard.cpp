@@ -89,7 +89,9 @@ void InnovationScale::add(double size) {
 
 std::span<const ImuSample> ImuGuard::accept(const ImuSample& sample) {
   believed_count_ = 0;
-  if (!is_plausible(sample) || !shows_gravity(sample)) {
+  const bool is_possible = is_plausible(sample);
+  if (is_possible) weigh(sample);
+  if (!is_possible || !shows_gravity()) {
     count(ImuFault::kImplausible);
     has_refused_ = true;
   } else if (is_late(sample)) {
@@ -104,18 +106,22 @@ std::span<const ImuSample> ImuGuard::accept(const ImuSample& sample) {
   return {believed_.data(), believed_count_};
 }
 
-/// False for samples in another unit: no robot falls freely for seconds, or bears twenty times its
-/// weight.
-bool ImuGuard::shows_gravity(const ImuSample& sample) {
-  constexpr double kMemory = 2.0;  // s
-  constexpr double kLeastMean = 0.3 * kGravityMps2;
-  constexpr double kMostMean = 20.0 * kGravityMps2;
-  if (to_seconds(weighed_ - sample.stamp) > kMemory) weighed_ = kNever;  // the clock went back
+/// Adds the sample's force to the mean of the last seconds.
+void ImuGuard::weigh(const ImuSample& sample) {
+  constexpr double kMemory_s = 2.0;
+  if (to_seconds(weighed_ - sample.stamp) > kMemory_s) weighed_ = kNever;  // the clock went back
   if (sample.stamp > weighed_) {
     const double passed_s = to_seconds(sample.stamp - std::exchange(weighed_, sample.stamp));
-    const double weight = 1.0 - std::exp(-passed_s / kMemory);  // the first sample: 1
+    const double weight = 1.0 - std::exp(-passed_s / kMemory_s);  // the first sample: 1
     mean_force_ += weight * (sample.accel_mps2.norm() - mean_force_);
   }
+}
+
+/// False for samples in another unit: no robot falls freely for seconds, or bears twenty times its
+/// weight.
+bool ImuGuard::shows_gravity() const {
+  constexpr double kLeastMean = 0.3 * kGravityMps2;
+  constexpr double kMostMean = 20.0 * kGravityMps2;
   return mean_force_ >= kLeastMean && mean_force_ <= kMostMean;
 }
 
@@ -166,7 +172,7 @@ void ImuGuard::compare(const ImuSample& sample) {
   // The scale learns from refused samples too: a vibration that begins must not be refused for
   // long.
   if (reference_ && !has_jumped_) {
-    update_sigmas(
+    add_innovation(
         innovation(sample, held_count_ > 0 ? reference_of_held(held_count_ - 1) : *reference_));
   }
   const bool is_in_doubt = held_count_ > 0 || has_jumped_;
@@ -179,7 +185,7 @@ void ImuGuard::compare(const ImuSample& sample) {
   }
 }
 
-void ImuGuard::update_sigmas(const PerSensor& innovation) {
+void ImuGuard::add_innovation(const PerSensor& innovation) {
   gyro_.add(innovation.gyro);
   accel_.add(innovation.accel);
 }
@@ -357,7 +363,7 @@ bool ImuGuard::held_are_plausible() const {
 
 void ImuGuard::restart_from_held() {
   for (std::size_t i = 2; i < held_count_; ++i)
-    update_sigmas(innovation(held_.at(i), reference_of_held(i - 1)));
+    add_innovation(innovation(held_.at(i), reference_of_held(i - 1)));
   reference_.reset();
   force_.setZero();
   believe_held(0);

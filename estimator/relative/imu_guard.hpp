@@ -84,7 +84,8 @@ class ImuGuard {
     refused_.at(static_cast<std::size_t>(fault)) += samples;
   }
   [[nodiscard]] bool is_late(const ImuSample& sample) const;
-  [[nodiscard]] bool shows_gravity(const ImuSample& sample);
+  void weigh(const ImuSample& sample);
+  [[nodiscard]] bool shows_gravity() const;
   [[nodiscard]] PerSensor limit() const;
   [[nodiscard]] PerSensor largest_change() const;
   [[nodiscard]] PerSensor excess(const ImuSample& sample, const Reference& reference) const;
@@ -92,7 +93,7 @@ class ImuGuard {
 
   void compare(const ImuSample& sample);
   void judge(const ImuSample& sample);
-  void update_sigmas(const PerSensor& innovation);
+  void add_innovation(const PerSensor& innovation);
   void believe(const ImuSample& sample);
   void refuse_spike(const ImuSample& spike, const ImuSample& before);
   void believe_held(std::size_t from);

@@ -18,7 +18,6 @@ namespace {
 
 using E = ErrorState;
 
-constexpr double kGraphSpeedSigma = 0.3;  // m/s
 // So long after three ranges they hold the distance.
 constexpr Duration kRangesLast = std::chrono::milliseconds{500};
 // So long after a bearing it holds the direction.
@@ -152,7 +151,7 @@ NeighborFilter::NeighborFilter(Timestamp stamp, const GaussianPose& T_B_N,
 NeighborFilter::NeighborFilter(Timestamp stamp, const GraphPose& first, const ProcessNoise& noise,
                                const Priors& priors)
     : stamp_(stamp),
-      P_(first_covariance(first.T_B_N.covariance, kGraphSpeedSigma, priors)),
+      P_(first_covariance(first.T_B_N.covariance, NeighborEstimate::kSpeedSigma, priors)),
       noise_(noise) {
   state_.motion = {first.T_B_N.pose, first.v_B_N};
 }

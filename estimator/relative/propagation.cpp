@@ -12,9 +12,8 @@ namespace {
 constexpr Duration kMaxStep = std::chrono::milliseconds{10};
 
 BodyRates rates(const ImuMean& mean, const ImuBias& bias) {
-  const Eigen::Vector3d w = mean.gyro_radps - bias.gyro_radps;
-  const Eigen::Vector3d a = mean.accel_mps2 - bias.accel_mps2;
-  return {w - bias.gyro_scale * w, a - bias.accel_scale * a};
+  return {without_errors(mean.gyro_radps, bias.gyro_radps, bias.gyro_scale),
+          without_errors(mean.accel_mps2, bias.accel_mps2, bias.accel_scale)};
 }
 
 constexpr int kMotion = ErrorState::kMotion;
@@ -157,12 +156,12 @@ Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body, const ImuMean& n
   Eigen::Matrix<double, 12, 1> variance;
   int row = 0;
   for (const ImuMean* imu : {&body, &neighbor}) {
-    variance.segment<3>(row).setConstant(
-        density2(noise.gyro_density, imu->gyro_noise_density, noise.gyro_extrapolation_density,
-                 imu->gyro_innovation_density, imu->extrapolation_time2_s2));
-    variance.segment<3>(row + 3).setConstant(
-        density2(noise.accel_density, imu->accel_noise_density, noise.accel_extrapolation_density,
-                 imu->accel_innovation_density, imu->extrapolation_time2_s2));
+    variance.segment<3>(row).setConstant(density2(
+        noise.gyro_density, imu->gyro_noise_density, ProcessNoise::kGyroExtrapolationDensity,
+        imu->gyro_innovation_density, imu->extrapolation_time2_s2));
+    variance.segment<3>(row + 3).setConstant(density2(
+        noise.accel_density, imu->accel_noise_density, ProcessNoise::kAccelExtrapolationDensity,
+        imu->accel_innovation_density, imu->extrapolation_time2_s2));
     variance.segment<3>(row + 3) += imu->blow_variance_m2ps2 / dt;
     row += 6;
   }

@@ -15,17 +15,18 @@ struct BodyRates {
 };
 
 /// Noise of the IMUs and of the range bias, the same for all robots. Densities are white noise per
-/// sqrt(Hz). Where no sample covers, the rates are random walks: `extrapolation` densities are
+/// sqrt(Hz). Where no sample covers, the rates are random walks: the extrapolation densities are
 /// their least densities; the innovation densities of the signals are added.
 struct ProcessNoise {
+  static constexpr double kGyroExtrapolationDensity = 0.3;   ///< [rad/s/sqrt(s)]
+  static constexpr double kAccelExtrapolationDensity = 3.0;  ///< [m/s^2/sqrt(s)]
+
   double gyro_density = 0.0;
   double accel_density = 0.0;
   double gyro_walk = 0.0;
   double accel_walk = 0.0;
-  double gyro_extrapolation_density = 0.3;   ///< [rad/s/sqrt(s)]
-  double accel_extrapolation_density = 3.0;  ///< [m/s^2/sqrt(s)]
-  double range_bias_walk = 0.0;              ///< [m/sqrt(s)]
-  double range_bias_return = 0.0;            ///< rate of its decay to zero [1/s]
+  double range_bias_walk = 0.0;    ///< [m/sqrt(s)]
+  double range_bias_return = 0.0;  ///< rate of its decay to zero [1/s]
 };
 
 /// The step of paper eq. 9 with the forces turned to the middle of the step:

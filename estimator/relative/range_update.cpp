@@ -12,19 +12,10 @@ using E = ErrorState;
 // Where the curvature's variance exceeds this share of the range's, ranges correct along the line.
 constexpr double kMaxCurvature = 0.1;
 
-struct Moments {
-  double mean_m;
-  double variance_m2;
-};
-
-// The second-order term of a range, |error across the line|^2 / (2 distance), for a Gaussian error
-// (Jazwinski 1970).
-Moments curvature_of(const Eigen::RowVector3d& line, double distance_m,
-                     const Eigen::Matrix3d& cov_p) {
+// The part of a position's covariance across the line of sight.
+Eigen::Matrix3d covariance_across(const Eigen::RowVector3d& line, const Eigen::Matrix3d& cov_p) {
   const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - line.transpose() * line;
-  const Eigen::Matrix3d cov_across = across * cov_p * across;
-  return {.mean_m = 0.5 * cov_across.trace() / distance_m,
-          .variance_m2 = 0.5 * cov_across.squaredNorm() / (distance_m * distance_m)};
+  return across * cov_p * across;
 }
 
 // The part of a gain that acts on distance and range bias.
@@ -44,10 +35,16 @@ double probability_true(double innovation_m, double variance_m2) {
   return density / (density + kFalseRangeDensity);
 }
 
+bool is_range_accepted(double innovation_m, double variance_m2, double gate_nis) {
+  return innovation_m * innovation_m / variance_m2 <= gate_nis &&
+         probability_true(innovation_m, variance_m2) >= 0.5;
+}
+
 RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double gate_nis,
                             E::Covariance& P, double shared_m2) {
   const Eigen::RowVector3d line = z.H.middleCols<3>(E::kP);
-  const Moments curvature = curvature_of(line, distance_m, P.block<E::kP, E::kP, 3, 3>());
+  const RangeCurvature curvature =
+      curvature_of(covariance_across(line, P.block<E::kP, E::kP, 3, 3>()), distance_m);
   const double curved = curvature.variance_m2;
   const E::Vector PHt = P.seen_columns().lazyProduct(z.H.transpose());
   const double predicted = z.H * PHt.head<E::kSeen>();
@@ -63,7 +60,7 @@ RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double 
   fusion.residual[0] = residual;
   fusion.sigma[0] = std::sqrt(expected);
   const double is_true = probability_true(residual, expected);
-  const bool fits = fusion.nis <= gate_nis && is_true >= 0.5;
+  const bool fits = is_range_accepted(residual, expected, gate_nis);
   fusion.verdict = fits ? Verdict::kFused : Verdict::kGated;
   if (fusion.verdict == Verdict::kGated || predicted <= shared) return update;
 

@@ -13,6 +13,24 @@ inline constexpr double kFalseRangeDensity = 0.05;
 /// (probabilistic data association, Bar-Shalom and Tse 1975). Below one half it is refused.
 [[nodiscard]] double probability_true(double innovation_m, double variance_m2);
 
+/// Whether a range is used: its NIS is at most `gate_nis`, and it is more likely true than false.
+[[nodiscard]] bool is_range_accepted(double innovation_m, double variance_m2, double gate_nis);
+
+/// Mean and variance of the second-order term of a range.
+struct RangeCurvature {
+  double mean_m = 0.0;
+  double variance_m2 = 0.0;
+};
+/// Of |dp|^2 / (2 distance), with dp a Gaussian error of the position across the line of sight
+/// (second-order filter, Jazwinski 1970; Bar-Shalom, Li and Kirubarajan 2001, 10.3). `across` is
+/// the covariance of dp [m^2], in any axes.
+template <class Covariance>
+[[nodiscard]] RangeCurvature curvature_of(const Covariance& across, double distance_m) {
+  return {.mean_m = 0.5 * across.trace() / distance_m,
+          .variance_m2 = 0.5 * across.squaredNorm() / (distance_m * distance_m)};
+}
+
+/// The correction by a range, and what became of it.
 struct RangeUpdate {
   Fusion fusion;
   ErrorState::Vector correction = ErrorState::Vector::Zero();  ///< to be injected

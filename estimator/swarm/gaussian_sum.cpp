@@ -21,10 +21,10 @@ double distance2(const GaussianPose& from, const Pose& to) {
 
 double log_likelihood_ratio(const Fusion& fusion, MeasurementKind kind) {
   if (fusion.verdict != Verdict::kFused && fusion.verdict != Verdict::kGated) return 0.0;
-  const bool is_range = kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange ||
-                        kind == MeasurementKind::kRingDistance;
+  const bool is_distance = kind == MeasurementKind::kRange || kind == MeasurementKind::kPeerRange ||
+                           kind == MeasurementKind::kRingDistance;
   const double ratio =
-      fusion.log_likelihood - std::log(is_range ? kFalseRangeDensity : kFalseBearings);
+      fusion.log_likelihood - std::log(is_distance ? kFalseRangeDensity : kFalseBearings);
   // What is gated was not used, but it still tells filters apart: else the least likely one would
   // gain on all others by a noisy reading that it alone admits.
   return fusion.verdict == Verdict::kFused ? ratio : std::max(0.0, ratio);

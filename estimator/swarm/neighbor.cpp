@@ -36,16 +36,12 @@ void Neighbor::reconfigure(const FilterSettings& settings) {
   publisher_.reconfigure(settings);
 }
 
-void Neighbor::add(const NeighborInput& input) {
-  std::visit([this](const auto& one) { add_input(one); }, input);
-}
-
-void Neighbor::add_input(const Bearing& bearing) {
+void Neighbor::add(const Bearing& bearing) {
   initiator_.add_bearing(bearing);
   intake_.add_bearing(bearing);
 }
 
-void Neighbor::add_input(const UwbRange& range) {
+void Neighbor::add(const UwbRange& range) {
   if (intake_.add_range(range, MeasurementKind::kRange))
     initiator_.add_range(range.stamp, range.range_m);
 }
@@ -78,8 +74,8 @@ void Neighbor::add_report(const ReceivedReport& received, const RobotState& self
   }
 }
 
-void Neighbor::add_input(const StampedGraphPose& input) {
-  const auto& [stamp, pose] = input;
+void Neighbor::add(const StampedGraphPose& solution) {
+  const auto& [stamp, pose] = solution;
   const bool sighted =
       !hypotheses_.empty() &&
       stamp - hypotheses_.leader().heaviest().last_sighting() <= recent_ + intake_.buffer().lag();
@@ -90,7 +86,7 @@ void Neighbor::add_input(const StampedGraphPose& input) {
   }
 }
 
-void Neighbor::add_input(const TeamEstimate& estimate) { publisher_.add_team_pose(estimate); }
+void Neighbor::add(const TeamEstimate& estimate) { publisher_.add_team_pose(estimate); }
 
 void Neighbor::tick(Timestamp now, const RobotState& self) {
   publisher_.clear();
@@ -101,12 +97,12 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
   }
   initiator_.tick(now, self, body_, hypotheses_, intake_);
   fuse_released(now, self);
-  if (const auto stamp = intake_.earliest_new()) publisher_.invalidate_from(*stamp);
+  if (const auto stamp = intake_.take_earliest_new()) publisher_.invalidate_from(*stamp);
   if (hypotheses_.is_unambiguous() && !self.imu.empty() && !body_.imu.empty())
     publisher_.update(now, self, body_, hypotheses_, intake_);
   if (!self.lacks_imu(now) && !body_.lacks_imu(now))
     publisher_.update_team(now, self, body_, intake_.last_contact());
-  if (publisher_.must_filter_restart()) hypotheses_.clear();
+  if (publisher_.take_restart()) hypotheses_.clear();
   if (outcomes().keeps_records() && !hypotheses_.empty())
     outcomes().add(hypotheses_.leader().heaviest().calibration());
   reason_ = publisher_.published() ? NoPoseReason::kNone : reason(now, self);

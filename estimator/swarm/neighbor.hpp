@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <variant>
 
 #include "estimator/core/outputs.hpp"
 #include "estimator/core/swarm_config.hpp"
@@ -20,7 +19,6 @@ struct StampedGraphPose {
   Timestamp stamp;
   GraphPose pose;
 };
-using NeighborInput = std::variant<Bearing, UwbRange, StampedGraphPose, TeamEstimate>;
 
 /// Readings enter through the intake and wait in its reorder buffer until the lag has passed. Each
 /// tick fuses the released ones or starts hypotheses from them. Poses do not wait: the publisher
@@ -32,8 +30,14 @@ class Neighbor {
   /// Keeps the state of the estimation, except for another profile.
   void reconfigure(const FilterSettings& settings);
 
-  /// Our own measurements of it, and its pose by the team's estimate.
-  void add(const NeighborInput& input);
+  /// Our own measurements of it.
+  void add(const Bearing& bearing);
+  void add(const UwbRange& range);
+  /// Its pose by the graph's solution. While anybody sees it, that corrects the published pose
+  /// only.
+  void add(const StampedGraphPose& solution);
+  /// Its pose by the team's filter.
+  void add(const TeamEstimate& estimate);
   /// Counts a range, ours or the neighbor's, that does not end where it says.
   void refuse(const UwbRange& range, MeasurementKind kind);
   /// A report of the neighbor; `self` is the state of our robot.
@@ -54,10 +58,6 @@ class Neighbor {
   [[nodiscard]] const RobotState& robot_state() const { return body_; }
 
  private:
-  void add_input(const Bearing& bearing);
-  void add_input(const UwbRange& range);
-  void add_input(const StampedGraphPose& input);
-  void add_input(const TeamEstimate& estimate);
   void fuse_released(Timestamp now, const RobotState& self);
   [[nodiscard]] NoPoseReason reason(Timestamp now, const RobotState& self) const;
 

@@ -91,10 +91,9 @@ void PosePublisher::add_graph_correction(Timestamp stamp, const GraphPose& pose)
 }
 
 std::optional<NeighborEstimate> PosePublisher::estimate() const {
-  constexpr double kMaxSpeedSigma = 0.3;  // m/s; those who start from it assume as much
   constexpr Duration kSettling = std::chrono::milliseconds{500};
-  const bool is_settled =
-      pose_ && pose_->stamp - started_ >= kSettling && speed_sigma_ <= kMaxSpeedSigma;
+  const bool is_settled = pose_ && pose_->stamp - started_ >= kSettling &&
+                          speed_sigma_ <= NeighborEstimate::kSpeedSigma;
   if (!is_settled || pose_->mode != PoseMode::kDirect) return std::nullopt;
   return NeighborEstimate{pose_->stamp, neighbor_, pose_->T_B_N, pose_->v_B_N};
 }
@@ -148,7 +147,7 @@ void PosePublisher::update_team(Timestamp now, const RobotState& self, const Rob
 /// What a filter out of sight predicts disputes nothing.
 void PosePublisher::compare() {
   if (!pose_ || pose_->mode == PoseMode::kPredicted) return;
-  if (team_->pose.has_no_witness) return dispute_.reset();
+  if (team_->pose.was_knocked) return dispute_.reset();
   const Vector6d d = pose_difference(pose_->T_B_N.pose, team_pose_->T_B_N.pose);
   const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
   if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return dispute_.reset();
@@ -163,9 +162,9 @@ bool PosePublisher::is_disputed() const {
   return team_pose_ && dispute_ && dispute_->last == team_pose_->stamp;
 }
 
-bool PosePublisher::must_filter_restart() {
-  if (!is_disputed() || dispute_->last - dispute_->since < kDispute || team_->pose.needs_witness ||
-      is_by_imus_)
+bool PosePublisher::take_restart() {
+  if (!is_disputed() || dispute_->last - dispute_->since < kDispute ||
+      team_->pose.needs_confirmation || is_by_imus_)
     return false;
   dispute_->since = dispute_->restarted = dispute_->last;
   return true;
@@ -173,14 +172,14 @@ bool PosePublisher::must_filter_restart() {
 
 std::optional<NeighborPose> PosePublisher::published() const {
   if (!team_pose_) return graph_corrected_pose();
-  const bool needs_witness = team_->pose.needs_witness;
+  const bool needs_confirmation = team_->pose.needs_confirmation;
   if (!pose_ || pose_->mode == PoseMode::kPredicted) {
-    if (needs_witness) return graph_corrected_pose();
+    if (needs_confirmation) return graph_corrected_pose();
     const bool restarts = dispute_ && team_pose_->stamp - dispute_->restarted <= kRestart;
     return restarts ? doubtful(*team_pose_, dispute_->difference) : team_pose_;
   }
   if (!is_disputed()) return team_pose_;
-  if (needs_witness) return graph_corrected_pose();
+  if (needs_confirmation) return graph_corrected_pose();
   // One of the two is wrong, and what shows which is how the pair knows its distance.
   return is_by_imus_ ? team_pose_ : doubtful(*pose_, dispute_->difference);
 }

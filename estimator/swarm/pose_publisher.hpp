@@ -49,9 +49,9 @@ class PosePublisher {
   /// Carries the newest team pose to now, and compares it with the filter's.
   void update_team(Timestamp now, const RobotState& self, const RobotState& neighbor,
                    const LastContact& last);
-  /// True once the team's pose has contradicted the filter's for a second: the filter must start
-  /// anew. Measurements that the team's filter believes agree with others', too.
-  [[nodiscard]] bool must_filter_restart();
+  /// True, once, when the team's pose has contradicted the filter's for a second: the filter must
+  /// start anew. Measurements that the team's filter believes agree with others', too.
+  [[nodiscard]] bool take_restart();
 
   /// The filter's pose at the last tick. Empty while unknown or too uncertain.
   [[nodiscard]] const std::optional<NeighborPose>& pose() const { return pose_; }
@@ -62,7 +62,7 @@ class PosePublisher {
   /// The team's pose if there is one and it agrees with the filter's. If they contradict each
   /// other, the filter's, with a covariance that contains the difference; none if that is too
   /// uncertain. While a filter that was contradicted starts anew, the team's, with that difference.
-  /// Without a team's pose, or with one that needs a witness and has none, the filter's,
+  /// Without a team's pose, or with one that needs to be confirmed and is not, the filter's,
   /// with the paper's graph's correction, if a recent one exists.
   [[nodiscard]] std::optional<NeighborPose> published() const;
 

@@ -50,7 +50,7 @@ class ReadingIntake {
   [[nodiscard]] const OutcomeLog& outcomes() const { return outcomes_; }
 
   /// The earliest stamp queued since the last call.
-  [[nodiscard]] std::optional<Timestamp> earliest_new() {
+  [[nodiscard]] std::optional<Timestamp> take_earliest_new() {
     return std::exchange(earliest_new_, std::nullopt);
   }
 

@@ -11,6 +11,9 @@ namespace crepes {
 
 /// Own measurements, or those in a neighbor's reports.
 struct RobotState {
+  /// An IMU without samples for longer does not show the motion.
+  static constexpr Duration kImuSilence = std::chrono::milliseconds{500};
+
   ImuHistory imu;
   std::optional<Tilt> tilt;
   ImuGuard guard{};
@@ -26,11 +29,10 @@ struct RobotState {
     return imu.push(sample, guard.blow_mps(sample));
   }
 
-  /// True if the IMU does not show the motion at `t`: no sample for half a second, a saturated
-  /// sensor, or a gyroscope that contradicts the cameras.
+  /// True if the IMU does not show the motion at `t`: it is silent, a sensor is saturated, or the
+  /// gyroscope contradicts the cameras.
   [[nodiscard]] bool lacks_imu(Timestamp t) const {
-    constexpr Duration kLongest = std::chrono::milliseconds{500};
-    return imu.empty() || t - imu.newest().stamp > kLongest || guard.is_saturated() ||
+    return imu.empty() || t - imu.newest().stamp > kImuSilence || guard.is_saturated() ||
            t < refused_until;
   }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "estimator/swarm/robot_state.hpp"
 #include "estimator/team/belief/team_state.hpp"
 
 namespace crepes {
@@ -12,7 +13,6 @@ namespace {
 constexpr double kLeastBearingSigma = 2e-4;  // rad; no camera is better, whatever a peer says
 constexpr Duration kLongest = std::chrono::milliseconds{500};  // of an interval
 constexpr std::size_t kMaxWaiting = 20000;  // if nothing is drained, for lack of own samples
-constexpr Duration kImuSilence = std::chrono::milliseconds{500};
 
 bool is_other_member(RobotId robot, RobotId sender, const SwarmConfig& swarm) {
   return robot != sender &&
@@ -117,7 +117,7 @@ std::optional<TeamInterval> TeamIntake::drain(RobotId self, Timestamp now, const
   interval.ranges = drained(ranges_, interval.from, to, stamp_of_range);
   for (const MemberConfig& member : swarm.members) {
     const ImuHistory* imu = imu_of(member.id);
-    if (imu == nullptr || imu->newest().stamp < to - kImuSilence) continue;
+    if (imu == nullptr || imu->newest().stamp < to - RobotState::kImuSilence) continue;
     interval.members.push_back(member_over(member, *imu, interval));
   }
   interval.settings = {.noise = settings.noise,

@@ -13,8 +13,8 @@ TeamPose keyframe_pose(const TeamBelief& belief, RobotId id, const TeamMember& m
   const Eigen::MatrixXd& P = belief.P;
   const double tau = robot.clock_s;
   const ImuMean& last = member.imu.back();
-  const Eigen::Vector3d rate = last.gyro_radps - robot.bias.gyro_radps;
-  const Eigen::Vector3d w = rate - robot.bias.gyro_scale * rate;
+  const Eigen::Vector3d w =
+      without_errors(last.gyro_radps, robot.bias.gyro_radps, robot.bias.gyro_scale);
   const Eigen::Vector3d a = robot.motion.q_F_B * (last.accel_mps2 - robot.bias.accel_mps2);
   const Eigen::Vector3d v = robot.motion.v_F + tau * a;
 

@@ -14,7 +14,6 @@
 namespace crepes {
 namespace {
 
-constexpr Duration kDark = std::chrono::seconds{1};
 constexpr std::size_t kLeastMembers = 5;  // four beacons, and this robot in the dark
 
 /// The same, as the peer itself would filter it. Of its estimates it has no more than this robot.
@@ -40,13 +39,13 @@ Eigen::Matrix3d bent_by_turn(const Eigen::Matrix3d& turn, const Eigen::Vector3d&
 
 std::optional<PeerView::View> PeerView::step(const TeamInterval& interval, const TeamBelief& own) {
   for (const TeamBearing& reading : interval.bearings) {
-    if (reading.observer == interval.self) sees_ = interval.to;
-    if (reading.bearing.neighbor == interval.self) is_seen_ = interval.to;
+    if (reading.observer == interval.self) last_saw_ = interval.to;
+    if (reading.bearing.neighbor == interval.self) last_seen_ = interval.to;
   }
-  if (own.robots.size() > 1) knows_ = interval.to;
-  const bool is_dark = interval.to - is_seen_ >= kDark;
-  const bool is_blind = interval.to - sees_ >= kDark;
-  const bool is_alone = !is_dark && interval.to - knows_ >= kDark;
+  if (own.robots.size() > 1) last_knew_ = interval.to;
+  const bool is_dark = interval.to - last_seen_ >= TeamRobot::kUnseenAfter;
+  const bool is_blind = interval.to - last_saw_ >= TeamRobot::kUnseenAfter;
+  const bool is_alone = !is_dark && interval.to - last_knew_ >= TeamRobot::kUnseenAfter;
   if (!(is_blind || is_alone) || (is_dark && interval.members.size() < kLeastMembers)) {
     forget();
     return std::nullopt;
@@ -64,7 +63,8 @@ std::optional<PeerView::View> PeerView::step(const TeamInterval& interval, const
   const TeamBelief& belief = filter_.belief();
   const auto self = belief.robots.find(interval.self);
   if (self == belief.robots.end()) return std::nullopt;
-  const bool needs_witness = !self->second.is_trusted && !is_plausible(belief, interval.self);
+  const bool needs_confirmation =
+      !self->second.is_trusted && !has_plausible_place(belief, interval.self);
   TeamBelief seen = seen_from(interval.self, belief);
   const Eigen::Matrix3d turn = belief.pose(interval.self).covariance.bottomRightCorner<3, 3>();
   solution.poses.clear();
@@ -73,8 +73,8 @@ std::optional<PeerView::View> PeerView::step(const TeamInterval& interval, const
     TeamPose& pose = solution.poses.emplace_back(keyframe_pose(seen, id, *interval.member(id)));
     pose.covariance.topLeftCorner<3, 3>() += bent_by_turn(turn, pose.T_B_N.p);
     pose.last_sighting = std::max(self->second.last_sighting, self->second.last_fix);
-    pose.needs_witness = needs_witness;
-    pose.has_no_witness = filter_.is_knocked(id) || filter_.is_knocked(interval.self);
+    pose.needs_confirmation = needs_confirmation;
+    pose.was_knocked = filter_.is_knocked(id) || filter_.is_knocked(interval.self);
   }
   if (solution.poses.empty()) return std::nullopt;
   solution.calibrations = calibrations_of(seen, interval.settings.priors);
@@ -108,14 +108,14 @@ void PeerView::choose_peer(const TeamInterval& interval, const TeamBelief& own) 
   });
   const auto best = std::ranges::max_element(merits, {}, [](const auto& e) { return e.second; });
   const auto present = merits.find(peer_);
-  if (present != merits.end()) peer_sees_ = interval.to;
+  if (present != merits.end()) peer_last_saw_ = interval.to;
   const bool is_useless = filter_.belief().robots.size() < 2 && present != merits.end() &&
                           !present->second.first && best->second.first;
   const bool stays = peer_ != RobotId{} && interval.member(peer_) != nullptr &&
-                     interval.to - peer_sees_ < kDark && !is_useless;
+                     interval.to - peer_last_saw_ < TeamRobot::kUnseenAfter && !is_useless;
   if (stays || merits.empty()) return;
   const RobotId next = best->first;
-  peer_sees_ = interval.to;
+  peer_last_saw_ = interval.to;
   if (next == peer_) return;
   peer_ = next;
   const bool goes_on = filter_.belief().robots.contains(interval.self);

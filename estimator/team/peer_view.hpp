@@ -32,12 +32,12 @@ class PeerView {
   void choose_peer(const TeamInterval& interval, const TeamBelief& own);
   void forget();
 
-  Timestamp sees_ = kNever;     ///< when this robot last saw anybody
-  Timestamp is_seen_ = kNever;  ///< when anybody last saw it
-  Timestamp knows_ = kNever;    ///< when its own filter last knew anybody
-  Timestamp peer_sees_ = kNever;
-  RobotId peer_{};    ///< whose frame it is; RobotId{} if there is none
-  RobotId former_{};  ///< one that turned out to have a fault
+  Timestamp last_saw_ = kNever;       ///< when this robot last saw anybody
+  Timestamp last_seen_ = kNever;      ///< when anybody last saw it
+  Timestamp last_knew_ = kNever;      ///< when its own filter last knew anybody
+  Timestamp peer_last_saw_ = kNever;  ///< when the peer last saw anybody
+  RobotId peer_{};                    ///< whose frame it is; RobotId{} if there is none
+  RobotId former_{};                  ///< one that turned out to have a fault
   TeamFilter filter_;
 };
 

@@ -33,6 +33,10 @@ bool has_own_edge(const TeamInterval& interval, RobotId id) {
   });
 }
 
+bool is_among(const std::vector<RobotId>& robots, RobotId id) {
+  return std::ranges::find(robots, id) != robots.end();
+}
+
 /// Of a correction: turns [rad], and moves over the distance.
 double largest_step(const std::map<RobotId, TeamRobot>& robots, const Eigen::VectorXd& dx) {
   double largest = 0.0;
@@ -88,49 +92,57 @@ TeamSolution TeamFilter::step(const TeamInterval& interval) {
   return solution;
 }
 
-/// A turned camera of a trusted robot has strained everybody's calibration, perhaps for long, so
-/// that all start anew. So have robots with false ranges, and this robot's own gyroscope, if it was
-/// false and there is no earlier belief.
+/// False gyroscopes have spoilt all calibrations, and these are recalled. Where something has
+/// strained them for perhaps longer than the memory goes back, all start anew: a turned camera of a
+/// trusted robot, robots with false ranges, this robot itself. Then nobody is left to be placed.
 bool TeamFilter::remove_members(const TeamInterval& interval) {
-  bool has_strained = false;
-  for (const RobotId id : trust_.lost(interval, belief_)) {
-    has_strained = has_strained || id == belief_.self;
-    remove(id);
-  }
-  bool has_spoilt = false;
+  const std::vector<RobotId> lost = trust_.note_lost(interval, belief_);
+  for (const RobotId id : lost) remove(id);
   const std::vector<RobotId> false_ones = false_gyros(interval);
-  // This robot's own gyroscope may have been false for longer than it was found to be.
-  const bool has_refusal_ended = trust_.is_gyro_false(belief_.self, interval.from) &&
-                                 !trust_.is_gyro_false(belief_.self, interval.to);
-  if (has_refusal_ended && !are_others_plausible()) {
+  if (must_recall_own(interval)) {
+    // Nothing corrects this interval even if there is no earlier belief.
     if (!recall(interval, {belief_.self})) begin_anew(interval);
     return true;
   }
-  for (const RobotId id : false_ones) {
-    has_spoilt = has_spoilt || belief_.robots.at(id).is_trusted;
-    remove(id);
+  const bool have_spoilt = std::ranges::any_of(
+      false_ones, [this](RobotId id) { return belief_.robots.at(id).is_trusted; });
+  for (const RobotId id : false_ones) remove(id);
+  const bool have_strained = remove_turned(interval) || is_among(lost, belief_.self);
+  if (have_strained || trust_.note_misleading(belief_)) {
+    begin_anew(interval);
+    return false;
   }
-  for (const RobotId id : trust_.turned(interval, belief_)) {
+  if (!have_spoilt) return false;
+  if (recall(interval, false_ones)) return true;
+  if (is_among(false_ones, belief_.self)) begin_anew(interval);
+  return false;
+}
+
+/// At the end of the time in which this robot's own gyroscope was refused: it may have been false
+/// for longer than it was found to be.
+bool TeamFilter::must_recall_own(const TeamInterval& interval) const {
+  return trust_.is_gyro_false(belief_.self, interval.from) &&
+         !trust_.is_gyro_false(belief_.self, interval.to) && !are_others_plausible();
+}
+
+/// Where the camera was only knocked, its robot stays.
+bool TeamFilter::remove_turned(const TeamInterval& interval) {
+  bool have_strained = false;
+  for (const RobotId id : trust_.note_turned(interval, belief_)) {
     if (const auto camera = trust_.knocked_camera(id)) {
       belief_.realign(id, *camera, trust_.turn_covariance(id).value());
       memory_.clear();
       continue;
     }
-    has_strained = has_strained || belief_.robots.at(id).is_trusted;
+    have_strained = have_strained || belief_.robots.at(id).is_trusted;
     remove(id);
   }
-  if (!has_strained && !trust_.is_misled(belief_)) {
-    if (!has_spoilt) return false;
-    if (recall(interval, false_ones)) return true;
-    if (std::ranges::find(false_ones, belief_.self) == false_ones.end()) return false;
-  }
-  begin_anew(interval);
-  return false;
+  return have_strained;
 }
 
 bool TeamFilter::are_others_plausible() const {
   return std::ranges::all_of(belief_.robots, [this](const auto& entry) {
-    return entry.first == belief_.self || is_plausible(belief_, entry.first);
+    return entry.first == belief_.self || has_plausible_place(belief_, entry.first);
   });
 }
 
@@ -146,7 +158,7 @@ bool TeamFilter::recall(const TeamInterval& interval, const std::vector<RobotId>
   if (!earlier) return false;
   const std::map<RobotId, TeamRobot> present = std::move(belief_.robots);
   belief_ = earlier->calibrations_at(interval);
-  const bool is_own = std::ranges::find(false_gyros, belief_.self) != false_gyros.end();
+  const bool is_own = is_among(false_gyros, belief_.self);
   if (is_own) belief_.doubt_imu(belief_.self, interval.settings.priors);
   for (auto& [id, robot] : belief_.robots) {
     const auto now = present.find(id);
@@ -185,7 +197,7 @@ std::vector<RobotId> TeamFilter::false_gyros(const TeamInterval& interval) {
                           .nis = check.chi2,
                           .dimension = check.dimension});
   }
-  return trust_.false_gyros(interval, belief_, checks);
+  return trust_.note_false_gyros(interval, belief_, checks);
 }
 
 /// For cameras that measure for the first time.
@@ -241,13 +253,14 @@ bool TeamFilter::correct(const TeamInterval& interval, Stage stage, TeamReadings
   for (int iteration = 1;; ++iteration) {
     const TeamTrajectories paths = belief_.trajectories(interval);
     const TeamInstant instant(belief_, paths, time_s);
+    const ReadingScene scene{interval, paths, instant, belief_};
     if (iteration == 1) {
-      gate(interval, paths, instant, belief_, readings, residuals_);
+      gate(scene, belief_, readings, residuals_);
       robots = belief_.robots;
       ranges = belief_.ranges;
     }
     const Eigen::VectorXd dy = instant.image_of(dx);
-    const std::vector<TeamRow> rows = linearized(interval, paths, instant, belief_, readings, dy);
+    const std::vector<TeamRow> rows = linearized(scene, readings, dy);
     belief_.robots = robots;
     belief_.ranges = ranges;
     if (rows.empty()) return true;  // the last step may have made all ranges unlikely
@@ -365,7 +378,7 @@ void TeamFilter::place_member(RobotId id, const TeamPlace& place) {
   const double doubt = trust_.doubt(id, belief_.stamp);
   covariance.diagonal().head<3>().array() += std::pow(doubt * kStartPosition, 2);
   covariance.diagonal().segment<3>(3).array() +=
-      (doubt * doubt - 1.0) * std::pow(TeamPlace::kSpeedSigma, 2);
+      (doubt * doubt - 1.0) * std::pow(NeighborEstimate::kSpeedSigma, 2);
   covariance.diagonal().tail<3>().array() += std::pow(doubt * kStartAttitude, 2);
   if (const auto turn = trust_.turn_covariance(id)) covariance.bottomRightCorner<3, 3>() += *turn;
   belief_.place(id, {place.T_S_N.p, place.v_S_N, place.T_S_N.q}, covariance);
@@ -382,8 +395,8 @@ void TeamFilter::report(const TeamInterval& interval, bool are_placed,
     if (robot.motion_index < 0 || (is_new && has_own_edge(interval, id))) continue;
     TeamPose& pose = solution.poses.emplace_back(keyframe_pose(belief_, id, *interval.member(id)));
     // The estimate that it started from may be false.
-    pose.needs_witness = !robot.is_trusted && !is_plausible(belief_, id);
-    pose.has_no_witness = is_knocked(id) || is_knocked(belief_.self);
+    pose.needs_confirmation = !robot.is_trusted && !has_plausible_place(belief_, id);
+    pose.was_knocked = is_knocked(id) || is_knocked(belief_.self);
   }
   std::ranges::sort(solution.poses, {}, &TeamPose::neighbor);
   solution.calibrations = calibrations_of(belief_, interval.settings.priors);

@@ -57,8 +57,12 @@ class TeamFilter {
  private:
   using Stage = TeamReadings::Stage;
 
-  /// Whether the robots that remain must be placed again.
+  /// Removes robots that are not to be believed, recalls an earlier belief or begins anew. True if
+  /// no reading may correct this interval: estimates must place again, at its end, whoever is left.
   [[nodiscard]] bool remove_members(const TeamInterval& interval);
+  [[nodiscard]] bool must_recall_own(const TeamInterval& interval) const;
+  /// Robots with turned cameras. True if one of them was trusted: it has strained the calibrations.
+  [[nodiscard]] bool remove_turned(const TeamInterval& interval);
   [[nodiscard]] bool are_others_plausible() const;
   void remove(RobotId id);
   /// After false gyroscopes. False if there is no earlier belief.

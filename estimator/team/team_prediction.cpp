@@ -8,8 +8,8 @@ namespace crepes {
 namespace {
 
 BodyRates rates(const ImuMean& mean, const ImuBiasEstimate& bias) {
-  const Eigen::Vector3d w = mean.gyro_radps - bias.gyro_radps;
-  return {w - bias.gyro_scale * w, mean.accel_mps2 - bias.accel_mps2};
+  return {without_errors(mean.gyro_radps, bias.gyro_radps, bias.gyro_scale),
+          mean.accel_mps2 - bias.accel_mps2};
 }
 
 }  // namespace

@@ -5,11 +5,11 @@
 #include <random>
 
 #include "estimator/core/contract.hpp"
+#include "estimator/vision/id_library.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr std::size_t kMaxSlots = 32;
 constexpr std::size_t kAttempts = 4;
 constexpr std::size_t kStepsAReport = 200'000;
 
@@ -42,7 +42,8 @@ struct Word {
 
 /// The first slot becomes the highest bit, so that words and texts have the same order.
 Word word_of(std::string_view pattern) {
-  CREPES_EXPECT(!pattern.empty() && pattern.size() <= kMaxSlots, "a pattern has 1 to 32 slots");
+  CREPES_EXPECT(!pattern.empty() && pattern.size() <= BlinkCode::kMaxSlots,
+                "a pattern has 1 to 32 slots");
   std::uint64_t bits = 0;
   for (const char slot : pattern) bits = bits << 1U | (slot == '1' ? 1U : 0U);
   return {bits, pattern.size()};
@@ -159,7 +160,8 @@ std::size_t clear_frames(std::string_view a, std::string_view b) {
 
 Codebook search_codebook(const CodebookRules& rules, std::size_t ids,
                          const CodebookSearch& search) {
-  CREPES_EXPECT(rules.slots >= 1 && rules.slots <= kMaxSlots, "a pattern has 1 to 32 slots");
+  CREPES_EXPECT(rules.slots >= 1 && rules.slots <= BlinkCode::kMaxSlots,
+                "a pattern has 1 to 32 slots");
   std::mt19937_64 random(search.seed);
   std::vector<Word> best;
   // Requires one more clear frame after each complete set, until no complete set is found.

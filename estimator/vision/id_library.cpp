@@ -9,8 +9,6 @@
 namespace crepes {
 namespace {
 
-constexpr std::size_t kMinPatternSlots = 8;
-constexpr std::size_t kMaxPatternSlots = 32;
 constexpr double kMinDutyDistance = 0.02;  // smaller differences are lost between two frames
 
 Duration from_ms(double ms) { return Duration{std::llround(ms * 1e6)}; }
@@ -33,7 +31,7 @@ bool are_alike(const MemberConfig& a, const MemberConfig& b) {
 }  // namespace
 
 Result<BlinkCode> BlinkCode::from_pattern(std::string_view pattern, Duration slot) {
-  if (pattern.size() < kMinPatternSlots || pattern.size() > kMaxPatternSlots) {
+  if (pattern.size() < kMinSlots || pattern.size() > kMaxSlots) {
     return fail(ErrorCode::kConfig,
                 fmt::format("pattern: must have 8 to 32 slots, has {}", pattern.size()));
   }

@@ -18,6 +18,10 @@ namespace crepes {
 /// Whether a board is lit, as a function of the board's own time. Repeats with period().
 class BlinkCode {
  public:
+  /// Lengths of a pattern.
+  static constexpr std::size_t kMinSlots = 8;
+  static constexpr std::size_t kMaxSlots = 32;
+
   /// `pattern`: 8 to 32 characters, one a slot, 1 lit and 0 dark. Both must occur.
   [[nodiscard]] static Result<BlinkCode> from_pattern(std::string_view pattern, Duration slot);
   /// Lit for the first `duty` of every `period`.

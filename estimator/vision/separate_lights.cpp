@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -15,6 +16,7 @@ namespace {
 constexpr int kLeastRise = 12;           // gray levels above the saddle to the next light
 constexpr double kContrastShare = 0.15;  // of the light's own height above the background
 constexpr double kCenterLevel = 0.3;     // of its height: what is below does not move its center
+constexpr std::size_t kMostLights = 300;
 constexpr std::int32_t kNoRegion = -1;
 
 /// A light: its brightest pixel, and the gray level at which it meets another or the background.
@@ -170,12 +172,12 @@ class CenterFinder {
 
 }  // namespace
 
-std::vector<Spot> separate_lights(const GrayImage& image, std::size_t most) {
+std::vector<Spot> separate_lights(const GrayImage& image) {
   const Background background = BrightnessSample(image).darkest_from(0);
   std::vector<Summit> summits = SummitFinder(image, background).find();
   std::ranges::stable_sort(summits, std::ranges::greater{},
                            [](const Summit& s) { return s.peak - s.floor; });
-  if (summits.size() > most) summits.resize(most);
+  if (summits.size() > kMostLights) summits.resize(kMostLights);
   CenterFinder centers(image, background.median);
   std::vector<Spot> spots;
   for (const Summit& summit : summits)

@@ -1,7 +1,6 @@
 /// Every light of a picture by itself, as the LEDs of a calibration grid.
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
 #include "estimator/core/measurements.hpp"
@@ -9,9 +8,9 @@
 
 namespace crepes {
 
-/// Lights that stand out from the dark part of the picture, by contrast, at most `most`. Lights
+/// Lights that stand out from the dark part of the picture, by contrast, at most 300. Lights
 /// that bloom into each other are parted at the saddle between them; those that the picture's
 /// border cuts are left out. Unlike `SpotDetector`, which makes one spot of a board's LEDs.
-[[nodiscard]] std::vector<Spot> separate_lights(const GrayImage& image, std::size_t most = 300);
+[[nodiscard]] std::vector<Spot> separate_lights(const GrayImage& image);
 
 }  // namespace crepes

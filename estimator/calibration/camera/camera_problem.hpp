@@ -67,13 +67,11 @@ class CameraProblem {
   template <class Visitor>
   void visit_priors(const CameraState& state, const CameraState& prior, Visitor& visitor) const;
   [[nodiscard]] double seconds(Timestamp t) const { return to_seconds(t - imu_[0].stamp); }
-  void assign_sightings();
 
   std::span<const ImuSample> imu_;
   std::vector<BoardSighting> sightings_;
   std::vector<double> weights_;
   std::vector<std::size_t> first_sample_;
-  std::vector<Eigen::Vector3d> accel_;  ///< unused samples have none
   ImuNoise noise_;
   CameraPriors priors_;
   double sigma_px_ = 1.0;

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <utility>
 
-#include "estimator/core/quantile.hpp"
+#include "estimator/calibration/batch/robust.hpp"
 
 namespace crepes {
 namespace {
@@ -12,10 +12,6 @@ namespace {
 constexpr double kFirstDamping = 1e-4;
 constexpr double kMostDamping = 1e8;
 constexpr double kDampingStep = 6.0;
-constexpr double kRobustSigmas = 3.0;
-constexpr double kOutlierWeight = 0.25;
-constexpr double kLeastSigma_px = 0.02;
-constexpr double kSigmaOfMedian2 = 1.3863;  // median of the squared length of a 2-D normal
 
 struct Descent {
   CameraState state;
@@ -54,23 +50,19 @@ Descent descend(const CameraProblem& problem, const CameraState& prior, CameraSt
   return descent;
 }
 
-/// One sigma of a coordinate, from the median of the squared lengths.
 double sigma_of(const std::vector<SightingResidual>& residuals, const std::vector<double>& mask) {
   std::vector<double> squares;
   for (std::size_t i = 0; i < residuals.size(); ++i)
     if (residuals[i].is_valid && mask[i] > 0.0) squares.push_back(residuals[i].uv.squaredNorm());
-  if (squares.empty()) return kLeastSigma_px;
-  return std::max(kLeastSigma_px, std::sqrt(upper_median(squares) / kSigmaOfMedian2));
+  return robust_sigma_px(std::move(squares));
 }
 
-/// Geman-McClure:  w = 1 / (1 + r^2 / c^2)^2 .
 std::vector<double> weights_of(const std::vector<SightingResidual>& residuals, double sigma_px,
                                const std::vector<double>& mask) {
-  const double c2 = std::pow(2.0 * kRobustSigmas * sigma_px, 2);
   std::vector<double> weights;
   weights.reserve(residuals.size());
   for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const double w = 1.0 / std::pow(1.0 + residuals[i].uv.squaredNorm() / c2, 2);
+    const double w = robust_weight(residuals[i].uv.squaredNorm(), sigma_px, 2.0);
     weights.push_back(residuals[i].is_valid ? mask[i] * w : 0.0);
   }
   return weights;
@@ -83,8 +75,7 @@ CameraSolution finished(const CameraProblem& problem, const CameraState& prior, 
   if (const auto step = problem.linearize(descent.state, prior).solve(0.0))
     solution.covariance = step->constants_covariance;
   solution.sigma_px = problem.sigma_px();
-  const auto low = std::ranges::count_if(weights, [](double w) { return w < kOutlierWeight; });
-  solution.outliers = static_cast<double>(low) / std::max(1.0, static_cast<double>(weights.size()));
+  solution.outliers = outlier_share(weights);
   solution.has_converged = descent.has_converged;
   solution.iterations = descent.iterations;
   solution.state = std::move(descent.state);

@@ -9,19 +9,16 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <utility>
 
 #include "estimator/calibration/batch/jet_geometry.hpp"
+#include "estimator/calibration/batch/robust.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
 namespace {
 
 constexpr double kLost_px = 100.0;  // residual of an LED that the lens cannot show
-constexpr double kLeastSigma_px = 0.02;
-constexpr double kRobustSigmas = 3.0;
-constexpr double kOutlierWeight = 0.25;
-constexpr double kSigmaOfMedian2 = 1.3863;  // median of the squared length of a 2-D normal
 
 Eigen::Vector3d place_of(const GridLed& led, const GridShape& shape) {
   return {shape.pitch_m * led.column, shape.pitch_m * led.row, 0.0};
@@ -119,17 +116,13 @@ double sigma_of(const std::vector<SightingResidual>& residuals) {
   for (const SightingResidual& residual : residuals)
     squares.push_back(residual.is_valid ? residual.uv.squaredNorm() : kLost_px * kLost_px);
   if (squares.empty()) return kLost_px;
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::ranges::nth_element(squares, middle);
-  return std::max(kLeastSigma_px, std::sqrt(*middle / kSigmaOfMedian2));
+  return robust_sigma_px(std::move(squares));
 }
 
-/// Geman-McClure:  w = 1 / (1 + r^2 / c^2)^2 .
 std::vector<double> weights_of(const std::vector<SightingResidual>& residuals, double sigma_px) {
-  const double c2 = std::pow(2.0 * kRobustSigmas * sigma_px, 2);
   std::vector<double> weights;
   for (const SightingResidual& residual : residuals)
-    weights.push_back(residual.is_valid ? 1.0 / std::pow(1.0 + residual.uv.squaredNorm() / c2, 2)
+    weights.push_back(residual.is_valid ? robust_weight(residual.uv.squaredNorm(), sigma_px, 2.0)
                                         : 0.0);
   return weights;
 }
@@ -252,8 +245,7 @@ GridFit finished(Guess guess, const GridShape& shape, bool has_converged) {
   const std::vector<double> weights = weights_of(fit.residuals, fit.sigma_px);
   fit.covariance =
       fit.sigma_px * fit.sigma_px * GridEquations(guess, shape, weights).lens_covariance();
-  const auto low = std::ranges::count_if(weights, [](double w) { return w < kOutlierWeight; });
-  fit.outliers = static_cast<double>(low) / std::max(1.0, static_cast<double>(weights.size()));
+  fit.outliers = outlier_share(weights);
   fit.has_converged = has_converged;
   fit.lens = std::move(guess.lens);
   fit.views = std::move(guess.views);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/calibration/batch/robust.hpp"
 #include "estimator/core/quantile.hpp"
 
 namespace crepes {
@@ -13,11 +14,7 @@ namespace {
 constexpr double kFirstSwarmDamping = 1e-13;
 constexpr double kMostSwarmDamping = 1e6;
 constexpr double kSwarmDampingStep = 30.0;
-constexpr double kSwarmRobustSigmas = 3.0;
-constexpr double kSmallWeight = 0.25;
-constexpr double kLeastSpotSigma_px = 0.02;
 constexpr double kLeastRangeSigma_m = 0.005;
-constexpr double kMedianOfSquare2 = 1.3863;  // of the squared length of a 2-D normal
 constexpr double kMedianOfAbsolute = 0.6745;
 
 struct SwarmDescent {
@@ -59,8 +56,7 @@ double spot_sigma(const std::vector<SightingResidual>& residuals) {
   std::vector<double> squares;
   for (const SightingResidual& residual : residuals)
     if (residual.is_valid) squares.push_back(residual.uv.squaredNorm());
-  if (squares.empty()) return kLeastSpotSigma_px;
-  return std::max(kLeastSpotSigma_px, std::sqrt(upper_median(squares) / kMedianOfSquare2));
+  return robust_sigma_px(std::move(squares));
 }
 
 double range_sigma(const std::vector<std::vector<double>>& residuals) {
@@ -70,12 +66,6 @@ double range_sigma(const std::vector<std::vector<double>>& residuals) {
       if (std::isfinite(r)) sizes.push_back(std::abs(r));
   if (sizes.empty()) return kLeastRangeSigma_m;
   return std::max(kLeastRangeSigma_m, upper_median(sizes) / kMedianOfAbsolute);
-}
-
-/// Geman-McClure:  w = 1 / (1 + r^2 / c^2)^2 .
-double robust_weight(double square, double sigma, double dimension) {
-  const double c2 = dimension * std::pow(kSwarmRobustSigmas * sigma, 2) * 2.0;
-  return 1.0 / std::pow(1.0 + square / c2, 2);
 }
 
 SwarmWeights swarm_weights(const SwarmResiduals& residuals, const std::vector<double>& sigma_px,
@@ -91,11 +81,6 @@ SwarmWeights swarm_weights(const SwarmResiduals& residuals, const std::vector<do
       ranges.push_back(std::isfinite(error) ? robust_weight(error * error, sigma_m, 1.0) : 0.0);
   }
   return weights;
-}
-
-double low_share(const std::vector<double>& weights) {
-  const auto low = std::ranges::count_if(weights, [](double w) { return w < kSmallWeight; });
-  return static_cast<double>(low) / std::max(1.0, static_cast<double>(weights.size()));
 }
 
 }  // namespace
@@ -139,10 +124,10 @@ SwarmSolution solve_swarm(SwarmProblem& problem, const SwarmState& start,
     solution.covariance = std::move(step->constants_covariance);
   std::vector<double> ranges;
   for (std::size_t r = 0; r < problem.robots(); ++r) {
-    solution.outliers.push_back(low_share(weights.sightings[r]));
+    solution.outliers.push_back(outlier_share(weights.sightings[r]));
     ranges.insert(ranges.end(), weights.ranges[r].begin(), weights.ranges[r].end());
   }
-  solution.range_outliers = low_share(ranges);
+  solution.range_outliers = outlier_share(ranges);
   solution.has_converged = descent.has_converged;
   solution.state = std::move(descent.state);
   if (progress) progress(1.0);

@@ -76,9 +76,8 @@ RobotTrajectory::Step RobotTrajectory::step_at(double t_s) const {
 
 RobotTrajectory::Step RobotTrajectory::rates(std::size_t index, double dt) const {
   const ImuMean& mean = (*imu_)[index];
-  const Eigen::Vector3d rate = mean.gyro_radps - bias_.gyro_radps;
   Step step{.index = index, .dt = dt};
-  step.w = rate - bias_.gyro_scale * rate;
+  step.w = without_errors(mean.gyro_radps, bias_.gyro_radps, bias_.gyro_scale);
   step.f = mean.accel_mps2 - bias_.accel_mps2;
   step.half = so3_exp(0.5 * dt * step.w);
   return step;

@@ -63,9 +63,6 @@ struct TeamInterval {
   }
   /// Whether what was stamped then belongs to this interval, and to no other one.
   [[nodiscard]] bool contains(Timestamp stamp) const { return stamp > from && stamp <= to; }
-  [[nodiscard]] std::size_t step_count() const {
-    return static_cast<std::size_t>((to - from + kStep - Duration{1}) / kStep);
-  }
 };
 
 }  // namespace crepes

@@ -33,7 +33,8 @@ TeamPlace TeamPlace::beyond(const GaussianPose& step, const Eigen::Vector3d& v_s
   of_step.block<3, 3>(0, 6) = step.covariance.topRightCorner<3, 3>();
   of_step.block<3, 3>(6, 0) = step.covariance.bottomLeftCorner<3, 3>();
   of_step.block<3, 3>(6, 6) = step.covariance.bottomRightCorner<3, 3>();
-  of_step.diagonal().segment<3>(3).setConstant(kSpeedSigma * kSpeedSigma);
+  of_step.diagonal().segment<3>(3).setConstant(NeighborEstimate::kSpeedSigma *
+                                               NeighborEstimate::kSpeedSigma);
   const Covariance here = by_here.lazyProduct(covariance);
   const Covariance there = by_step.lazyProduct(of_step);
   TeamPlace place{.T_S_N = T_S_N * step.pose,

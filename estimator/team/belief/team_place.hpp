@@ -8,8 +8,6 @@ namespace crepes {
 /// A pose and a velocity with their errors.
 struct TeamPlace {
   using Covariance = Eigen::Matrix<double, FreeMotionAt::kMotion, FreeMotionAt::kMotion>;
-  /// An estimate says nothing about the error of its velocity; nobody sends one that is worse.
-  static constexpr double kSpeedSigma = 0.3;  // m/s
 
   Pose T_S_N;
   Eigen::Vector3d v_S_N = Eigen::Vector3d::Zero();

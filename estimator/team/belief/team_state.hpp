@@ -86,11 +86,13 @@ struct TeamCamera {
 struct TeamRobot {
   /// [gyroscope and accelerometer bias, the gyroscope's scale errors, antenna delay, clock]
   static constexpr int kCalibration = FreeMotionAt::kBias + 2;
+  /// A robot that for so long saw nobody, and that nobody saw, is in the dark.
+  static constexpr Duration kUnseenAfter = std::chrono::seconds{1};
 
   FreeMotion motion{};
   ImuBias bias{};
   double antenna_delay_m = 0.0;  ///< of its module; lengthens all its ranges
-  /// How far its clock is ahead of this robot's. Its motion is kept on its own clock.
+  /// How far its clock is ahead of this robot's [s]. Its motion is kept on its own clock.
   double clock_s = 0.0;
   int motion_index = -1;  ///< none for this robot
   int bias_index = 0;
@@ -103,6 +105,8 @@ struct TeamRobot {
 
   [[nodiscard]] int delay_index() const { return bias_index + FreeMotionAt::kBias; }
   [[nodiscard]] int clock_index() const { return delay_index() + 1; }
+  /// Whether it is in the dark.
+  [[nodiscard]] bool is_unseen(Timestamp now) const { return now - last_sighting >= kUnseenAfter; }
 };
 
 /// The error of all ranges between two robots that their modules' antenna delays do not explain.

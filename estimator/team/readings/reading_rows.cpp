@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "estimator/relative/range_update.hpp"
-#include "estimator/team/readings/reading_scene.hpp"
 
 namespace crepes {
 namespace {
@@ -76,10 +75,8 @@ std::optional<TeamRow> mean_of(const ReadingScene& scene, const Ranging& ranging
 
 }  // namespace
 
-std::vector<TeamRow> linearized(const TeamInterval& interval, const TeamTrajectories& paths,
-                                const TeamInstant& instant, const TeamBelief& belief,
-                                const TeamReadings& readings, const Eigen::VectorXd& dy) {
-  const ReadingScene scene{interval, paths, instant, belief};
+std::vector<TeamRow> linearized(const ReadingScene& scene, const TeamReadings& readings,
+                                const Eigen::VectorXd& dy) {
   std::vector<TeamRow> rows;
   rows.reserve(readings.sights.size() + readings.rangings.size());
   const auto add = [&](const std::optional<TeamRow>& row) {

@@ -1,11 +1,11 @@
 #include "estimator/team/readings/team_measurement.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <span>
 
 #include "estimator/core/contract.hpp"
 #include "estimator/core/so3.hpp"
+#include "estimator/relative/range_update.hpp"
 
 namespace crepes {
 namespace {
@@ -58,7 +58,7 @@ struct LineOfSight {
 LineOfSight line_of_sight(const TeamPair& pair, const TeamCamera& camera, const FreeMotion& i,
                           const FreeMotion& j) {
   LineOfSight line{.R_F_N = j.R(), .R_B_F = i.R().transpose(), .p_B_M = {}, .d = {}};
-  line.p_B_M = line.R_B_F * (j.p_F + line.R_F_N * pair.neighbor_arms.p_body_led - i.p_F);
+  line.p_B_M = line.R_B_F * (j.p_F + line.R_F_N * pair.neighbor_member.p_body_led - i.p_F);
   line.d = line.p_B_M - camera.p_B_C;
   return line;
 }
@@ -109,7 +109,7 @@ std::optional<SightModel> SightModel::at(const TeamPair& pair, const TeamCamera&
   add_motion(-by_d * line.R_B_F, by_d * hat(line.p_B_M), pair.observer_path, i, pair.observer,
              pair.states, row);
   add_motion(by_d * line.R_B_F,
-             -by_d * line.R_B_F * line.R_F_N * hat(pair.neighbor_arms.p_body_led),
+             -by_d * line.R_B_F * line.R_F_N * hat(pair.neighbor_member.p_body_led),
              pair.neighbor_path, j, pair.neighbor, pair.states, row);
   add_columns(pair.states.of(camera.index),
               -across * hat(direction) * so3_right_jacobian(camera.misalignment), row);
@@ -117,8 +117,8 @@ std::optional<SightModel> SightModel::at(const TeamPair& pair, const TeamCamera&
       pair.states.of(camera.lens_index()),
       model.across_.transpose() * (Eigen::Matrix3d::Identity() - turned * turned.transpose()), row);
   add_clocks(
-      by_d * line.R_B_F * pair.neighbor_path.velocity_F(t_j_s, pair.neighbor_arms.p_body_led), pair,
-      row);
+      by_d * line.R_B_F * pair.neighbor_path.velocity_F(t_j_s, pair.neighbor_member.p_body_led),
+      pair, row);
   return model;
 }
 
@@ -128,11 +128,8 @@ std::optional<Eigen::Vector2d> SightModel::residual(const TeamPair& pair, const 
                                          pair.neighbor_path.motion_at(pair.neighbor_time_s(t_s)));
   const Eigen::Vector3d then = camera.seen(line.d.normalized());
   const Eigen::Vector3d u = shortest_rotation(then, predicted_) * u_B;
-  const double cosine = predicted_.dot(u);
-  if (!(cosine > 0.0)) return std::nullopt;
-  const double sine = predicted_.cross(u).norm();
-  const double stretch = sine < 1e-9 ? 1.0 : std::atan2(sine, cosine) / sine;
-  return stretch * (across_.transpose() * u);
+  if (!(predicted_.dot(u) > 0.0)) return std::nullopt;
+  return angles_across(predicted_, across_, u);
 }
 
 std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias,
@@ -143,8 +140,8 @@ std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias
   const FreeMotionAt& j = pair.neighbor_path.nearest(t_j_s);
   const FreeMotion now_i = pair.observer_path.motion_at(t_s);
   const FreeMotion now_j = pair.neighbor_path.motion_at(t_j_s);
-  const Eigen::Vector3d& q_i = pair.observer_arms.p_body_uwb;
-  const Eigen::Vector3d& q_j = pair.neighbor_arms.p_body_uwb;
+  const Eigen::Vector3d& q_i = pair.observer_member.p_body_uwb;
+  const Eigen::Vector3d& q_j = pair.neighbor_member.p_body_uwb;
   const Eigen::Vector3d d = now_j.p_F + now_j.q_F_B * q_j - now_i.p_F - now_i.q_F_B * q_i;
   const double distance = d.norm();
   if (distance < kMinDistance) return std::nullopt;
@@ -169,9 +166,10 @@ std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias
   add_clocks(Eigen::Vector2d(u.dot(pair.neighbor_path.velocity_F(t_j_s, q_j)), 0.0), pair, row);
 
   const Eigen::Matrix<double, 3, 2> across = tangent_basis(d / distance);
-  const Eigen::Matrix2d P = across.transpose() * covariance * across;
-  row.residual.x() -= 0.5 * P.trace() / distance;
-  row.variance += 0.5 * P.squaredNorm() / (distance * distance);
+  const Eigen::Matrix2d covariance_across = across.transpose() * covariance * across;
+  const RangeCurvature curvature = curvature_of(covariance_across, distance);
+  row.residual.x() -= curvature.mean_m;
+  row.variance += curvature.variance_m2;
   return row;
 }
 

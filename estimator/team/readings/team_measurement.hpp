@@ -32,8 +32,8 @@ struct TeamRow {
 struct TeamPair {
   const TeamRobot& observer;
   const TeamRobot& neighbor;
-  const TeamMember& observer_arms;
-  const TeamMember& neighbor_arms;
+  const TeamMember& observer_member;
+  const TeamMember& neighbor_member;
   const RobotTrajectory& observer_path;
   const RobotTrajectory& neighbor_path;
   const InstantStates& states;

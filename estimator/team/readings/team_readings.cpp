@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "estimator/relative/range_update.hpp"
-#include "estimator/team/readings/reading_scene.hpp"
 #include "estimator/team/unseen/team_darkness.hpp"
 
 namespace crepes {
@@ -172,8 +171,7 @@ TeamResidual gate(const ReadingScene& scene, TeamRangeBias& bias, Ranging& rangi
     const double residual = row->residual.x();
     variance = row->covariance(scene.instant.covariance())(0, 0);
     noise = z->reading.sigma_m * z->reading.sigma_m;
-    const bool fits = residual * residual <= scene.interval.settings.range_gate * variance &&
-                      probability_true(residual, variance) >= 0.5;
+    const bool fits = is_range_accepted(residual, variance, scene.interval.settings.range_gate);
     if (!ranging.dark) bias.add(ranging.observer, fits, residual);
     mean.add({residual, 0.0}, fits);
     return !fits;
@@ -232,9 +230,8 @@ std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& be
   return sights_of(interval, belief, [](RobotId, RobotId, const TeamCamera&) { return true; });
 }
 
-void gate(const TeamInterval& interval, const TeamTrajectories& paths, const TeamInstant& instant,
-          TeamBelief& belief, TeamReadings& readings, std::vector<TeamResidual>& residuals) {
-  const ReadingScene scene{interval, paths, instant, belief};
+void gate(const ReadingScene& scene, TeamBelief& belief, TeamReadings& readings,
+          std::vector<TeamResidual>& residuals) {
   for (Sight& sight : readings.sights) {
     residuals.push_back(gate(scene, belief.robots.at(sight.observer).cameras[sight.camera], sight));
     for (const Bearing* z : sight.bearings) {
@@ -248,7 +245,7 @@ void gate(const TeamInterval& interval, const TeamTrajectories& paths, const Tea
     residuals.push_back(
         gate(scene, belief.ranges.at(ordered(ranging.observer, ranging.neighbor)), ranging));
     if (ranging.dark && !ranging.ranges.empty())
-      belief.robots.at(*ranging.dark).last_fix = interval.to;
+      belief.robots.at(*ranging.dark).last_fix = scene.interval.to;
   }
   std::erase_if(readings.sights, [](const Sight& s) { return s.bearings.empty(); });
   std::erase_if(readings.rangings, [](const Ranging& r) { return r.ranges.empty(); });

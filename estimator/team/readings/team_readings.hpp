@@ -6,7 +6,7 @@
 
 #include "estimator/team/belief/team_belief.hpp"
 #include "estimator/team/belief/team_interval.hpp"
-#include "estimator/team/readings/team_instant.hpp"
+#include "estimator/team/readings/reading_scene.hpp"
 
 namespace crepes {
 
@@ -54,8 +54,8 @@ struct TeamReadings {
 [[nodiscard]] std::vector<Sight> all_sights(const TeamInterval& interval, const TeamBelief& belief);
 
 /// Drops readings that are too unlikely. Counts how each camera and pair agrees, and when a robot
-/// was last seen. Appends what was found to `residuals`.
-void gate(const TeamInterval& interval, const TeamTrajectories& paths, const TeamInstant& instant,
-          TeamBelief& belief, TeamReadings& readings, std::vector<TeamResidual>& residuals);
+/// was last seen, in `belief`, which is that of the scene. Appends what was found to `residuals`.
+void gate(const ReadingScene& scene, TeamBelief& belief, TeamReadings& readings,
+          std::vector<TeamResidual>& residuals);
 
 }  // namespace crepes

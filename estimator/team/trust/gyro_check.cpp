@@ -34,10 +34,7 @@ struct Direction {
 
   /// In the plane across, if the camera is turned by `R`.
   [[nodiscard]] Eigen::Vector2d residual(const Eigen::Matrix3d& R) const {
-    const Eigen::Vector3d u = R.transpose() * measured;
-    const double sine = predicted.cross(u).norm();
-    const double stretch = sine < 1e-9 ? 1.0 : std::atan2(sine, predicted.dot(u)) / sine;
-    return stretch * (across.transpose() * u);
+    return angles_across(predicted, across, R.transpose() * measured);
   }
   /// Of the residual, by a turn of the camera.
   [[nodiscard]] Matrix23 by_turn() const { return across.transpose() * hat(predicted); }
@@ -150,9 +147,7 @@ bool may_be_leap(const TeamPair& pair, const TeamCamera& camera, const SightMode
   return is_clear && !is_gradual;
 }
 
-std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajectories& paths,
-                                const TeamInstant& instant, const TeamBelief& belief,
-                                const Sight& sight) {
+std::optional<Change> change_of(const ReadingScene& scene, const Sight& sight) {
   const std::size_t count = sight.bearings.size() / 2;
   if (count == 0) return std::nullopt;
   std::vector<const Bearing*> sorted = sight.bearings;
@@ -162,18 +157,18 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   const std::span all(sorted);
   const Half first{all.first(count)};
   const Half second{all.last(count)};
-  const double t1_s = first.time_s(interval.from);
-  const double t2_s = second.time_s(interval.from);
+  const Timestamp from = scene.interval.from;
+  const double t1_s = first.time_s(from);
+  const double t2_s = second.time_s(from);
   if (t2_s - t1_s < kLeastTime) return std::nullopt;
 
-  const ReadingScene scene{interval, paths, instant, belief};
   const TeamPair pair = scene.pair(sight.observer, sight.neighbor);
   const TeamCamera& camera = pair.observer.cameras[sight.camera];
   const auto before = SightModel::at(pair, camera, t1_s, sight.sigma_rad());
   const auto after = SightModel::at(pair, camera, t2_s, sight.sigma_rad());
   if (!before || !after) return std::nullopt;
-  const auto r1 = median_residual(pair, camera, *before, first, interval.from);
-  const auto r2 = median_residual(pair, camera, *after, second, interval.from);
+  const auto r1 = median_residual(pair, camera, *before, first, from);
+  const auto r2 = median_residual(pair, camera, *after, second, from);
   if (!r1 || !r2) return std::nullopt;
 
   const Eigen::Matrix3d R =
@@ -186,14 +181,14 @@ std::optional<Change> change_of(const TeamInterval& interval, const TeamTrajecto
   Change change{.first = direction_of(*before, *r1),
                 .second = direction_of(*after, *r2),
                 .turn = turn,
-                .first_covariance = before->row().covariance(instant.covariance()),
-                .covariance = row.covariance(instant.covariance()),
+                .first_covariance = before->row().covariance(scene.instant.covariance()),
+                .covariance = row.covariance(scene.instant.covariance()),
                 .time_s = t2_s - t1_s};
   const double rate_radps = change.residual(Eigen::Matrix3d::Identity()).norm() / change.time_s;
-  change.may_be_leap = may_be_leap(pair, camera, *before, all, rate_radps, interval.from);
+  change.may_be_leap = may_be_leap(pair, camera, *before, all, rate_radps, from);
   // The instant has no part of the gyroscope's errors from the first half to the second.
   change.covariance += change.by_rate() *
-                       rate_covariance(belief, pair.observer, pair.observer_arms) *
+                       rate_covariance(scene.belief, pair.observer, pair.observer_member) *
                        change.by_rate().transpose();
   return change;
 }
@@ -285,9 +280,10 @@ using SeenByAll = std::map<RobotId, Seen>;
 SeenByAll seen_by_all(const TeamInterval& interval, const TeamTrajectories& paths,
                       const TeamBelief& belief) {
   const TeamInstant instant(belief, paths, 0.5 * to_seconds(interval.to - interval.from));
+  const ReadingScene scene{interval, paths, instant, belief};
   SeenByAll all;
   for (const Sight& sight : all_sights(interval, belief)) {
-    const auto change = change_of(interval, paths, instant, belief, sight);
+    const auto change = change_of(scene, sight);
     if (!change) continue;
     all[sight.observer].add(*change, sight.neighbor, belief.robots.at(sight.neighbor).is_trusted);
   }

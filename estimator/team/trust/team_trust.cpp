@@ -45,8 +45,9 @@ bool contradicts_all(const TeamCamera& camera) {
 
 }  // namespace
 
-std::vector<RobotId> TeamTrust::false_gyros(const TeamInterval& interval, const TeamBelief& belief,
-                                            const std::map<RobotId, GyroCheck>& checks) {
+std::vector<RobotId> TeamTrust::note_false_gyros(const TeamInterval& interval,
+                                                 const TeamBelief& belief,
+                                                 const std::map<RobotId, GyroCheck>& checks) {
   const double kept = std::exp(-to_seconds(interval.to - interval.from) / kGyroMemory);
   for (auto& [id, doubt] : gyro_doubts_) doubt.chi2 *= kept;
   std::vector<RobotId> robots;
@@ -143,7 +144,7 @@ bool TeamTrust::is_everybody_strained(Timestamp now) const {
   });
 }
 
-std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBelief& belief) {
+std::vector<RobotId> TeamTrust::note_lost(const TeamInterval& interval, const TeamBelief& belief) {
   // A robot that was away may have been repaired.
   const auto is_away = [&](const auto& entry) { return interval.member(entry.first) == nullptr; };
   std::erase_if(verdicts_, is_away);
@@ -194,7 +195,8 @@ std::vector<RobotId> TeamTrust::lost(const TeamInterval& interval, const TeamBel
   return lost;
 }
 
-std::vector<RobotId> TeamTrust::turned(const TeamInterval& interval, const TeamBelief& belief) {
+std::vector<RobotId> TeamTrust::note_turned(const TeamInterval& interval,
+                                            const TeamBelief& belief) {
   std::vector<RobotId> turned;
   // All that is known is relative to this robot.
   if (is_strained(belief.self, belief.stamp)) return turned;
@@ -277,7 +279,7 @@ void TeamTrust::count(std::map<RobotId, Losses>& all, RobotId robot, Timestamp n
   all[robot] = {now, recent(all, robot, now) + 1};
 }
 
-bool TeamTrust::is_misled(const TeamBelief& belief) {
+bool TeamTrust::note_misleading(const TeamBelief& belief) {
   int refused = 0;
   int fitting = 0;
   std::map<RobotId, int> refused_of;
@@ -300,13 +302,13 @@ bool TeamTrust::is_misled(const TeamBelief& belief) {
   // If one robot is part of all, its ranges are false, and not the others'.
   const auto is_in_all = [&](const auto& entry) { return entry.second == refused; };
   if (std::ranges::any_of(refused_of, is_in_all)) return false;
-  bool is_misled = false;
+  bool is_new = false;
   for (const auto& [id, pairs] : fitting_of) {
     if (id == belief.self || pairs < fitting || has_misled(id, belief.stamp)) continue;
     misled_by_[id] = belief.stamp;
-    is_misled = true;
+    is_new = true;
   }
-  return is_misled;
+  return is_new;
 }
 
 bool TeamTrust::has_misled(RobotId robot, Timestamp now) const {
@@ -317,10 +319,10 @@ bool TeamTrust::has_misled(RobotId robot, Timestamp now) const {
 void TeamTrust::end_probations(TeamBelief& belief) const {
   const Witnesses all = bearings_of(belief);
   for (auto& [id, robot] : belief.robots) {
-    const auto agreement = all.find(id);
+    const auto votes = all.find(id);
     const bool is_long_enough = belief.stamp - robot.since >= probation(id, belief.stamp);
-    if (is_long_enough && agreement != all.end() &&
-        agreement->second.fused > kAgreed * agreement->second.gated + 2.0 &&
+    if (is_long_enough && votes != all.end() &&
+        votes->second.agree > kAgreed * votes->second.contradict + 2.0 &&
         !is_placed_by_its_own_ranges(belief, id))
       robot.is_trusted = true;
   }
@@ -360,12 +362,12 @@ bool TeamTrust::has_leapt(RobotId robot, std::size_t camera, Timestamp now) cons
   return leap != leaps_.end() && now - leap->second < kKnock && !is_gyro_false(robot, now);
 }
 
-bool is_plausible(const TeamBelief& belief, RobotId id) {
+bool has_plausible_place(const TeamBelief& belief, RobotId id) {
   if (belief.stamp <= belief.robots.at(id).since || ranges_of(belief, id).is_contradiction())
     return false;
   const Witnesses all = bearings_of(belief);
-  const auto agreement = all.find(id);
-  return agreement == all.end() || agreement->second.fused >= kAgreed * agreement->second.gated;
+  const auto votes = all.find(id);
+  return votes == all.end() || votes->second.agree >= kAgreed * votes->second.contradict;
 }
 
 }  // namespace crepes

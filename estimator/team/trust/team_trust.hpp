@@ -16,35 +16,37 @@ namespace crepes {
 /// Remembers which robots were contradicted, and whose cameras are turned.
 class TeamTrust {
  public:
-  /// Robots that must be removed from the belief: they have no IMU, are too uncertain, or are
-  /// contradicted by most cameras that see them. In a tie, the robot that came last is removed.
-  /// Also robots whose camera agrees with nobody and contradicts only whom other cameras confirm,
-  /// at most twice in ten seconds: their attitude is wrong. Also robots whose camera was refused
-  /// for so long that it is tried again.
-  [[nodiscard]] std::vector<RobotId> lost(const TeamInterval& interval, const TeamBelief& belief);
+  /// Notices robots that must be removed from the belief, and counts that: they have no IMU, are
+  /// too uncertain, or are contradicted by most cameras that see them. In a tie, the robot that
+  /// came last is removed. Also robots whose camera agrees with nobody and contradicts only whom
+  /// other cameras confirm, at most twice in ten seconds: their attitude is wrong. Also robots
+  /// whose camera was refused for so long that it is tried again. Forgets verdicts that have ended.
+  [[nodiscard]] std::vector<RobotId> note_lost(const TeamInterval& interval,
+                                               const TeamBelief& belief);
 
-  /// Robots whose gyroscope has contradicted for some intervals what their cameras see, and robots
-  /// whose gyroscope was found false of late and whose camera now contradicts most of what it sees:
-  /// their attitude is wrong.
-  [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval,
-                                                 const TeamBelief& belief,
-                                                 const std::map<RobotId, GyroCheck>& checks);
+  /// Notices robots whose gyroscope has contradicted for some intervals what their cameras see, and
+  /// robots whose gyroscope was found false of late and whose camera now contradicts most of what
+  /// it sees: their attitude is wrong.
+  [[nodiscard]] std::vector<RobotId> note_false_gyros(const TeamInterval& interval,
+                                                      const TeamBelief& belief,
+                                                      const std::map<RobotId, GyroCheck>& checks);
 
   /// Notices cameras that may have been knocked: they agreed until now, and within this interval
   /// most robots that they see were far from where they should be.
   void note_leaps(const TeamInterval& interval, const TeamBelief& belief,
                   const std::vector<TeamResidual>& residuals);
 
-  /// Robots of which a camera was newly found turned. Their attitude is wrong too. They must be
-  /// restarted with an uncertain misalignment, so that the others' measurements determine it. If
+  /// Notices robots of which a camera is newly found turned. Their attitude is wrong too. They must
+  /// be restarted with an uncertain misalignment, so that the others' measurements determine it. If
   /// the camera contradicts the others again, it is refused.
-  [[nodiscard]] std::vector<RobotId> turned(const TeamInterval& interval, const TeamBelief& belief);
+  [[nodiscard]] std::vector<RobotId> note_turned(const TeamInterval& interval,
+                                                 const TeamBelief& belief);
 
-  /// Whether a robot that was trusted too early was newly found to have set a wrong scale: the
-  /// ranges of at least half of the pairs are refused, and the robot is part of every other pair,
-  /// but no robot of every refused one.
-  /// All robots must be restarted, and this one is trusted last.
-  [[nodiscard]] bool is_misled(const TeamBelief& belief);
+  /// Notices robots that were trusted too early and have set a wrong scale: the ranges of at least
+  /// half of the pairs are refused, and such a robot is part of every other pair, but no robot of
+  /// every refused one. True if one is newly found. Then all robots must be restarted, and this one
+  /// is trusted last.
+  [[nodiscard]] bool note_misleading(const TeamBelief& belief);
   /// Ends the probation of robots whose measurements agreed with the trusted ones for long enough.
   void end_probations(TeamBelief& belief) const;
 
@@ -116,6 +118,6 @@ class TeamTrust {
 
 /// Whether the bearings of a robot and to it agree with its place, four in five of them, and its
 /// ranges do not contradict it. False in the interval in which it started: they are yet to come.
-[[nodiscard]] bool is_plausible(const TeamBelief& belief, RobotId id);
+[[nodiscard]] bool has_plausible_place(const TeamBelief& belief, RobotId id);
 
 }  // namespace crepes

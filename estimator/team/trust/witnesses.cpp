@@ -10,7 +10,7 @@ bool others_contradict(const TeamBelief& belief, RobotId observer, RobotId id) {
   const auto all =
       witnesses_of(belief, [&](RobotId witness, const TeamCamera&) { return witness == observer; });
   const auto found = all.find(id);
-  return found != all.end() && found->second.gated > 0.0;
+  return found != all.end() && found->second.contradict > 0.0;
 }
 
 /// It contradicts most of the robots that it sees, at least two since one may itself be in the
@@ -48,11 +48,11 @@ Witnesses witnesses_of(const TeamBelief& belief, const IsExcluded& is_excluded) 
     for (const TeamCamera& camera : robot.cameras) {
       if (camera.is_refused || is_excluded(id, camera)) continue;
       for (const auto& [neighbor, agreement] : camera.agreement) {
-        Agreement& of_neighbor = witnesses[neighbor];
+        Votes& of_neighbor = witnesses[neighbor];
         if (agreement.is_contradiction()) {
-          of_neighbor.gated += 1.0;
+          of_neighbor.contradict += 1.0;
         } else if (agreement.fused > 1.0) {
-          of_neighbor.fused += 1.0;
+          of_neighbor.agree += 1.0;
         }
       }
     }
@@ -66,8 +66,8 @@ Witnesses bearings_of(const TeamBelief& belief) {
     for (const TeamCamera& camera : robot.cameras) {
       for (const auto& [neighbor, agreement] : camera.agreement) {
         for (const RobotId end : {id, neighbor}) {
-          all[end].fused += agreement.fused;
-          all[end].gated += agreement.gated;
+          all[end].agree += agreement.fused;
+          all[end].contradict += agreement.gated;
         }
       }
     }
@@ -108,7 +108,7 @@ bool looks_turned(const TeamBelief& belief, RobotId observer, const TeamCamera& 
     return false;
   const auto all = witnesses_of(belief, [](RobotId, const TeamCamera&) { return false; });
   const auto of_observer = all.find(observer);
-  return of_observer == all.end() || of_observer->second.gated == 0.0;
+  return of_observer == all.end() || of_observer->second.contradict == 0.0;
 }
 
 bool is_alone(const TeamBelief& belief, RobotId observer, const TeamCamera& camera) {
@@ -119,7 +119,7 @@ bool is_alone(const TeamBelief& belief, RobotId observer, const TeamCamera& came
     if (agreement.is_contradiction()) {
       contradicts = true;
       const auto found = others.find(neighbor);
-      if (found == others.end() || found->second.fused == 0.0 || found->second.gated > 0.0)
+      if (found == others.end() || found->second.agree == 0.0 || found->second.contradict > 0.0)
         return false;
     } else if (agreement.fused > 1.0) {
       return false;
@@ -130,13 +130,14 @@ bool is_alone(const TeamBelief& belief, RobotId observer, const TeamCamera& came
 
 bool is_contradicted(const TeamBelief& belief, const Witnesses& all, RobotId id) {
   const auto found = all.find(id);
-  if (found == all.end() || found->second.gated == 0.0) return false;
-  const Agreement& of_robot = found->second;
+  if (found == all.end() || found->second.contradict == 0.0) return false;
+  const Votes& of_robot = found->second;
   const bool came_last = std::ranges::none_of(all, [&](const auto& other) {
-    return other.second.gated > 0.0 &&
+    return other.second.contradict > 0.0 &&
            belief.robots.at(other.first).since > belief.robots.at(id).since;
   });
-  return of_robot.gated > of_robot.fused || (of_robot.gated == of_robot.fused && came_last);
+  return of_robot.contradict > of_robot.agree ||
+         (of_robot.contradict == of_robot.agree && came_last);
 }
 
 bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {

@@ -8,8 +8,14 @@
 
 namespace crepes {
 
-/// How many cameras or bearings agree with each robot's place, and how many contradict it.
-using Witnesses = std::map<RobotId, Agreement>;
+/// How many cameras, or how many bearings of late, agree with a robot's place, and how many
+/// contradict it.
+struct Votes {
+  double agree = 0.0;
+  double contradict = 0.0;
+};
+/// Of each robot.
+using Witnesses = std::map<RobotId, Votes>;
 
 /// Whether a camera of this robot is no witness.
 using IsExcluded = std::function<bool(RobotId, const TeamCamera&)>;

@@ -6,7 +6,6 @@
 namespace crepes {
 namespace {
 
-constexpr Duration kDark = std::chrono::seconds{1};  // a robot that nobody saw for so long
 // Ranges locate a robot in the dark if those who measure them are in different directions from it:
 // the least eigenvalue of the sum of u u^T.
 constexpr std::size_t kLeastBeacons = 3;
@@ -43,7 +42,7 @@ std::optional<RobotId> TeamDarkness::dark_of(const TeamRange& reading) const {
 }
 
 bool TeamDarkness::is_dark(RobotId id) const {
-  return interval_.to - belief_.robots.at(id).last_sighting > kDark;
+  return belief_.robots.at(id).is_unseen(interval_.to);
 }
 
 bool TeamDarkness::is_located(RobotId dark, const std::set<RobotId>& beacons) const {

@@ -13,7 +13,6 @@ constexpr Duration kLeast = std::chrono::seconds{2};
 constexpr Duration kMost = std::chrono::seconds{5};
 constexpr Duration kTrial = std::chrono::seconds{1};
 constexpr Duration kTurn = std::chrono::milliseconds{100};  // by which robots take turns
-constexpr Duration kRecent = std::chrono::seconds{1};       // a robot seen since then is a beacon
 
 /// Members that no camera sees, and whose cameras see nobody.
 std::set<RobotId> unseen_of(const TeamInterval& interval) {
@@ -30,7 +29,7 @@ std::set<RobotId> unseen_of(const TeamInterval& interval) {
 bool is_beacon(const TeamInterval& interval, const TeamBelief& belief, RobotId id) {
   const auto robot = belief.robots.find(id);
   return robot != belief.robots.end() && robot->second.is_trusted &&
-         interval.to - robot->second.last_sighting <= kRecent && interval.member(id) != nullptr;
+         !robot->second.is_unseen(interval.to) && interval.member(id) != nullptr;
 }
 
 /// Of an interval's ranges between two robots. Their errors last longer than the interval, so the

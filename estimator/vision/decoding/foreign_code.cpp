@@ -7,8 +7,6 @@
 namespace crepes {
 namespace {
 
-constexpr std::size_t kMaxSlots = 32;  // of any pattern
-
 /// Where an observation lies: its slot, and how far into it, as a part of the slot.
 struct SlotTime {
   std::size_t slot;
@@ -20,7 +18,7 @@ class SlotPattern {
  public:
   SlotPattern(const BlinkWindow& window, const CodeModel& code, double shift)
       : code_(code), shift_(shift), blur_(code.edge_blur * static_cast<double>(code.slots)) {
-    std::array<int, kMaxSlots> more_lit{};
+    std::array<int, BlinkCode::kMaxSlots> more_lit{};
     for (std::size_t i = 0; i < window.size(); ++i) {
       const SlotTime at = slot_time(window[i].stamp);
       if (at.into < blur_ || at.into > 1.0 - blur_) continue;
@@ -57,7 +55,7 @@ class SlotPattern {
   const CodeModel& code_;
   double shift_;
   double blur_;  // at each end of a slot, as a part of it
-  std::array<double, kMaxSlots> lit_{};
+  std::array<double, BlinkCode::kMaxSlots> lit_{};
 };
 
 }  // namespace

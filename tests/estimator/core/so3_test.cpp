@@ -147,13 +147,15 @@ TEST(So3, ShortestRotationTurnsOneDirectionIntoTheOther) {
   }
 }
 
-TEST(So3, YawIsTheHeadingOfTheForwardAxis) {
+TEST(So3, AnglesAcrossAreTheTurnFromOneDirectionToAnother) {
   RandomGeometry random(8);
   for (int i = 0; i < 200; ++i) {
-    const Eigen::Quaterniond q = random.rotation();
-    const Eigen::Vector3d forward = q * Eigen::Vector3d::UnitX();
+    const Eigen::Vector3d from = random.direction();
+    const Eigen::Matrix<double, 3, 2> across = tangent_basis(from);
+    const Eigen::Vector2d angles = random.vector(i % 4 == 0 ? 1e-12 : 0.5).head<2>();
+    const Eigen::Vector3d axis = from.cross(across * angles);
 
-    EXPECT_NEAR(yaw_of(q), std::atan2(forward.y(), forward.x()), 1e-12);
+    EXPECT_LT((angles_across(from, across, so3_exp(axis) * from) - angles).norm(), 1e-12);
   }
 }
 

@@ -19,14 +19,14 @@ class TeamPublisher : public testing::Test {
   TeamPublisher() { self_.imu = neighbor_.imu = imu_at_rest(1000); }
 
   /// The team's pose at `ms`, seen by anybody at `sighted_ms`.
-  void add(int ms, int sighted_ms, double sigma_m = 0.05, bool needs_witness = false,
-           bool has_no_witness = false) {
+  void add(int ms, int sighted_ms, double sigma_m = 0.05, bool needs_confirmation = false,
+           bool was_knocked = false) {
     TeamPose pose{.neighbor = kNeighbor, .T_B_N = kTruth};
     pose.covariance.diagonal().head<3>().setConstant(sigma_m * sigma_m);
     pose.covariance.diagonal().segment<6>(3).setConstant(1e-4);
     pose.last_sighting = at_ms(sighted_ms);
-    pose.needs_witness = needs_witness;
-    pose.has_no_witness = has_no_witness;
+    pose.needs_confirmation = needs_confirmation;
+    pose.was_knocked = was_knocked;
     publisher_.add_team_pose({at_ms(ms), pose, {}, {}});
   }
   [[nodiscard]] std::optional<NeighborPose> at(int now_ms, const LastContact& last = {}) {
@@ -151,7 +151,7 @@ TEST_F(TeamAndFilter, AFilterThatIsNoWitnessContradictsNothing) {
     ASSERT_TRUE(pose) << ms;
     EXPECT_LT((pose->T_B_N.pose.p - kTruth.p).norm(), 1e-6) << ms;
     EXPECT_LT(sigma_m(*pose), 0.1) << ms;
-    EXPECT_FALSE(publisher_.must_filter_restart()) << ms;
+    EXPECT_FALSE(publisher_.take_restart()) << ms;
   }
 }
 
@@ -177,14 +177,14 @@ TEST_F(TeamAndFilter, AFilterThatTheTeamContradictsForASecondStartsAnew) {
   for (int ms = 1000; ms <= 2000; ms += 100) {
     go_on_until(ms);
     EXPECT_TRUE(with_filter_at(elsewhere, ms - 100, ms)) << ms;
-    EXPECT_EQ(publisher_.must_filter_restart(), ms == 2000) << ms;
+    EXPECT_EQ(publisher_.take_restart(), ms == 2000) << ms;
   }
   go_on_until(2200);
   const auto alone = at(2200);
   ASSERT_TRUE(alone);
   EXPECT_LT((alone->T_B_N.pose.p - kTruth.p).norm(), 1e-6);
   EXPECT_GT(sigma_m(*alone), 0.8);
-  EXPECT_FALSE(publisher_.must_filter_restart());
+  EXPECT_FALSE(publisher_.take_restart());
 
   go_on_until(2500);
   ASSERT_TRUE(with_filter_at(kTruth, 2400, 2500));
@@ -200,7 +200,7 @@ TEST_F(TeamAndFilter, AFilterThatIsContradictedNowAndThenGoesOn) {
   for (const int ms : {1000, 2500, 2900, 4200}) {
     go_on_until(ms);
     EXPECT_TRUE(with_filter_at(elsewhere, ms - 100, ms)) << ms;
-    EXPECT_FALSE(publisher_.must_filter_restart()) << ms;
+    EXPECT_FALSE(publisher_.take_restart()) << ms;
   }
 }
 
@@ -210,7 +210,7 @@ TEST_F(TeamAndFilter, AFilterThatIsContradictedNowAndLongAgoGoesOn) {
   for (const int ms : {1000, 1900, 4200, 5100}) {
     go_on_until(ms);
     EXPECT_TRUE(with_filter_at(elsewhere, ms - 100, ms)) << ms;
-    EXPECT_FALSE(publisher_.must_filter_restart()) << ms;
+    EXPECT_FALSE(publisher_.take_restart()) << ms;
   }
 }
 
@@ -219,7 +219,7 @@ TEST_F(TeamAndFilter, AFilterThatAgreesNowAndThenGoesOn) {
   for (int ms = 1000; ms <= 3000; ms += 100) {
     go_on_until(ms);
     EXPECT_TRUE(with_filter_at(ms % 500 == 0 ? kTruth : elsewhere, ms - 100, ms)) << ms;
-    EXPECT_FALSE(publisher_.must_filter_restart()) << ms;
+    EXPECT_FALSE(publisher_.take_restart()) << ms;
   }
 }
 

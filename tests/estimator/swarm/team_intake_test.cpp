@@ -146,7 +146,7 @@ TEST_F(Intake, ARobotWithoutImuIsNoMember) {
   const auto without = drain(500 + lag);
   ASSERT_EQ(without->members.size(), 1U);
   EXPECT_EQ(without->members[0].robot, kOwn);
-  EXPECT_EQ(without->members[0].imu.size(), without->step_count());
+  EXPECT_EQ(without->members[0].imu.size(), 10U) << "steps of 10 ms";
   const ImuHistory old = imu_at_rest(50);
   peer_imu_ = &old;  // silent for more than half a second
   EXPECT_EQ(drain(600 + lag)->members.size(), 1U);

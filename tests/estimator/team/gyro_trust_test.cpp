@@ -21,8 +21,8 @@ TEST_F(GyroTrust, AGyroscopeIsFalseAfterSomeContradictionsAndForASecond) {
   const std::map<RobotId, GyroCheck> checks{
       {kAccused, {.chi2 = 50.0, .dimension = 6, .contradiction = {{40.0, 0.5, false}}}},
       {kSecond, {.chi2 = 6.0, .dimension = 6, .contradiction = {}}}};
-  EXPECT_TRUE(trust_.false_gyros(interval_, belief_, checks).empty());
-  EXPECT_EQ(trust_.false_gyros(interval_, belief_, checks), Ids{kAccused});
+  EXPECT_TRUE(trust_.note_false_gyros(interval_, belief_, checks).empty());
+  EXPECT_EQ(trust_.note_false_gyros(interval_, belief_, checks), Ids{kAccused});
   ASSERT_EQ(trust_.gyro_faults(belief_.stamp).size(), 1U);
   EXPECT_EQ(trust_.gyro_faults(belief_.stamp).front().robot, kAccused);
   EXPECT_EQ(trust_.gyro_faults(belief_.stamp).front().size, 0.5);
@@ -36,7 +36,7 @@ TEST_F(GyroTrust, OneRobotMustContradictAGyroscopeInTwoIntervalsOnEnd) {
   const auto next = [&](const std::map<RobotId, GyroCheck>& of_interval) {
     interval_.from = interval_.to;
     interval_.to += 100ms;
-    return trust_.false_gyros(interval_, belief_, of_interval);
+    return trust_.note_false_gyros(interval_, belief_, of_interval);
   };
   EXPECT_TRUE(next(checks).empty());
   EXPECT_TRUE(next({}).empty());
@@ -48,7 +48,7 @@ TEST_F(GyroTrust, OneRobotMustContradictAGyroscopeInTwoIntervalsOnEnd) {
 // neither its camera nor what it sees.
 TEST_F(GyroTrust, AfterAFalseGyroscopeACameraThatAgreesWithNobodyShowsAWrongAttitude) {
   const auto false_gyros = [&](const std::map<RobotId, GyroCheck>& checks) {
-    return trust_.false_gyros(interval_, belief_, checks);
+    return trust_.note_false_gyros(interval_, belief_, checks);
   };
   const auto sees_one_in_the_wrong_place = [&] {
     camera_of(kAccused).agreement = {{kSecond, kContradicts}};
@@ -86,11 +86,11 @@ TEST_F(GyroTrust, AConfirmedGyroscopeExcusesNothingAfterTwoSeconds) {
       {kAccused, {.chi2 = 100.0, .dimension = 6, .contradiction = {{100.0, 0.5, false}}}}};
   const std::map<RobotId, GyroCheck> confirmation{
       {kAccused, {.chi2 = 3.0, .dimension = 6, .is_confirmed = true, .contradiction = {}}}};
-  EXPECT_EQ(trust_.false_gyros(interval_, belief_, contradiction), Ids{kAccused});
-  EXPECT_TRUE(trust_.false_gyros(interval_, belief_, confirmation).empty());
+  EXPECT_EQ(trust_.note_false_gyros(interval_, belief_, contradiction), Ids{kAccused});
+  EXPECT_TRUE(trust_.note_false_gyros(interval_, belief_, confirmation).empty());
   wait(2s);
   contradict_what_it_sees(kAccused);
-  EXPECT_TRUE(trust_.false_gyros(interval_, belief_, confirmation).empty());
+  EXPECT_TRUE(trust_.note_false_gyros(interval_, belief_, confirmation).empty());
   EXPECT_EQ(turned(), Ids{kAccused});
 }
 

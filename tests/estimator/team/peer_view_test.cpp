@@ -46,7 +46,7 @@ Known known(int robots, double seconds, const std::function<void(SimulatedTeam&)
       const auto seen = view.step(team.next(), {});
       if (!seen) continue;
       for (const TeamPose& pose : seen->solution.poses) {
-        if (pose.needs_witness) continue;
+        if (pose.needs_confirmation) continue;
         is_known = true;
         ++all.poses;
         const Pose truth = team.truth(pose.neighbor);

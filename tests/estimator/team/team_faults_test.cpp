@@ -102,8 +102,8 @@ TEST(TeamFaults, ACameraThatIsKnockedIsRealignedInPlace) {
         ASSERT_NE(fault, nullptr) << label;
         EXPECT_EQ(fault->kind, TeamFault::Kind::kCameraTurned) << label;
         EXPECT_NEAR(fault->size, radians(2.0), radians(0.5)) << label;
-        EXPECT_TRUE(find(solution, RobotId{4})->has_no_witness) << label;
-        EXPECT_EQ(find(solution, RobotId{2})->has_no_witness, knocked == kSelf) << label;
+        EXPECT_TRUE(find(solution, RobotId{4})->was_knocked) << label;
+        EXPECT_EQ(find(solution, RobotId{2})->was_knocked, knocked == kSelf) << label;
         for (const RobotId robot : {RobotId{2}, RobotId{3}})
           EXPECT_LT(camera_sigma_rad(solution, robot), 1.05 * camera_sigma_rad(before, robot))
               << label;
@@ -345,7 +345,7 @@ TEST(TeamFaults, APoseByAFalseEstimateNeedsAWitnessUntilBearingsAgree) {
     int published = 0;
     for (double t = 0.0; t < 3.0; t += kIntervalSeconds) {
       for (const TeamPose& pose : filter.step(team.next()).poses) {
-        if (pose.needs_witness) continue;
+        if (pose.needs_confirmation) continue;
         EXPECT_LT(nees_of(pose, team.truth(pose.neighbor)), 40.0)
             << seed << " at " << t << ": " << pose.neighbor.value;
         published += pose.neighbor == kStarted ? 0 : 1;

@@ -94,7 +94,7 @@ Eigen::Vector3d true_bearing(const Scene& scene, const TeamPair& pair, double t_
   const FreeMotion from = pair.observer_path.motion_at(t_s);
   const FreeMotion to =
       pair.neighbor_path.motion_at(t_s + pair.neighbor.clock_s - pair.observer.clock_s);
-  const Eigen::Vector3d p_F_led = to.p_F + to.q_F_B * pair.neighbor_arms.p_body_led;
+  const Eigen::Vector3d p_F_led = to.p_F + to.q_F_B * pair.neighbor_member.p_body_led;
   const Eigen::Vector3d d = from.q_F_B.conjugate() * (p_F_led - from.p_F) - scene.camera.p_B_C;
   return scene.camera.seen(d.normalized());
 }

@@ -34,8 +34,8 @@ TEST(TeamPlace, AChainHasTheErrorsOfAllItsLinks) {
     const TeamPlace true_here = moved(here, random.draw<9>(here.covariance));
     const GaussianPose true_step{perturbed(step.pose, random.draw<6>(step.covariance)),
                                  Matrix6d::Zero()};
-    const TeamPlace truth =
-        true_here.beyond(true_step, v_step + random.vector(TeamPlace::kSpeedSigma), Timestamp{});
+    const TeamPlace truth = true_here.beyond(
+        true_step, v_step + random.vector(NeighborEstimate::kSpeedSigma), Timestamp{});
     const Vector6d of_pose = pose_difference(there.T_S_N, truth.T_S_N);
     Errors e;
     e << of_pose.head<3>(), truth.v_S_N - there.v_S_N, of_pose.tail<3>();

@@ -47,7 +47,7 @@ class TeamReadingsTest : public testing::Test {
     TeamReadings readings = TeamReadings::of(interval_, belief_, TeamReadings::Stage::kTrusted);
     const TeamInstant instant(belief_, paths, readings.time_s(interval_));
     std::vector<TeamResidual> residuals;
-    gate(interval_, paths, instant, belief_, readings, residuals);
+    gate({interval_, paths, instant, belief_}, belief_, readings, residuals);
     for (const TeamResidual& residual : residuals)
       if (residual.observer == kObserver && residual.neighbor == kNeighbor &&
           residual.kind == TeamResidual::Kind::kBearing)
@@ -115,7 +115,7 @@ TEST(TeamRanges, OneThatIsMoreLikelyFalseIsRefusedAndSpeaksAgainstItsPair) {
     TeamReadings readings = TeamReadings::of(interval, belief, TeamReadings::Stage::kTrusted);
     const TeamInstant instant(belief, paths, readings.time_s(interval));
     std::vector<TeamResidual> residuals;
-    gate(interval, paths, instant, belief, readings, residuals);
+    gate({interval, paths, instant, belief}, belief, readings, residuals);
     const auto& by_observer = belief.ranges.at(ordered(kObserver, kNeighbor)).agreement;
     ASSERT_FALSE(by_observer.empty());
     for (const auto& [observer, agreement] : by_observer) {
@@ -146,7 +146,7 @@ TEST(TeamRows, ARangeIsAsLikelyToBeTrueInEveryIteration) {
     moved.inject(dx);
     const TeamTrajectories paths = moved.trajectories(interval);
     const TeamInstant instant(moved, paths, readings.time_s(interval));
-    return linearized(interval, paths, instant, moved, readings, instant.image_of(dx)).at(0);
+    return linearized({interval, paths, instant, moved}, readings, instant.image_of(dx)).at(0);
   };
 
   const TeamRow first = row_after(0.0);

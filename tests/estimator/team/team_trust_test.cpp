@@ -22,7 +22,7 @@ using TrustOfFour = test::TrustOfFour;
 TEST_F(TrustOfFour, NobodyIsAccusedIfAllAgree) {
   EXPECT_TRUE(lost().empty());
   EXPECT_TRUE(turned().empty());
-  EXPECT_FALSE(trust_.is_misled(belief_));
+  EXPECT_FALSE(trust_.note_misleading(belief_));
   for (const RobotId robot : {kSelf, kSecond, kThird, kAccused}) {
     EXPECT_FALSE(trust_.turn_covariance(robot)) << robot.value;
     EXPECT_EQ(trust_.doubt(robot, belief_.stamp), 1.0);
@@ -205,32 +205,32 @@ TEST_F(TrustOfFour, ProbationEndsWhenMostAgreeForASecond) {
 TEST_F(TrustOfFour, ARobotWhoseRangesContradictItsPlaceIsNotPlausible) {
   belief_.robots.at(kAccused).since = belief_.stamp;
   wait(100ms);
-  ASSERT_TRUE(is_plausible(belief_, kAccused));
+  ASSERT_TRUE(has_plausible_place(belief_, kAccused));
 
   belief_.ranges[ordered(kSecond, kAccused)].agreement[kSecond] = kContradicts;
-  EXPECT_FALSE(is_plausible(belief_, kAccused));
+  EXPECT_FALSE(has_plausible_place(belief_, kAccused));
 
   // Those of one pair may go through an obstacle.
   for (const auto& [id, robot] : belief_.robots)
     if (id != kSecond && id != kAccused)
       belief_.ranges[ordered(id, kAccused)].agreement[id] = kAgrees;
-  EXPECT_TRUE(is_plausible(belief_, kAccused));
+  EXPECT_TRUE(has_plausible_place(belief_, kAccused));
 }
 
 TEST_F(TrustOfFour, ARobotIsPlausibleFromItsSecondIntervalOnWhileMostOfItsBearingsAgree) {
   TeamRobot& robot = belief_.robots.at(kAccused);
   robot.since = belief_.stamp;
-  EXPECT_FALSE(is_plausible(belief_, kAccused));
+  EXPECT_FALSE(has_plausible_place(belief_, kAccused));
   wait(100ms);
-  EXPECT_TRUE(is_plausible(belief_, kAccused));
+  EXPECT_TRUE(has_plausible_place(belief_, kAccused));
 
   // It sees others where they are, so half of its bearings agree.
   contradict_its_place(kAccused);
-  EXPECT_FALSE(is_plausible(belief_, kAccused));
-  EXPECT_TRUE(is_plausible(belief_, kSecond));
+  EXPECT_FALSE(has_plausible_place(belief_, kAccused));
+  EXPECT_TRUE(has_plausible_place(belief_, kSecond));
 
   for (auto& [id, other] : belief_.robots) other.cameras[0].agreement.clear();
-  EXPECT_TRUE(is_plausible(belief_, kAccused));  // nobody sees it
+  EXPECT_TRUE(has_plausible_place(belief_, kAccused));  // nobody sees it
 }
 
 TEST_F(TrustOfFour, ARobotThatItsOwnRangesPlacedStaysOnProbation) {
@@ -250,8 +250,8 @@ TEST_F(TrustOfFour, ARobotThatSetAWrongScaleIsFoundOnce) {
     const bool has_part = pair.first == kAccused || pair.second == kAccused;
     range.agreement[pair.first] = has_part ? kAgrees : kContradicts;
   }
-  EXPECT_TRUE(trust_.is_misled(belief_));
-  EXPECT_FALSE(trust_.is_misled(belief_));
+  EXPECT_TRUE(trust_.note_misleading(belief_));
+  EXPECT_FALSE(trust_.note_misleading(belief_));
   TeamRobot& robot = belief_.robots.at(kAccused);
   robot.is_trusted = false;
   wait(2s);
@@ -269,7 +269,7 @@ TEST_F(TrustOfFour, ARobotWhoseRangesAreAllRefusedShowsNoWrongScale) {
     const bool has_part = pair.first == kAccused || pair.second == kAccused;
     range.agreement[pair.first] = has_part ? kContradicts : kAgrees;
   }
-  EXPECT_FALSE(trust_.is_misled(belief_));
+  EXPECT_FALSE(trust_.note_misleading(belief_));
 }
 
 TEST_F(TrustOfFour, NamesWhatCalibrationsAndRangesShow) {

@@ -48,8 +48,8 @@ class TrustOfFour : public testing::Test {
     interval_.from += time;
     interval_.to += time;
   }
-  Ids lost() { return trust_.lost(interval_, belief_); }
-  Ids turned() { return trust_.turned(interval_, belief_); }
+  Ids lost() { return trust_.note_lost(interval_, belief_); }
+  Ids turned() { return trust_.note_turned(interval_, belief_); }
 
   SimulatedTeam team_{1};
   TeamInterval interval_;
