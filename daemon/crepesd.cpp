@@ -14,6 +14,7 @@
 #include "daemon/service/watchdog.hpp"
 #include "daemon/version.hpp"
 #include "drivers/base/monotonic_clock.hpp"
+#include "drivers/base/sleep.hpp"
 
 namespace crepes {
 namespace {
@@ -21,6 +22,7 @@ namespace {
 constexpr int kDone = 0;
 constexpr int kBadInput = 1;
 constexpr int kBadUsage = 2;
+constexpr int kRobotTaken = 3;  // systemd tries again: the other daemon may end
 
 constexpr Duration kCheckPeriod = std::chrono::seconds{1};  // of the watchdog
 
@@ -43,13 +45,32 @@ int check(const std::string& file, bool strict) {
   return print(file + ": good\n");
 }
 
+/// Waits a little for a daemon that is ending. So systemd, which starts this one again, does not do
+/// so ten times a second.
+Result<RobotLock> claim_robot(const Config& config) {
+  constexpr int kTries = 20;
+  constexpr Duration kPause = std::chrono::milliseconds{100};
+  const auto claim = [&config] {
+    return RobotLock::claim(config.robot.id, config.net.interface, config.net.port);
+  };
+  Result<RobotLock> lock = claim();
+  for (int i = 1; i < kTries && !lock && lock.error().code == ErrorCode::kBusy; ++i) {
+    sleep_for(kPause);
+    lock = claim();
+  }
+  return lock;
+}
+
 int run(const std::string& file) {
   CheckedConfig checked = check_config(file);
   print_lines("", checked.faults);
   if (!checked.faults.empty()) return kBadInput;
   Config* const config = &checked.config;
-  auto lock = RobotLock::claim(config->robot.id, config->net.interface, config->net.port);
-  if (!lock) return print(tl::unexpected(lock.error()));
+  auto lock = claim_robot(*config);
+  if (!lock) {
+    print(tl::unexpected(lock.error()));
+    return lock.error().code == ErrorCode::kBusy ? kRobotTaken : kBadInput;
+  }
   const Signals signals;
   const LogSession log(config->log.level);
   const MonotonicClock machine;

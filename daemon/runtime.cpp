@@ -82,11 +82,11 @@ Runtime::Runtime(Config config, const Clock& machine)
   }
   start_sensor("imu",
                sensor_source(imu_settings_, [this, sense](const ImuSensorSettings& settings) {
-                 return imu_sensor(settings, clock_, sense);
+                 return imu_sensor(settings, clock_, sense, imu_device_);
                }));
   start_sensor("uwb",
                sensor_source(uwb_settings_, [this, sense](const UwbSensorSettings& settings) {
-                 return uwb_sensor(settings, clock_, sense);
+                 return uwb_sensor(settings, clock_, sense, uwb_device_);
                }));
   for (std::size_t i = 0; i < cameras_.size(); ++i) start_camera(i, sense);
   if (!records) return;

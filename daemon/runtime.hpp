@@ -21,6 +21,7 @@
 #include "daemon/stages/sensor_stage.hpp"
 #include "daemon/stages/vision_stage.hpp"
 #include "daemon/stages/worker.hpp"
+#include "drivers/serial/device_name.hpp"
 #include "drivers/sim/sim_clock.hpp"
 #include "drivers/sim/sim_serial.hpp"
 #include "drivers/sim/world.hpp"
@@ -99,6 +100,9 @@ class Runtime {
   LiveSettings<ImuSensorSettings> imu_settings_;
   LiveSettings<UwbSensorSettings> uwb_settings_;
   LiveSettings<Config> recorder_settings_;
+
+  DeviceName imu_device_{"", kSerialById};  // the sensor's thread's
+  DeviceName uwb_device_{"", kSerialById};
 
   // The main thread's.
   Config active_config_;

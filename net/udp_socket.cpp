@@ -219,6 +219,12 @@ Result<Endpoint> UdpSocket::broadcast_address(const std::string& interface, std:
     if ((entry->ifa_flags & IFF_UP) == 0)
       return fail(ErrorCode::kIo, fmt::format("{}: interface is down; see `ip link`", interface));
     if ((entry->ifa_flags & IFF_LOOPBACK) != 0) return Endpoint::ipv4({127, 255, 255, 255}, port);
+    if ((entry->ifa_flags & IFF_RUNNING) == 0) {
+      return fail(ErrorCode::kIo,
+                  fmt::format("{}: interface has no carrier; is its cable plugged in, or its radio "
+                              "part of the mesh? See `ip link`",
+                              interface));
+    }
     const std::optional<in_addr_t> broadcast = broadcast_of(*entry);
     if (!broadcast) {
       return fail(ErrorCode::kIo,

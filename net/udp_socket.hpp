@@ -35,7 +35,8 @@ class UdpSocket {
   [[nodiscard]] static Result<UdpSocket> open_broadcast(const std::string& interface,
                                                         std::uint16_t port);
 
-  /// Where such a socket sends now; its interface may get another address.
+  /// Where such a socket sends now; its interface may get another address. An interface that is
+  /// down or has no carrier is an error, though the system would lose what is sent in silence.
   [[nodiscard]] static Result<Endpoint> broadcast_address(const std::string& interface,
                                                           std::uint16_t port);
 

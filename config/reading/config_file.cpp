@@ -118,7 +118,10 @@ CheckedConfig check_config_text(const std::string& text, const std::string& file
 CheckedConfig check_config(const std::filesystem::path& path) {
   std::vector<ConfigFault> faults;
   const ConfigNode root = load_config_tree(path, faults);
-  return read_config(root, std::move(faults));
+  CheckedConfig checked = read_config(root, std::move(faults));
+  for (ConfigFault& warning : ignored_fragments(path))
+    checked.warnings.push_back(std::move(warning));
+  return checked;
 }
 
 Result<Config> load_config(const std::filesystem::path& path) {

@@ -29,14 +29,17 @@ ConfigNode parse_file(const fs::path& path, ConfigFaults& faults) {
   return {.place = {path.string(), 1}};
 }
 
-std::vector<fs::path> fragments_of(const fs::path& path, ConfigFaults& faults) {
+/// The files beside `path` in its folder of fragments that end in `extension`, in their order.
+std::vector<fs::path> fragments_of(const fs::path& path, std::string_view extension,
+                                   ConfigFaults& faults) {
   const fs::path folder = path.parent_path() / (path.stem().string() + ".d");
   std::vector<fs::path> files;
   std::error_code error;
   if (!fs::exists(folder, error)) return files;
   fs::directory_iterator entry(folder, error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    if (entry->path().extension() == ".yaml" && !entry->path().filename().string().starts_with('.'))
+    if (entry->path().extension() == extension &&
+        !entry->path().filename().string().starts_with('.'))
       files.push_back(entry->path());  // a hidden one is an editor's
   }
   if (error) faults.push_back({folder.string(), 0, "", error.message()});
@@ -246,12 +249,20 @@ ConfigNode load_config_tree(const fs::path& path, ConfigFaults& faults) {
   ConfigNode root = parse_file(path, faults);
   // Fragments alone lack almost everything, which is no fault of theirs.
   if (root.kind == ConfigNode::Kind::kNothing && !faults.empty()) return root;
-  for (const fs::path& fragment : fragments_of(path, faults)) {
+  for (const fs::path& fragment : fragments_of(path, ".yaml", faults)) {
     ConfigNode over = parse_file(fragment, faults);
     // A fragment whose lines are all commented out changes nothing.
     if (over.kind != ConfigNode::Kind::kNothing) root = merged(std::move(root), std::move(over));
   }
   return with_references(std::move(root), faults);
+}
+
+std::vector<ConfigFault> ignored_fragments(const fs::path& path) {
+  ConfigFaults unreadable;  // reported where the fragments are read
+  ConfigFaults ignored;
+  for (const fs::path& file : fragments_of(path, ".yml", unreadable))
+    ignored.push_back({file.string(), 0, "", "is ignored: rename it, so that it ends in .yaml"});
+  return ignored;
 }
 
 ConfigNode parse_config_tree(const std::string& text, const std::string& file,

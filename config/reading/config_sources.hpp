@@ -16,5 +16,7 @@ namespace crepes {
 /// The same for one text instead of files and fragments.
 [[nodiscard]] ConfigNode parse_config_tree(const std::string& text, const std::string& file,
                                            std::vector<ConfigFault>& faults);
+/// Warnings of files beside crepesd.d/*.yaml that look like fragments.
+[[nodiscard]] std::vector<ConfigFault> ignored_fragments(const std::filesystem::path& path);
 
 }  // namespace crepes

@@ -36,9 +36,6 @@ void doubt_members(const SwarmConfig& swarm, Doubts& doubts) {
   }
 }
 
-/// The shortest slot of whole milliseconds that a camera of this rate can read [ms].
-double slot_of(double rate_hz) { return std::ceil(kFewFrames / rate_hz / kMillisecond - 1e-6); }
-
 void doubt_cameras(const Config& config, Doubts& doubts) {
   std::error_code status;
   for (std::size_t i = 0; i < config.cameras.size(); ++i) {
@@ -57,12 +54,12 @@ void doubt_cameras(const Config& config, Doubts& doubts) {
     if (frames < kFewFrames) {
       doubts.push_back(
           {key + ".rate_hz",
-           slot_of(camera.calibration.rate_hz) > kLongestSlot_ms
+           readable_slot_ms(camera.calibration.rate_hz) > kLongestSlot_ms
                ? fmt::format("is too slow to read codes: {:.0f} frames a second or more",
                              std::ceil(kFewFrames / (kLongestSlot_ms * kMillisecond)))
                : fmt::format("gives {:.1f} frames a slot; two or more can be read "
                              "reliably: swarm.slot_ms: {:.0f}, and the same on the boards",
-                             frames, slot_of(camera.calibration.rate_hz))});
+                             frames, readable_slot_ms(camera.calibration.rate_hz))});
     }
     if (camera.device.driver == CameraDriver::kFolder &&
         !std::filesystem::is_directory(camera.device.folder, status))
@@ -102,6 +99,10 @@ void doubt_keys(const Config& config, Doubts& doubts) {
 }
 
 }  // namespace
+
+double readable_slot_ms(double rate_hz) {
+  return std::ceil(kFewFrames / rate_hz / kMillisecond - 1e-6);
+}
 
 std::vector<RuleFault> doubtful_settings(const Config& config) {
   Doubts doubts;

@@ -19,7 +19,6 @@ class CameraDevice final : public Device {
         recycled_(recycled) {}
 
   [[nodiscard]] Result<std::size_t> read_once(milliseconds timeout) override {
-    if (light_.has_update()) set_light();
     while (auto frame = recycled_.try_pop()) camera_->recycle(std::move(*frame));
     Result<std::optional<Frame>> frame = camera_->read_once(timeout);
     if (!frame) return tl::unexpected(frame.error());
@@ -29,17 +28,18 @@ class CameraDevice final : public Device {
     return 1;
   }
 
+  [[nodiscard]] bool has_new_settings() const override { return light_.has_update(); }
+  void apply_settings() override {
+    const Result<void> set = camera_->set_light(light_.receive());
+    refused_light_ = set ? "" : set.error().message;
+  }
+
   [[nodiscard]] SensorTotals counters() const override { return camera_->counters(); }
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     return refused_light_.empty() ? camera_->diagnosis() : refused_light_;
   }
 
  private:
-  void set_light() {
-    const Result<void> set = camera_->set_light(light_.receive());
-    refused_light_ = set ? "" : set.error().message;
-  }
-
   std::unique_ptr<Camera> camera_;
   LiveLight& light_;
   const Clock& clock_;

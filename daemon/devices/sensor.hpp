@@ -26,6 +26,10 @@ class Device {
   /// Waits at most `timeout` and forwards what arrives. Returns the number of measurements. An
   /// error means that the device is gone.
   [[nodiscard]] virtual Result<std::size_t> read_once(std::chrono::milliseconds timeout) = 0;
+  /// Whether settings wait that change while it is open, as a camera's light.
+  [[nodiscard]] virtual bool has_new_settings() const { return false; }
+  /// Applies them. May take seconds, so it is called on a thread of its own, while nothing else is.
+  virtual void apply_settings() {}
   /// Since it was opened.
   [[nodiscard]] virtual SensorTotals counters() const = 0;
   /// One sentence on what is wrong with the data, if anything.

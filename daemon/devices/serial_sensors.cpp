@@ -283,12 +283,13 @@ OpenDevice configured_imu(const ImuSensorSettings& settings, const Clock& clock,
 
 /// A device that was unplugged is found again, also under another port name.
 Sensor serial_sensor(const std::string& name, const std::string& port, int baud,
-                     const OpenDevice& device, const std::string& by_id) {
+                     const OpenDevice& device, DeviceName& found) {
+  found.configure(port);
   Sensor sensor;
   sensor.name = name;
   sensor.silence_hint =
       fmt::format("{}: silent: is it powered and wired, and is {}.baud right?", port, name);
-  sensor.open = [=, found = DeviceName(port, by_id)]() mutable -> Result<std::unique_ptr<Device>> {
+  sensor.open = [=, &found]() -> Result<std::unique_ptr<Device>> {
     if (port.empty()) return fail(ErrorCode::kConfig, fmt::format("no device: set {}.port", name));
     return SerialPort::open(found.path_to_open(), baud).map([&](SerialPort&& opened) {
       found.remember_link();
@@ -312,16 +313,16 @@ ImuSensorSettings imu_sensor_settings(const Config& config) {
 }
 
 Sensor uwb_sensor(const UwbSensorSettings& settings, const Clock& clock, const EventSink& sink,
-                  const std::string& by_id) {
+                  DeviceName& name) {
   return serial_sensor("uwb", settings.device.port, settings.device.baud,
-                       configured_uwb(settings, clock, sink), by_id);
+                       configured_uwb(settings, clock, sink), name);
 }
 
 Sensor imu_sensor(const ImuSensorSettings& settings, const Clock& clock, const EventSink& sink,
-                  const std::string& by_id) {
+                  DeviceName& name) {
   if (settings.device.protocol == ImuProtocol::kIio) return iio_sensor(settings, clock, sink);
   return serial_sensor("imu", settings.device.port, settings.device.baud,
-                       configured_imu(settings, clock, sink), by_id);
+                       configured_imu(settings, clock, sink), name);
 }
 
 }  // namespace crepes

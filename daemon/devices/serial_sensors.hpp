@@ -35,11 +35,12 @@ struct ImuSensorSettings {
 [[nodiscard]] UwbSensorSettings uwb_sensor_settings(const Config& config);
 [[nodiscard]] ImuSensorSettings imu_sensor_settings(const Config& config);
 
-/// `clock` must outlive the sensor. The links in `by_id` identify a device that was unplugged and
-/// has returned under another name.
+/// `clock` and `name` must outlive the sensor. `name` identifies a device that was unplugged and
+/// has returned under another name. It is the same one for each new sensor of the same kind, so
+/// that new settings do not lose the device.
 [[nodiscard]] Sensor uwb_sensor(const UwbSensorSettings& settings, const Clock& clock,
-                                const EventSink& sink, const std::string& by_id = kSerialById);
+                                const EventSink& sink, DeviceName& name);
 [[nodiscard]] Sensor imu_sensor(const ImuSensorSettings& settings, const Clock& clock,
-                                const EventSink& sink, const std::string& by_id = kSerialById);
+                                const EventSink& sink, DeviceName& name);
 
 }  // namespace crepes

@@ -29,7 +29,9 @@ void append_block(std::string& text, std::string_view kind, std::string_view con
 
 Result<void> BlockStream::request(std::string_view request) {
   const std::string line = std::string(request) + '\n';
-  if (::send(socket_.get(), line.data(), line.size(), MSG_NOSIGNAL) < 0) return failure();
+  const bool is_sent = ::send(socket_.get(), line.data(), line.size(), MSG_NOSIGNAL) >= 0;
+  // A daemon that has hung up may have said why, which can still be received.
+  if (!is_sent && errno != EPIPE) return failure();
   return {};
 }
 

@@ -23,7 +23,7 @@ class BlockStream {
  public:
   explicit BlockStream(UniqueFd socket) : socket_(std::move(socket)) {}
 
-  /// Sends a line.
+  /// Sends a line. A daemon that has hung up is no error here: `receive` has its last words.
   [[nodiscard]] Result<void> request(std::string_view request);
   /// Waits at most `patience_ms` for data. Returns false once the daemon has closed the connection.
   [[nodiscard]] Result<bool> receive(int patience_ms);

@@ -48,7 +48,9 @@ Result<UniqueFd> listen_unix(const std::string& path) {
   Result<UniqueFd> socket = open_with(path, SOCK_NONBLOCK, ::bind);
   if (!socket && errno == EADDRINUSE) {
     if (!is_socket(path)) return fail(ErrorCode::kConfig, path + ": is there and is no socket");
-    if (connect_unix(path)) return fail(ErrorCode::kIo, path + ": another daemon listens there");
+    // EAGAIN: others wait there already.
+    if (connect_unix(path, SOCK_NONBLOCK) || errno == EAGAIN)
+      return fail(ErrorCode::kIo, path + ": another daemon listens there");
     if (errno != ECONNREFUSED || ::unlink(path.c_str()) != 0) return failure(path);
     socket = open_with(path, SOCK_NONBLOCK, ::bind);
   }

@@ -19,10 +19,10 @@ UdpSocket* MeshSocket::get(Timestamp now) {
     close_for_retry(opened.error(), now);
     return nullptr;
   }
-  // Only a broadcast shows that a socket can be used again. Other faults end here, because a robot
-  // without a tilt sends nothing.
+  // Only use shows that a socket can be used again; see also follow_address.
   if (!failed_in_use_) end_fault();
   socket_ = std::move(*opened);
+  opened_ = now;
   return &*socket_;
 }
 
@@ -30,7 +30,11 @@ void MeshSocket::follow_address(Timestamp now) {
   if (!socket_) return;
   const Result<Endpoint> address = UdpSocket::broadcast_address(config_.interface, port());
   if (!address) return close_for_retry(address.error(), now);
-  if (*address == socket_->local()) return;
+  if (*address == socket_->local()) {
+    constexpr Duration kTrialTime = std::chrono::seconds{1};
+    if (now - opened_ >= kTrialTime) end_fault();  // a robot without a tilt sends nothing
+    return;
+  }
   log_message(LogLevel::kWarning, fmt::format("mesh: {}: another address; datagrams go to {} now",
                                               config_.interface, address->to_string()));
   socket_.reset();

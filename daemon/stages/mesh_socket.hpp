@@ -34,7 +34,8 @@ class MeshSocket {
   /// Closes the socket after an error and schedules the next attempt.
   void close_for_retry(const Error& error, Timestamp now);
   /// Opens the socket anew if its interface has got another address, which no error shows: what is
-  /// sent to the old one is lost. Once a second is enough.
+  /// sent to the old one is lost. Ends the fault of a socket that has been open for a second. Once
+  /// a second is enough.
   void follow_address(Timestamp now);
   /// Call it after a successful broadcast.
   void end_fault();
@@ -64,6 +65,7 @@ class MeshSocket {
   std::string fault_;
   Timestamp retry_at_ = kNever;
   Duration retry_ = kFirstRetry;
+  Timestamp opened_{};
   bool failed_in_use_ = false;  ///< the current fault is one of an open socket
   std::string logged_keys_;
 };

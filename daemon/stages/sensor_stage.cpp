@@ -23,6 +23,17 @@ constexpr Duration kHealthyAfter =
 constexpr Duration kSilence = milliseconds{1500};
 constexpr milliseconds kReadTimeout{50};
 
+/// Runs work that may take seconds on its own thread, so that the loop keeps iterating for the
+/// watchdog.
+template <class Work>
+auto run_on_own_thread(const StageContext& context, const std::string& name, const Work& work) {
+  BoundedQueue<decltype(work())> done{1, Overflow::kDropOldest};
+  const Worker worker(name, [&](const std::stop_token& /*stop*/) { done.push(work()); });
+  auto result = done.try_pop();
+  for (; !result; result = done.pop_for(milliseconds{100}, {})) context.iterations.add();
+  return std::move(*result);
+}
+
 /// Reads until the device fails (returns the error), or until `stop` or new settings (no error). A
 /// fault is published within two seconds.
 Result<void> read_device(Device& device, const Sensor& sensor, const SensorSource& source,
@@ -32,6 +43,12 @@ Result<void> read_device(Device& device, const Sensor& sensor, const SensorSourc
   Timestamp last_look = last_heard;
   while (!stop.stop_requested() && !source.has_new_settings()) {
     context.iterations.add();
+    if (device.has_new_settings()) {
+      run_on_own_thread(context, sensor.name + " set", [&device] {
+        device.apply_settings();
+        return true;
+      });
+    }
     const Result<std::size_t> count = device.read_once(kReadTimeout);
     if (!count) return tl::unexpected(count.error());
     health.count(*count);
@@ -54,17 +71,6 @@ void back_off(Duration wait, const SensorSource& source, const StageContext& con
     context.iterations.add();
     wait_for(milliseconds{100}, stop);
   }
-}
-
-/// Runs work that may take seconds on its own thread, so that the loop keeps iterating for the
-/// watchdog.
-template <class Work>
-auto run_on_own_thread(const StageContext& context, const std::string& name, const Work& work) {
-  BoundedQueue<decltype(work())> done{1, Overflow::kDropOldest};
-  const Worker worker(name, [&](const std::stop_token& /*stop*/) { done.push(work()); });
-  auto result = done.try_pop();
-  for (; !result; result = done.pop_for(milliseconds{100}, {})) context.iterations.add();
-  return std::move(*result);
 }
 
 }  // namespace

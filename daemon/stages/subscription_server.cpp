@@ -55,6 +55,7 @@ void SubscriptionServer::reconfigure(const std::map<RobotId, std::string>& names
   service_.reconfigure(config);
   if (config.push != push_configs_ || names != names_) {
     pushes_.clear();
+    push_faults_.clear();
     for (const PushConfig& push : config.push) pushes_.emplace_back(push, self_, names);
   }
   push_configs_ = config.push;
@@ -65,6 +66,7 @@ void SubscriptionServer::reconfigure(const std::map<RobotId, std::string>& names
 void SubscriptionServer::open_missing() {
   std::string fault = open_listen();
   append(fault, open_push());
+  for (const auto& [target, error] : push_faults_) append(fault, "push: " + error);
   if (fault == fault_) return;
   if (fault.empty()) {
     log_message(LogLevel::kInfo, "subscription: works again");
@@ -126,19 +128,27 @@ void SubscriptionServer::serve(Timestamp now) {
 void SubscriptionServer::publish(const std::vector<NeighborPose>& poses, Timestamp now) {
   for (const NeighborPose& pose : poses) {
     for (const PoseDelivery& delivery : service_.deliveries(pose.neighbor, pose.stamp, now)) {
-      send(delivery.socket, pose_json(delivery.sequence, self_, names_[pose.neighbor], pose),
-           delivery.client);
-      ++poses_;
+      const std::string json = pose_json(delivery.sequence, self_, names_[pose.neighbor], pose);
+      if (send(delivery.socket, json, delivery.client)) ++poses_;
     }
   }
   for (PosePush& push : pushes_) {
     auto& socket = push.target().is_ipv4() ? push_ipv4_ : push_ipv6_;
     if (!socket) continue;
-    for (const std::string& json : push.datagrams(poses)) {
-      if (!socket->send_to(bytes_of(json), push.target())) ++unsent_;
-      ++pushed_;
-    }
+    for (const std::string& json : push.datagrams(poses))
+      note_push(push.target(), socket->send_to(bytes_of(json), push.target()));
   }
+}
+
+/// A system that is busy is no fault of the target's.
+void SubscriptionServer::note_push(const Endpoint& target, const Result<void>& sent) {
+  if (sent) {
+    ++pushed_;
+    push_faults_.erase(target);
+    return;
+  }
+  ++unsent_;
+  if (sent.error().code != ErrorCode::kBusy) push_faults_[target] = sent.error().message;
 }
 
 std::vector<int> SubscriptionServer::descriptors() const {
@@ -166,9 +176,11 @@ std::size_t SubscriptionServer::index_of(const Way& way) {
 }
 
 /// A client hears only the address that it asked.
-void SubscriptionServer::send(std::size_t way, const std::string& json, const Endpoint& to) {
+bool SubscriptionServer::send(std::size_t way, const std::string& json, const Endpoint& to) {
   const auto& [socket, own] = ways_.at(way);
-  if (!sockets_[socket].send_to(bytes_of(json), to, own)) ++unsent_;
+  const bool is_sent = sockets_[socket].send_to(bytes_of(json), to, own).has_value();
+  if (!is_sent) ++unsent_;
+  return is_sent;
 }
 
 }  // namespace crepes

@@ -25,7 +25,7 @@ class SubscriptionServer {
   /// same.
   void reconfigure(const std::map<RobotId, std::string>& names, const SubscriptionConfig& config);
 
-  /// Opens what could not be opened yet; call it about once a second. Changes of `fault` are
+  /// Opens what could not be opened yet; call it about once a second. Updates `fault`; changes are
   /// logged.
   void open_missing();
 
@@ -36,7 +36,8 @@ class SubscriptionServer {
 
   /// For poll(2).
   [[nodiscard]] std::vector<int> descriptors() const;
-  /// The addresses that cannot be served now; empty without any.
+  /// The addresses that cannot be served, and why poses cannot be pushed, as of the last
+  /// `open_missing`; empty without either.
   [[nodiscard]] const std::string& fault() const { return fault_; }
   /// Totals by name.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
@@ -53,7 +54,9 @@ class SubscriptionServer {
     [[nodiscard]] bool operator==(const Way&) const = default;
   };
   [[nodiscard]] std::size_t index_of(const Way& way);
-  void send(std::size_t way, const std::string& json, const Endpoint& to);
+  /// Returns whether it was sent.
+  bool send(std::size_t way, const std::string& json, const Endpoint& to);
+  void note_push(const Endpoint& target, const Result<void>& sent);
 
   RobotId self_;
   std::map<RobotId, std::string> names_;
@@ -66,6 +69,7 @@ class SubscriptionServer {
   std::vector<PosePush> pushes_;
   std::optional<UdpSocket> push_ipv4_;
   std::optional<UdpSocket> push_ipv6_;
+  std::map<Endpoint, std::string> push_faults_;  ///< of the last datagram to a target
   std::string fault_;
   std::uint64_t poses_ = 0;
   std::uint64_t pushed_ = 0;

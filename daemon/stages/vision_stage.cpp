@@ -49,13 +49,17 @@ Picture picture_of(const Frame& frame, const Detection& found) {
           .saturated_share = found.saturated_share};
 }
 
+std::string_view calibration_hint(bool is_calibrated) {
+  return is_calibrated ? ""
+                       : "not calibrated: no pose comes from this camera; record, then crepesctl "
+                         "calibrate camera";
+}
+
 std::string_view diagnosis_of(const Detection& found, bool is_calibrated) {
   if (!found.failure.empty()) return found.failure;
   if (found.exposure == Exposure::kBright)
     return "the picture is bright all over: shorten the exposure or mend the infrared filter";
-  return is_calibrated ? ""
-                       : "not calibrated: no pose comes from this camera; record, then crepesctl "
-                         "calibrate camera";
+  return calibration_hint(is_calibrated);
 }
 
 /// The gray levels of the spots since the last call.
@@ -117,29 +121,36 @@ void append_exposure(const AutoExposure& exposure, Totals& counts) {
   counts.emplace_back("longest_exposure_us", static_cast<std::uint64_t>(exposure.longest_us()));
 }
 
+/// What is true without a picture, too.
+SensorTotals totals_since_start(const Rejected& rejected, std::uint64_t failures) {
+  return {.faults = {{"failures", failures}},
+          .counts = {{"hot", rejected.hot},
+                     {"huge", rejected.huge},
+                     {"faint", rejected.faint},
+                     {"surplus", rejected.surplus},
+                     {"cut", rejected.cut}}};
+}
+
 SensorTotals totals_of(const Detection& found, const Rejected& rejected, std::uint64_t failures,
                        Delays& delays, SpotLevels& levels, const AutoExposure& exposure) {
   const auto [median_us, p99_us] = delays.percentiles_since_last_call();
-  SensorTotals totals{.faults = {{"failures", failures}},
-                      .counts = {{"delay_p50_us", median_us},
-                                 {"delay_p99_us", p99_us},
-                                 {"threshold", static_cast<std::uint64_t>(found.threshold)},
-                                 {"background", static_cast<std::uint64_t>(found.background)},
-                                 {"hot_pixels", found.hot_pixels.size()},
-                                 {"hot", rejected.hot},
-                                 {"huge", rejected.huge},
-                                 {"faint", rejected.faint},
-                                 {"surplus", rejected.surplus},
-                                 {"cut", rejected.cut}}};
+  SensorTotals totals = totals_since_start(rejected, failures);
+  totals.counts.insert(totals.counts.end(),
+                       {{"delay_p50_us", median_us},
+                        {"delay_p99_us", p99_us},
+                        {"threshold", static_cast<std::uint64_t>(found.threshold)},
+                        {"background", static_cast<std::uint64_t>(found.background)},
+                        {"hot_pixels", found.hot_pixels.size()}});
   levels.append_since_last_call(totals.counts);
   append_exposure(exposure, totals.counts);
   return totals;
 }
 
-/// What was published last. It stays while no frames come; only the rate falls to 0.
+/// What was published last. It stays for a second without a frame.
 struct Published {
   std::string message;
   SensorTotals totals;
+  Timestamp last_frame{};
 };
 
 }  // namespace
@@ -164,7 +175,13 @@ void run_vision(const VisionStage& stage, const StageContext& context,
     }
     std::optional<Frame> frame = stage.frames.pop_for(milliseconds{100}, stop);
     if (!frame) {
-      if (last && health.is_due()) health.publish(last->message, last->totals);
+      constexpr Duration kStale = std::chrono::seconds{1};
+      if (!last || !health.is_due()) continue;
+      if (context.clock.now() - last->last_frame >= kStale) {
+        last->message = calibration_hint(stage.is_calibrated);
+        last->totals = totals_since_start(rejected, failures);
+      }
+      health.publish(last->message, last->totals);
       continue;
     }
     const Detection found =
@@ -185,6 +202,7 @@ void run_vision(const VisionStage& stage, const StageContext& context,
               .totals = totals_of(found, rejected, failures, delays, levels, exposure)};
       health.publish(last->message, last->totals);
     }
+    if (last) last->last_frame = context.clock.now();
     if (stage.tap.requests.try_pop()) stage.tap.pictures.push(picture_of(*frame, found));
     stage.recycled.push(std::move(*frame));
   }

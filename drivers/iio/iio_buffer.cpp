@@ -264,8 +264,9 @@ std::optional<Timestamp> IioBuffer::stamp_of(std::int64_t stamp_ns, Timestamp ar
   Timestamp stamp{Duration{stamp_ns}};
   if (is_monotonic_) {
     if (stamp > arrival + kAhead || stamp < arrival - kOldest) {
-      wrong_stamps_ = fmt::format("{}: its stamps are {:.3f} s from the time of arrival",
-                                  device_.title(), to_seconds(stamp - arrival));
+      wrong_stamps_ = fmt::format(
+          "{}: its stamps are more than {:g} s before or {:g} s after the time of arrival",
+          device_.title(), to_seconds(kOldest), to_seconds(kAhead));
       return std::nullopt;
     }
     stamp = std::min(stamp, arrival);

@@ -63,6 +63,12 @@ std::optional<std::string> process_using(const std::string& device) {
   return holder;
 }
 
+void DeviceName::configure(const std::string& configured) {
+  if (configured == configured_) return;
+  configured_ = configured;
+  by_id_link_.reset();
+}
+
 std::string DeviceName::path_to_open() const {
   if (!by_id_link_) return configured_;
   // Adapters without a serial number share one link. If it now refers to another adapter, the

@@ -25,6 +25,8 @@ class DeviceName {
   DeviceName(std::string configured, std::filesystem::path by_id)
       : configured_(std::move(configured)), by_id_(std::move(by_id)) {}
 
+  /// Another device from now on, unless this one is configured already.
+  void configure(const std::string& configured);
   [[nodiscard]] std::string path_to_open() const;
   /// Call when `path_to_open()` has been opened.
   void remember_link();

@@ -60,7 +60,7 @@ void UwbRanges::forward(const UwbReading& reading, Timestamp arrival,
     }
     if (!is_plausible(distance)) {
       ++counts_.implausible;
-      refused_ = Refused{robot->second, distance.range_m, distance.age_ms};
+      refused_ = Refused{robot->second, distance.age_ms > kOldestRangeMs};
       continue;
     }
     ++counts_.ranges;
@@ -75,14 +75,15 @@ void UwbRanges::forward(const UwbReading& reading, Timestamp arrival,
 std::string UwbRanges::no_measurement_reason(std::string_view advice) const {
   if (!no_ranges_.empty())
     return fmt::format("the module sends {}, which has no ranges; {}", no_ranges_, advice);
-  if (refused_ && refused_->age_ms > kOldestRangeMs) {
-    return fmt::format("the range to robot {} is refused: it is {:.1f} s old",
-                       refused_->robot.value, refused_->age_ms * 1e-3);
+  // The limits alone: a text with what was measured would be logged as another fault each second.
+  if (refused_ && refused_->is_old) {
+    return fmt::format("the range to robot {} is refused: it is older than {:g} s",
+                       refused_->robot.value, kOldestRangeMs * 1e-3);
   }
   if (refused_) {
     return fmt::format(
-        "the range to robot {} is refused: {:g} m is not above 0 and up to uwb.max_range_m, {:g} m",
-        refused_->robot.value, refused_->range_m, max_range_m_);
+        "the range to robot {} is refused: it is not above 0 and up to uwb.max_range_m, {:g} m",
+        refused_->robot.value, max_range_m_);
   }
   if (stranger_) {
     return fmt::format(

@@ -73,8 +73,7 @@ class UwbRanges {
  private:
   struct Refused {
     RobotId robot;
-    double range_m = 0.0;
-    double age_ms = 0.0;
+    bool is_old = false;
   };
 
   /// The module at the far end from here; empty if this robot has no part in the distance.

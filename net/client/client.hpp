@@ -92,7 +92,8 @@ struct Status {
     double age_s = 0.0;
     double loss = 0.0;  ///< of the last seconds
   };
-  /// One neighbor of the robot.
+  /// One neighbor of the robot. Where STATUS has no room for more than its id, it has neither a
+  /// pose nor a reason: ask for it by itself.
   struct Neighbor {
     std::uint16_t peer = 0;
     std::string name;
@@ -113,12 +114,13 @@ struct Status {
     Totals counts;           ///< totals of zero are omitted; all are, where STATUS has no room
     bool calibrated = true;  ///< false: a camera whose lens is a guess
   };
-  /// The neighbor's clock minus ours.
+  /// The neighbor's clock minus ours. A STATUS of all neighbors may have no room for its rate and
+  /// its error; one of that neighbor has.
   struct Clock {
     std::uint16_t peer = 0;
     double offset_s = 0.0;
-    double skew_ppm = 0.0;
-    double sigma_s = 0.0;
+    std::optional<double> skew_ppm{};
+    std::optional<double> sigma_s{};
   };
   /// How datagrams between robots are protected, and their airtime.
   struct Mesh {

@@ -67,7 +67,8 @@ std::optional<Connection> Connection::open(const Address& daemon, const Requests
                                            std::string& fault) {
   const std::optional<sockaddr_in6> address = resolve(daemon);
   if (!address) {
-    fault = "'" + daemon.address + "' is not a numeric IPv4 or IPv6 address";
+    fault = "'" + daemon.address + "' is not a numeric IPv4 or IPv6 address: names are not " +
+            "resolved; say 127.0.0.1 for this machine";
     return std::nullopt;
   }
   // Not connected: its own address may change, and an absent daemon is no error of the socket.

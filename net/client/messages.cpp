@@ -116,9 +116,15 @@ Status::Sensor sensor_from(const json& object) {
           object.value("calibrated", true)};
 }
 
+std::optional<double> number_in(const json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end()) return std::nullopt;
+  return found->get<double>();
+}
+
 Status::Clock clock_from(const json& object) {
-  return {id_from(object.at("peer")), object.value("offset_s", 0.0), object.value("skew_ppm", 0.0),
-          object.value("sigma_s", 0.0)};
+  return {id_from(object.at("peer")), object.value("offset_s", 0.0), number_in(object, "skew_ppm"),
+          number_in(object, "sigma_s")};
 }
 
 Status::Mesh mesh_from(const json& object) {
@@ -156,7 +162,7 @@ std::map<std::string, Status::Residual> residuals_from(const json& object) {
   if (found == object.end()) return residuals;
   for (const auto& [kind, value] : found->items()) {
     Status::Residual& residual = residuals[kind];
-    if (value.contains("nis")) residual.nis = value["nis"].get<double>();
+    residual.nis = number_in(value, "nis");
     residual.fused = value.value("fused", residual.fused);
     residual.refused = value.value("refused", residual.refused);
   }
@@ -183,7 +189,7 @@ Status::TeamRobot team_robot_from(const json& object) {
 
 Status::Team team_from(const json& object) {
   Status::Team team;
-  if (object.contains("age_s")) team.age_s = object["age_s"].get<double>();
+  team.age_s = number_in(object, "age_s");
   for_each_of(object, "robots",
               [&](const json& robot) { team.robots.push_back(team_robot_from(robot)); });
   return team;

@@ -245,10 +245,23 @@ bool drop_last_fault(Json& status) {
   return true;
 }
 
-/// Reductions in order, the least important part first. Each applies only if the rest is still too
-/// long.
+/// A reduction of a STATUS.
+using Cut = void (*)(Json&);
+
+/// The text after reductions in order, the least important part first. Each applies only if the
+/// rest is still too long.
+std::string shortened(Json& status, std::span<const Cut> cuts) {
+  std::string text = dump(status);
+  for (const Cut cut : cuts) {
+    if (text.size() <= kMaxSubscriptionDatagram) return text;
+    status["truncated"] = true;
+    cut(status);
+    text = dump(status);
+  }
+  return text;
+}
+
 std::string fitted(Json status) {
-  using Cut = void (*)(Json&);
   constexpr std::array<Cut, 16> kCuts{
       [](Json& s) { erase_in_each(s, "sensors", "counts"); },
       [](Json& s) { erase_in_each(s, "neighbors", "measurements"); },
@@ -270,13 +283,7 @@ std::string fitted(Json status) {
       [](Json& s) { s.erase("clocks"); },
       [](Json& s) { erase_in_each(s, "neighbors", "faults"); },
   };
-  std::string text = dump(status);
-  for (const Cut cut : kCuts) {
-    if (text.size() <= kMaxSubscriptionDatagram) return text;
-    status["truncated"] = true;
-    cut(status);
-    text = dump(status);
-  }
+  std::string text = shortened(status, kCuts);
   while (text.size() > kMaxSubscriptionDatagram) {
     if (!drop_last_neighbor(status) && !drop_last(status, "more") && !drop_last_fault(status) &&
         !drop_last(status, "sensors"))
@@ -404,7 +411,15 @@ std::optional<std::string> pair_status_json(const SystemStatus& status, RobotId 
   if (neighbor == neighbors.end()) return std::nullopt;
   Json json = head_json(status);
   json["pair"] = pair_filter_json(*neighbor);
-  return dump(json);
+  constexpr std::array<Cut, 3> kCuts{
+      [](Json& s) {
+        s.erase("name");
+        s["pair"].erase("name");
+      },
+      [](Json& s) { s["pair"].erase("residuals"); },
+      [](Json& s) { s["pair"].erase("calibration"); },
+  };
+  return shortened(json, kCuts);
 }
 
 }  // namespace crepes

@@ -16,6 +16,7 @@
 #include "drivers/base/child_process.hpp"
 #include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
+#include "tests/clients/tool_run.hpp"
 #include "tests/support/live_daemon.hpp"
 #include "tests/support/places.hpp"
 
@@ -121,6 +122,20 @@ TEST_F(Clients, InEachLanguageGetThePosesThatAreTrue) {
     }
   } else {
     std::puts("not tried: nc is not installed (Debian: netcat-openbsd)");
+  }
+}
+
+TEST_F(Clients, EndTheirSubscriptionWhereNobodyReadsOn) {
+  expect_true_poses(first_);
+  for (const std::string& program :
+       {std::string(CREPES_CPP_CLIENT) + " 127.0.0.1 " + port_,
+        "PYTHONPATH=" + kClients + "/python /usr/bin/python3 -B -m crepes_client --port " +
+            port_}) {
+    SCOPED_TRACE(program);
+    for (int i = 0; i <= first_.subscription.max_per_address; ++i) {
+      const Ending ending = run("/bin/sh", {"-c", program + " | head -n 1"});
+      EXPECT_NE(ending.output, "") << ending.errors;
+    }
   }
 }
 

@@ -4,6 +4,7 @@ import asyncio
 import json
 import pathlib
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -236,6 +237,32 @@ class OverLoopback(unittest.TestCase):
                 asyncio.run(first_of(daemon.port))
         with self.assertRaises(TimeoutError):
             asyncio.run(first_of(daemon.port, patience_s=0.0))
+
+
+class TheProgram(unittest.TestCase):
+    def run_until_a_pose(self, daemon):
+        words = [sys.executable, "-B", "-m", "crepes_client", "--port", str(daemon.port)]
+        running = subprocess.Popen(words, env={"PYTHONPATH": str(PYTHON)}, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True,
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+        self.addCleanup(running.stderr.close)
+        self.assertIn("direct", running.stdout.readline())
+        return running
+
+    def test_ends_its_subscription_when_it_is_stopped(self):
+        for stop in (signal.SIGTERM, signal.SIGINT):
+            with StandIn(VERSION, POSE) as daemon, self.run_until_a_pose(daemon) as running:
+                running.send_signal(stop)
+
+                self.assertTrue(daemon.ended.wait(10.0))
+                self.assertEqual((running.wait(10.0), running.stderr.read()), (0, ""))
+
+    def test_ends_its_subscription_when_nobody_reads_its_poses(self):
+        with StandIn(VERSION, POSE) as daemon, self.run_until_a_pose(daemon) as running:
+            running.stdout.close()
+
+            self.assertTrue(daemon.ended.wait(10.0))
+            self.assertEqual((running.wait(10.0), running.stderr.read()), (0, ""))
 
 
 class TheExamples(unittest.TestCase):

@@ -8,6 +8,7 @@
 
 #include "config/keys/robot_key.hpp"
 #include "daemon/runtime.hpp"
+#include "daemon/service/robot_lock.hpp"
 #include "tests/clients/tool_run.hpp"
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 #include "tests/support/places.hpp"
@@ -197,6 +198,35 @@ TEST_F(OneRobot, IsWatchedOnceInJsonThoughItsNeighborIsMissing) {
 
   EXPECT_EQ(once.how, "exit code 0");
   EXPECT_NE(once.output.find("STATUS"), std::string::npos) << once.output;
+}
+
+TEST_F(OneRobot, EndsTheSubscriptionOfAWatchThatNobodyReads) {
+  const Config config = pair_config(1, mesh_port_);
+  const Runtime runtime(config, machine_);
+  EXPECT_TRUE(Client(config).await_status([](const Json&) { return true; }));
+  const std::string watch =
+      crepesctl_path() + " watch --json --port " + std::to_string(config.subscription.port);
+
+  for (int i = 0; i <= config.subscription.max_per_address; ++i) {
+    const Ending ending = run("/bin/sh", {"-c", watch + " | head -n 1"});
+    EXPECT_NE(ending.output, "");
+    EXPECT_EQ(ending.output.find("ERROR"), std::string::npos) << ending.output;
+  }
+}
+
+TEST(ToolsAlone, LeaveARobotToTheDaemonThatHasItsId) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const Config config = pair_config(1, free_port());
+  const std::string file = scratch.path() / "crepesd.yaml";
+  std::ofstream(file) << write_config(config);
+  const auto lock = RobotLock::claim(config.robot.id, config.net.interface, config.net.port);
+  ASSERT_TRUE(lock) << lock.error().message;
+
+  const Ending ending = run(crepesd_path(), {"--config", file});
+
+  // Not one of the service's RestartPreventExitStatus.
+  EXPECT_EQ(ending.how, "exit code 3") << ending.errors;
+  EXPECT_NE(ending.errors.find("already runs on this machine"), std::string::npos);
 }
 
 TEST(ToolsAlone, ReplayNothingWhereNoRowOfASensorIsGood) {

@@ -57,6 +57,20 @@ TEST_F(DeviceNameTest, FollowsTheDeviceToAnotherTty) {
   EXPECT_TRUE(fs::equivalent(name.path_to_open(), tty(1)));
 }
 
+TEST_F(DeviceNameTest, ForgetsTheDeviceOnlyForAnother) {
+  plug("usb-LinkTrack", 0);
+  DeviceName name(tty(0), by_id());
+  name.remember_link();
+  unplug("usb-LinkTrack", 0);
+  plug("usb-LinkTrack", 1);
+
+  name.configure(tty(0));
+  EXPECT_EQ(name.path_to_open(), link("usb-LinkTrack"));
+
+  name.configure(tty(5));
+  EXPECT_EQ(name.path_to_open(), tty(5));
+}
+
 TEST_F(DeviceNameTest, KeepsTheConfiguredPathWhereNoLinkPointsAtIt) {
   plug("usb-IMU", 1);
   std::ofstream{tty(0)};

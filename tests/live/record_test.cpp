@@ -154,6 +154,39 @@ TEST_F(Record, HasTheClocksInCaseItIsKilled) {
   EXPECT_EQ(recorded->end_reason, "ended");
 }
 
+TEST_F(Record, AsksForTheClocksWhereTheDaemonIsReached) {
+  const Runtime runtime_2(recorded_config(2), machine_);
+  for (const std::vector<std::string>& listen :
+       {std::vector<std::string>{"192.0.2.1", "127.0.0.1"}, std::vector<std::string>{"0.0.0.0"}}) {
+    SCOPED_TRACE(listen.front());
+    Config first = recorded_config(1);
+    first.subscription.listen = listen;
+    const Runtime runtime_1(first, machine_);
+    expect_true_poses(first);
+    RecordOptions wanted = options(first, 1.0);
+    wanted.dir += listen.front();
+
+    const auto recorded = record(wanted);
+
+    ASSERT_TRUE(recorded) << recorded.error().message;
+    EXPECT_EQ(recorded->warning, "");
+    const std::string manifest = text_of(wanted.dir / "swarm.yaml");
+    EXPECT_NE(manifest.find("# - {id: 2"), std::string::npos) << manifest;
+  }
+}
+
+TEST_F(Record, SaysThatClocksAreMissing) {
+  Config config = recorded_config(1);
+  config.subscription.listen.clear();
+  const Runtime runtime(config, machine_);
+  await_socket(config);
+
+  const auto recorded = record(options(config, 1.0));
+
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  EXPECT_NE(recorded->warning.find("no STATUS from"), std::string::npos) << recorded->warning;
+}
+
 TEST_F(Record, CanBeReplayedThoughASensorWasSilent) {
   Config config = recorded_config(1);
   config.uwb.noise.max_range_m = 1.0;  // nobody is so near

@@ -130,7 +130,8 @@ TEST(UdpSocket, ReachesTheNetworkOfItsInterfaceAndNothingElse) {
         "ip link add mesh0 type veth peer mesh1 && ip link add up0 type veth peer up1 && "
         "ip address add 10.9.0.1/24 dev mesh0 && ip address add 192.168.50.1/24 dev up0 && "
         "ip link set mesh1 up && ip link set up1 up && "
-        "ip link set mesh0 up && ip link set up0 up && ip route add default via 192.168.50.2");
+        "ip link set mesh0 up && ip link set up0 up && ip route add default via 192.168.50.2 && "
+        "timeout 5 sh -c \"until ip link show mesh0 | grep -q 'state UP'; do sleep 0.01; done\"");
     if (!is_permitted) return;
     auto socket = UdpSocket::open_broadcast("mesh0", some_port());
     ASSERT_TRUE(socket) << socket.error().message;
@@ -144,6 +145,23 @@ TEST(UdpSocket, ReachesTheNetworkOfItsInterfaceAndNothingElse) {
     EXPECT_NE(sent.error().code, ErrorCode::kBusy);
   }).join();
   if (!is_permitted) GTEST_SKIP() << "needs root and ip(8) for a network of its own";
+}
+
+TEST(UdpSocket, DoesNotOpenWithoutACarrier) {
+  bool is_permitted = false;
+  std::optional<Error> refusal;
+  std::thread([&] {
+    is_permitted = have_network(
+        "ip link add mesh0 type veth peer mesh1 && ip link set mesh0 up && "
+        "ip address add 10.9.0.1/24 dev mesh0");
+    if (!is_permitted) return;
+    const auto socket = UdpSocket::open_broadcast("mesh0", some_port());
+    if (!socket) refusal = socket.error();
+  }).join();
+  if (!is_permitted) GTEST_SKIP() << "needs root and ip(8) for a network of its own";
+
+  ASSERT_TRUE(refusal);
+  EXPECT_NE(refusal->message.find("no carrier"), std::string::npos) << refusal->message;
 }
 
 TEST(UdpSocket, AnswersFromTheAddressThatWasAsked) {

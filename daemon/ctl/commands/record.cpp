@@ -25,6 +25,7 @@ std::string text_of(const RecordSummary& summary) {
     text += fmt::format("{} events are missing: the disk was too slow\n", progress.missing);
   if (progress.configurations > 1)
     text += "the daemon was reloaded meanwhile; crepesd.yaml is what it ended with\n";
+  if (!summary.warning.empty()) text += summary.warning + "\n";
   return text;
 }
 
@@ -37,7 +38,8 @@ std::string json_of(const RecordSummary& summary) {
                     {"pictures", progress.pictures},
                     {"bytes", progress.bytes},
                     {"missing", progress.missing},
-                    {"configurations", progress.configurations}});
+                    {"configurations", progress.configurations},
+                    {"warning", summary.warning}});
 }
 
 Result<void> run_record(RecordOptions options, bool json) {

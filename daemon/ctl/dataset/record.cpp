@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <system_error>
 #include <utility>
@@ -20,6 +21,7 @@
 #include "drivers/base/monotonic_clock.hpp"
 #include "drivers/base/number_text.hpp"
 #include "drivers/dataset/robot_folder.hpp"
+#include "net/endpoint.hpp"
 
 namespace crepes {
 namespace {
@@ -67,7 +69,9 @@ class Recording {
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] bool has_begun() const { return first_ <= last_; }
   [[nodiscard]] RecordSummary summary(std::string why) const {
-    return {progress(), folder_ ? folder_->path() : dir_, std::move(why)};
+    return {.progress = progress(),
+            .folder = folder_ ? folder_->path() : dir_,
+            .end_reason = std::move(why)};
   }
   [[nodiscard]] RecordProgress progress() const {
     RecordProgress progress = progress_;
@@ -152,44 +156,111 @@ class Recording {
   RecordProgress progress_;
 };
 
-/// Polls the status once a second; empty if there is no socket to do so.
-std::optional<client::Connection> connect_to(const SubscriptionConfig& subscription) {
-  if (subscription.listen.empty()) return std::nullopt;
-  auto daemon =
-      connect({subscription.listen.front(), static_cast<std::uint16_t>(subscription.port)},
-              {.watch = false, .polls = {{}}});
-  if (!daemon) return std::nullopt;
-  return std::move(*daemon);
+/// Where a program on this machine reaches a daemon that listens at `address`.
+std::string address_to_ask(const std::string& address) {
+  const auto endpoint = Endpoint::parse(address, 0);
+  if (!endpoint || !endpoint->is_any()) return address;
+  return endpoint->is_ipv4() ? "127.0.0.1" : "::1";
 }
 
-/// The peers' clocks as the daemon knows them; empty without an answer.
-std::vector<client::Status::Clock> ask_for_clocks(const SubscriptionConfig& subscription) {
-  auto daemon = connect_to(subscription);
-  if (!daemon) return {};
-  for (int i = 0; i < 10; ++i) {
-    const auto answer = daemon->receive(50ms);
-    const auto* status = answer ? std::get_if<client::Status>(&answer->message) : nullptr;
-    if (status != nullptr) return status->clocks;
-  }
-  return {};
+/// All other members of the robot's swarm.
+std::vector<std::uint16_t> peers_of(const Config& config) {
+  std::vector<std::uint16_t> peers;
+  for (const MemberConfig& member : config.swarm.members)
+    if (member.id != config.robot.id) peers.push_back(member.id.value);
+  return peers;
 }
 
-/// The peers' clocks, as the daemon reported them last. Asks once a second and never waits, because
-/// the measurements do not, either.
+/// The peers' clocks, as the daemon reported them last. Asks for each peer, because a STATUS of all
+/// may have no room for the rates of the clocks. Where the daemon serves several addresses, a
+/// silent one is left for the next.
 class KnownClocks {
  public:
-  void update(const SubscriptionConfig& subscription) {
-    if (!daemon_) daemon_ = connect_to(subscription);
-    while (auto answer = daemon_ ? daemon_->receive(0ms) : std::nullopt) {
-      auto* status = std::get_if<client::Status>(&answer->message);
-      if (status != nullptr && !status->clocks.empty()) clocks_ = std::move(status->clocks);
+  /// Never waits, because the measurements do not, either.
+  void update(const Config& config) {
+    constexpr std::chrono::seconds kSilence{4};
+    if (!daemon_ || daemon_->silent_for() > kSilence) connect_to_next(config);
+    if (!daemon_) return;
+    if (peers_ != peers_of(config)) ask(config);
+    while (const auto answer = daemon_->receive(0ms)) take(*answer);
+  }
+
+  /// Asks again, and waits for the answers: half a second for each address.
+  void refresh(const Config& config) {
+    for (std::size_t i = 0; i < config.subscription.listen.size(); ++i) {
+      if (i > 0 || !daemon_) {
+        connect_to_next(config);
+      } else {
+        ask(config);
+      }
+      if (daemon_ && takes_answers_of_all()) return;
     }
   }
-  [[nodiscard]] const std::vector<client::Status::Clock>& clocks() const { return clocks_; }
+
+  [[nodiscard]] std::vector<client::Status::Clock> clocks() const {
+    std::vector<client::Status::Clock> clocks;
+    for (const auto& [peer, clock] : clocks_) clocks.push_back(clock);
+    return clocks;
+  }
+  /// Why there are no clocks; empty if the daemon has answered or has no peers.
+  [[nodiscard]] std::string fault(const Config& config) const {
+    if (is_answered_ || peers_of(config).empty()) return "";
+    std::string asked;
+    for (const std::string& address : config.subscription.listen)
+      asked += (asked.empty() ? "" : ", ") + address_to_ask(address);
+    return fmt::format("no STATUS from {} port {}, so swarm.yaml has no clocks of other robots",
+                       asked.empty() ? "subscription.listen, which is empty," : asked,
+                       config.subscription.port);
+  }
 
  private:
+  [[nodiscard]] client::Requests requests() const {
+    constexpr double kPollPeriod = 2.0;  // a daemon answers 50 requests a second
+    client::Requests requests{.watch = false};
+    for (const std::uint16_t peer : peers_)
+      requests.polls.push_back({.peer = peer, .period_s = kPollPeriod});
+    return requests;
+  }
+  void ask(const Config& config) {
+    peers_ = peers_of(config);
+    daemon_->ask(requests());
+  }
+  void connect_to_next(const Config& config) {
+    daemon_.reset();
+    const SubscriptionConfig& served = config.subscription;
+    if (served.listen.empty()) return;
+    peers_ = peers_of(config);
+    auto daemon = connect({address_to_ask(served.listen[next_++ % served.listen.size()]),
+                           static_cast<std::uint16_t>(served.port)},
+                          requests());
+    if (daemon) daemon_ = std::move(*daemon);
+  }
+  void take(const client::Answer& answer) {
+    const auto* status = std::get_if<client::Status>(&answer.message);
+    if (status == nullptr) return;
+    is_answered_ = true;
+    for (const client::Status::Clock& clock : status->clocks) clocks_[clock.peer] = clock;
+  }
+  /// Whether any has come.
+  [[nodiscard]] bool takes_answers_of_all() {
+    constexpr Duration kAnswerTime = 500ms;
+    const MonotonicClock clock;
+    const Timestamp end = clock.now() + kAnswerTime;
+    std::size_t answers = 0;
+    while (clock.now() < end && answers < peers_.size()) {
+      const auto answer = daemon_->receive(50ms);
+      if (!answer) continue;
+      take(*answer);
+      ++answers;
+    }
+    return answers > 0;
+  }
+
   std::optional<client::Connection> daemon_;
-  std::vector<client::Status::Clock> clocks_;
+  std::size_t next_ = 0;  ///< of the addresses, the one to ask next
+  std::vector<std::uint16_t> peers_;
+  std::map<std::uint16_t, client::Status::Clock> clocks_;
+  bool is_answered_ = false;
 };
 
 /// Why the recording ends now; empty while it continues.
@@ -226,7 +297,7 @@ Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recor
     if (std::string why = end_reason(options, recording.progress(), elapsed, signals); !why.empty())
       return why;
     if (!*goes_on) return "the daemon hung up";
-    if (recording.has_begun()) known.update(recording.config().subscription);
+    if (recording.has_begun()) known.update(recording.config());
     if (clock.now() < next_manifest) continue;
     next_manifest = clock.now() + kManifestPeriod;
     if (auto written = recording.write_manifest(known.clocks()); !written)
@@ -253,13 +324,14 @@ Result<RecordSummary> record(const RecordOptions& options) {
   Recording recording(options);
   KnownClocks known;
   const Result<std::string> why = run(options, daemon, recording, known, signals);
-  auto clocks = ask_for_clocks(recording.config().subscription);
-  if (clocks.empty()) clocks = known.clocks();  // the daemon has ended
-  const Result<void> written = recording.write_manifest(clocks);
+  if (recording.has_begun()) known.refresh(recording.config());
+  const Result<void> written = recording.write_manifest(known.clocks());
   if (!why) return tl::unexpected(why.error());
   if (!written) return tl::unexpected(written.error());
   if (!recording.has_begun()) return fail(ErrorCode::kIo, "record: nothing came; " + *why);
-  return recording.summary(*why);
+  RecordSummary summary = recording.summary(*why);
+  summary.warning = known.fault(recording.config());
+  return summary;
 }
 
 }  // namespace crepes

@@ -46,6 +46,7 @@ struct RecordSummary {
   RecordProgress progress;
   std::filesystem::path folder;  ///< the robot's
   std::string end_reason;        ///< why it ended
+  std::string warning{};         ///< what the data set lacks; empty if nothing
 };
 
 /// Records until a signal, `duration_s`, `max_bytes`, `is_enough`, or the end of the daemon. `dir`

@@ -33,17 +33,20 @@ std::string recorded_manifest(const Config& config, const std::string& dir, Time
       "`clock`\n"
       "# of another robot: offset_s is its clock minus this one's, plus this one's offset_s.\n" +
       manifest_text(manifest);
-  if (!clocks.empty())
-    text += "# As this robot knew its peers' clocks; uncomment each robot whose folder is here:\n";
+  std::string peers;
   for (const client::Status::Clock& clock : clocks) {
+    if (!clock.skew_ppm) continue;
     // local = true (1 + skew) + offset, and at `last` local = last + clock.offset_s.
-    const double turned_s = manifest.duration_s * clock.skew_ppm * 1e-6;
-    const RobotClock peer{own.offset_s + clock.offset_s - turned_s, clock.skew_ppm};
+    const double turned_s = manifest.duration_s * *clock.skew_ppm * 1e-6;
+    const RobotClock peer{own.offset_s + clock.offset_s - turned_s, *clock.skew_ppm};
     const std::string name = name_of(config.swarm, RobotId{clock.peer});
-    text +=
+    peers +=
         "# " + robot_text({.id = RobotId{clock.peer}, .name = name, .dir = name, .clock = peer});
   }
-  return text;
+  if (peers.empty()) return text;
+  return text +
+         "# As this robot knew its peers' clocks; uncomment each robot whose folder is here:\n" +
+         peers;
 }
 
 }  // namespace crepes

@@ -12,6 +12,7 @@
 #include "daemon/ctl/live/camera_lights.hpp"
 #include "daemon/ctl/live/check/robot_check.hpp"
 #include "daemon/ctl/live/full_status.hpp"
+#include "daemon/ctl/live/light_advice.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/base/child_process.hpp"
@@ -102,8 +103,9 @@ std::string setting(const std::optional<double>& value) {
 
 /// The gray levels of a camera's spots; null while they are unknown.
 const StatusTotals* levels_of(const client::Status& status, const std::string& camera) {
-  const client::Status::Sensor* const spots = sensor_of(status, camera + " spots");
-  return spots == nullptr || spots->counts.empty() ? nullptr : &spots->counts;
+  const auto* const spots = sensor_of(status, camera + std::string(kSpotsSuffix));
+  const bool are_known = spots != nullptr && spots->rate_hz > 0.0 && !spots->counts.empty();
+  return are_known ? &spots->counts : nullptr;
 }
 
 std::string lights_table(const client::Status& status, const CameraLights& lights) {

@@ -4,6 +4,8 @@
 
 namespace crepes {
 
+bool is_spots(const client::Status::Sensor& sensor) { return sensor.name.ends_with(kSpotsSuffix); }
+
 std::string light_advice(const client::Status::Totals& counts) {
   constexpr std::uint64_t kBright = 60;  // gray levels of the darkest part of the picture
   constexpr std::uint64_t kWhite = 250;

@@ -11,8 +11,8 @@
 
 namespace crepes {
 
-/// Blocks SIGINT, SIGTERM and SIGHUP during its lifetime, so that child processes can be stopped
-/// first.
+/// Blocks SIGINT, SIGTERM, SIGHUP and SIGPIPE (of an output that nobody reads any more) during its
+/// lifetime, so that child processes and subscriptions can be ended first.
 class StopSignals {
  public:
   StopSignals();

@@ -78,8 +78,8 @@ std::string neighbors_of(const client::Status& status) {
         std::ranges::find(status.clocks, neighbor.peer, &client::Status::Clock::peer);
     const bool known = clock != status.clocks.end();
     row.push_back(known ? fixed(clock->offset_s, 6) : "-");
-    row.push_back(known ? fixed(1e3 * clock->sigma_s, 3) : "-");
-    row.push_back(known ? fixed(clock->skew_ppm, 1) : "-");
+    row.push_back(known && clock->sigma_s ? fixed(1e3 * *clock->sigma_s, 3) : "-");
+    row.push_back(known && clock->skew_ppm ? fixed(*clock->skew_ppm, 1) : "-");
     row.push_back(neighbor.reason);
     rows.push_back(std::move(row));
   }
@@ -105,7 +105,7 @@ std::string advice_of(const client::Status& status) {
 std::string light_of(const client::Status& status) {
   std::string text;
   for (const auto& sensor : status.sensors) {
-    if (!sensor.counts.contains("background")) continue;
+    if (!is_spots(sensor) || sensor.rate_hz <= 0.0 || sensor.counts.empty()) continue;
     const std::string advice = light_advice(sensor.counts);
     if (!advice.empty()) text += fmt::format("{}: {}\n", sensor.name, advice);
   }

@@ -1,6 +1,9 @@
 #include "daemon/ctl/live/watch.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <set>
+#include <utility>
 
 #include "daemon/ctl/live/live_screen.hpp"
 #include "daemon/ctl/live/watch_screen.hpp"
@@ -13,9 +16,12 @@ using namespace std::chrono_literals;
 
 constexpr Duration kMaxSilence = 3s;  ///< a daemon silent for longer does not run
 
-client::Requests requests_for(const std::optional<RobotId>& detailed) {
+client::Requests requests_for(const std::set<RobotId>& polled) {
+  constexpr double kMostPerSecond = 20.0;  // of the 50 requests that a daemon answers
+  const double period_s = std::max(1.0, static_cast<double>(polled.size()) / kMostPerSecond);
   client::Requests requests{.polls = {{}}};
-  if (detailed) requests.polls.push_back({.peer = detailed->value});
+  for (const RobotId neighbor : polled)
+    requests.polls.push_back({.peer = neighbor.value, .period_s = period_s});
   return requests;
 }
 
@@ -27,13 +33,13 @@ Result<void> converse(const WatchOptions& options, WatchScreen& screen, const Sh
   if (!daemon) return tl::unexpected(daemon.error());
   const MonotonicClock clock;
   const Timestamp start = clock.now();
-  std::optional<RobotId> asked;
+  std::set<RobotId> asked;
   StopSignals stop;
   for (;;) {
     const Timestamp now = clock.now();
     if (stop.requested() || (options.for_s && now - start >= from_seconds(*options.for_s))) break;
-    if (screen.detailed_neighbor() != asked) {
-      asked = screen.detailed_neighbor();
+    if (std::set<RobotId> polled = screen.polled_neighbors(); polled != asked) {
+      asked = std::move(polled);
       daemon->ask(requests_for(asked));
     }
     const auto answer = daemon->receive(50ms);

@@ -177,10 +177,16 @@ void WatchScreen::handle_status(const client::Status& status, Timestamp /*now*/)
   for (const client::Status::Neighbor& neighbor : status.neighbors) {
     const RobotId id{neighbor.peer};
     if (!neighbor.name.empty()) names_[id] = neighbor.name;
-    neighbors_[id].set_reason(neighbor.reason);
+    NeighborView& view = neighbors_[id];
+    if (neighbor.state == "none" && neighbor.reason.empty()) {  // its id alone
+      left_out_.insert(id);
+    } else {
+      view.set_reason(neighbor.reason);
+    }
   }
   if (status.sensors.empty()) {  // the answer about one neighbor
-    if (!status.neighbors.empty()) details_ = status.neighbors.front();
+    if (!status.neighbors.empty() && picked_ == RobotId{status.neighbors.front().peer})
+      details_ = status.neighbors.front();
     return;
   }
   const double elapsed_s = status_ ? status.uptime_s - status_->uptime_s : status.uptime_s;
@@ -232,6 +238,12 @@ void WatchScreen::handle_command(char key) {
 
 std::optional<RobotId> WatchScreen::detailed_neighbor() const {
   return shows_details_ ? picked_ : std::nullopt;
+}
+
+std::set<RobotId> WatchScreen::polled_neighbors() const {
+  std::set<RobotId> polled = left_out_;
+  if (const auto detailed = detailed_neighbor()) polled.insert(*detailed);
+  return polled;
 }
 
 void WatchScreen::pick(int step) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -26,8 +27,11 @@ class WatchScreen {
   void handle_key(char key);
 
   [[nodiscard]] bool should_quit() const { return quit_; }
-  /// The neighbor whose details are shown and must be polled.
+  /// The neighbor whose details are shown.
   [[nodiscard]] std::optional<RobotId> detailed_neighbor() const;
+  /// Those that must be asked for by themselves: the one with details, and all for which STATUS
+  /// once had no room.
+  [[nodiscard]] std::set<RobotId> polled_neighbors() const;
   [[nodiscard]] std::optional<Timestamp> last_message_time() const { return last_message_time_; }
   [[nodiscard]] bool has_status() const { return status_.has_value(); }
 
@@ -47,6 +51,7 @@ class WatchScreen {
 
   std::map<RobotId, NeighborView> neighbors_;
   std::map<RobotId, std::string> names_;
+  std::set<RobotId> left_out_;  ///< of a STATUS
   std::optional<client::Status> status_;
   std::optional<client::Status::Neighbor> details_;
   std::optional<Timestamp> last_message_time_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "config/schema/plausibility.hpp"
 #include "config/writing/config_writer.hpp"
 #include "estimator/calibration/camera/camera_start.hpp"
 #include "estimator/core/constants.hpp"
@@ -102,11 +103,21 @@ std::string devices_file(const RobotPlan& plan) {
   return text + serial_text("imu", plan.imu) + serial_text("uwb", plan.uwb);
 }
 
+/// Empty where the camera is fast enough for the default.
+std::string slot_text(double rate_hz) {
+  constexpr double kLongestSlot = 70.0;  // ms; a slower camera is warned of
+  const double slot_ms = std::min(readable_slot_ms(rate_hz), kLongestSlot);
+  if (slot_ms <= SwarmConfig{}.slot_ms) return "";
+  return fmt::format("  slot_ms: {}   # two frames of the slowest camera; boards are set by it\n",
+                     to_yaml(slot_ms));
+}
+
 std::string members_file(const RobotPlan& plan) {
   std::string text =
       "# The members of the swarm, written by crepesctl init: the same file on all robots.\n"
       "# p_body_led and p_body_uwb: LED ring's center and UWB antenna, from the inertial sensor.\n"
-      "swarm:\n  members:\n";
+      "swarm:\n" +
+      slot_text(plan.camera.rate_hz) + "  members:\n";
   for (const MemberConfig& member : plan.members) {
     text +=
         fmt::format("    - {{id: {}, name: {}, pattern: \"{}\", p_body_led: {}, p_body_uwb: {}}}\n",

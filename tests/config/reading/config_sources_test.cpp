@@ -46,6 +46,18 @@ TEST_F(ConfigSources, LeavesHiddenFilesAlone) {
   EXPECT_EQ(faults(), "");
 }
 
+TEST_F(ConfigSources, WarnsOfAFragmentThatEndsOtherwise) {
+  write("crepesd.yaml", kBase);
+  write("crepesd.d/20-uwb.yml", "uwb: {noise_m: 0.5}\n");
+
+  const CheckedConfig checked = check();
+
+  EXPECT_EQ(checked.config.uwb.noise.noise_m, 0.05);
+  EXPECT_NE(to_string(checked.warnings).find("20-uwb.yml: is ignored: rename it"),
+            std::string::npos)
+      << to_string(checked.warnings);
+}
+
 TEST_F(ConfigSources, MissesNothingWhereAFileCannotBeParsed) {
   write("crepesd.yaml", "robot: {id: 1\n");
   write("crepesd.d/10-noise.yaml", "uwb: {noise_m: 0.1}\n");

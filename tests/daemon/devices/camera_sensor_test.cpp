@@ -63,21 +63,28 @@ TEST_F(CameraSensor, ChangesTheLightOfACameraThatRuns) {
   ASSERT_TRUE(device->read_once(0ms));
   EXPECT_TRUE(log_.set.empty());
 
+  EXPECT_FALSE(device->has_new_settings());
+
   light_.update(fixed(300));
+  EXPECT_TRUE(device->has_new_settings());
   ASSERT_TRUE(device->read_once(0ms));
-  ASSERT_TRUE(device->read_once(0ms));
+  EXPECT_TRUE(log_.set.empty()) << "it may take seconds, which reading must not";
+  device->apply_settings();
 
   EXPECT_EQ(log_.set, std::vector<CameraLight>{exposure(300)});
+  EXPECT_FALSE(device->has_new_settings());
 }
 
 TEST_F(CameraSensor, GoesOnWithTheLightThatItHasWhereOneIsRefused) {
   const auto device = open();
   light_.update(fixed(2000));
+  device->apply_settings();
 
   EXPECT_EQ(device->read_once(0ms).value(), 1U);
   EXPECT_EQ(device->diagnosis(), "exposure_us: too long");
 
   light_.update(fixed(400));
+  device->apply_settings();
   EXPECT_EQ(device->read_once(0ms).value(), 1U);
   EXPECT_EQ(device->diagnosis(), std::nullopt);
 }

@@ -39,12 +39,16 @@ class SerialSensors : public testing::Test {
     return device ? std::move(*device) : nullptr;
   }
   std::unique_ptr<Device> open_imu() {
-    return open(imu_sensor(imu_sensor_settings(config_), clock_, [this](Event event) {
-      if (const auto* sample = std::get_if<ImuSample>(&event)) samples_.push_back(*sample);
-    }));
+    return open(imu_sensor(
+        imu_sensor_settings(config_), clock_,
+        [this](Event event) {
+          if (const auto* sample = std::get_if<ImuSample>(&event)) samples_.push_back(*sample);
+        },
+        name_));
   }
   std::unique_ptr<Device> open_uwb() {
-    return open(uwb_sensor(uwb_sensor_settings(config_), clock_, [](Event) {}));
+    return open(uwb_sensor(
+        uwb_sensor_settings(config_), clock_, [](Event) {}, name_));
   }
 
   /// The device sends these bytes again and again, ten times a second.
@@ -57,6 +61,7 @@ class SerialSensors : public testing::Test {
   }
 
   ManualClock clock_;
+  DeviceName name_{"", kSerialById};
   std::unique_ptr<PseudoTerminal> line_;
   Config config_;
   std::vector<ImuSample> samples_;
@@ -167,9 +172,13 @@ TEST_F(SerialSensors, FindTheSameDeviceAgainUnderAnotherTty) {
   const auto link = scratch->path() / "usb-HiPNUC";
   std::filesystem::create_symlink(line_->path(), link);
   config_.imu.device.protocol = ImuProtocol::kHipnuc;
-  const Sensor sensor = imu_sensor(
-      imu_sensor_settings(config_), clock_,
-      [this](Event event) { samples_.push_back(std::get<ImuSample>(event)); }, scratch->path());
+  DeviceName name("", scratch->path());
+  const auto make = [&] {
+    return imu_sensor(
+        imu_sensor_settings(config_), clock_,
+        [this](Event event) { samples_.push_back(std::get<ImuSample>(event)); }, name);
+  };
+  const Sensor sensor = make();
   auto device = open(sensor);
   line_.reset();
   EXPECT_FALSE(device->read_once(1s));
@@ -188,8 +197,13 @@ TEST_F(SerialSensors, FindTheSameDeviceAgainUnderAnotherTty) {
   std::filesystem::create_symlink(line_->path(), link);
   device = open(sensor);
   send_for(*device, recorded_file("imu/hipnuc_hi91_official").bytes, 100ms);
-
   EXPECT_EQ(samples_.size(), 1U);
+
+  device.reset();
+  config_.imu.noise.update_rate = 123.0;  // a reload
+  device = open(make());
+  send_for(*device, recorded_file("imu/hipnuc_hi91_official").bytes, 100ms);
+  EXPECT_EQ(samples_.size(), 2U);
 }
 
 TEST_F(SerialSensors, TellASensorThatRepeatsItself) {

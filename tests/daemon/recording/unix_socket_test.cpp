@@ -1,9 +1,12 @@
 #include "daemon/recording/unix_socket.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 
 #include <filesystem>
 #include <fstream>
+#include <utility>
+#include <vector>
 
 #include "drivers/base/scratch_directory.hpp"
 #include "drivers/base/text_file.hpp"
@@ -21,6 +24,22 @@ TEST(UnixSocket, ReplacesASocketThatNobodyListensOn) {
 
   ASSERT_TRUE(listener) << listener.error().message;
   const Result<UniqueFd> second = listen_unix(path);
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().message.find("another daemon listens there"), std::string::npos);
+}
+
+TEST(UnixSocket, NeverWaitsForAnotherDaemonThatAcceptsNobody) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const std::filesystem::path path = scratch.path() / "record";
+  const Result<UniqueFd> listener = listen_unix(path);
+  ASSERT_TRUE(listener);
+  std::vector<UniqueFd> waiting;
+  for (auto one = connect_unix(path, SOCK_NONBLOCK); one; one = connect_unix(path, SOCK_NONBLOCK))
+    waiting.push_back(std::move(*one));
+  ASSERT_FALSE(waiting.empty());
+
+  const Result<UniqueFd> second = listen_unix(path);
+
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("another daemon listens there"), std::string::npos);
 }

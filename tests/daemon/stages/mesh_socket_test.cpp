@@ -65,6 +65,23 @@ TEST(MeshSocket, IsWellOnceOpenThoughNothingIsSent) {
   EXPECT_EQ(mesh.fault(), "");
 }
 
+TEST(MeshSocket, IsWellAgainAfterASecondThoughNothingIsSent) {
+  const LogSession log(LogLevel::kError);
+  MeshSocket mesh(loopback());
+  Timestamp now{};
+  ASSERT_NE(mesh.get(now), nullptr);
+  mesh.close_for_retry({ErrorCode::kIo, "lo: interface is down"}, now);
+  now += milliseconds{100};
+  ASSERT_NE(mesh.get(now), nullptr);
+
+  mesh.follow_address(now + milliseconds{500});
+  EXPECT_NE(mesh.fault(), "");
+  mesh.follow_address(now + milliseconds{1000});
+
+  EXPECT_EQ(mesh.fault(), "");
+  EXPECT_NE(mesh.get(now + milliseconds{1000}), nullptr);
+}
+
 // As where DHCP answers after the robot gave itself an address.
 TEST(MeshSocket, FollowsItsInterfaceToAnotherAddress) {
   const auto run = [](const char* command) {
@@ -73,9 +90,12 @@ TEST(MeshSocket, FollowsItsInterfaceToAnotherAddress) {
   const LogSession log(LogLevel::kError);
   bool is_permitted = false;
   std::thread([&] {
-    is_permitted = ::unshare(CLONE_NEWNET) == 0 &&
-                   run("ip link add mesh0 type veth peer mesh1 && ip link set mesh0 up && "
-                       "ip address add 169.254.5.6/16 dev mesh0") == 0;
+    is_permitted =
+        ::unshare(CLONE_NEWNET) == 0 &&
+        run("ip link add mesh0 type veth peer mesh1 && ip link set mesh1 up && "
+            "ip link set mesh0 up && ip address add 169.254.5.6/16 dev mesh0 && "
+            "timeout 5 sh -c \"until ip link show mesh0 | grep -q 'state UP'; do sleep 0.01; "
+            "done\"") == 0;
     if (!is_permitted) return;
     NetConfig config;
     config.interface = "mesh0";

@@ -84,6 +84,26 @@ TEST(ClientMessages, ReadTheReasonWhereThereIsNoPose) {
   EXPECT_EQ(read.clocks[0].offset_s, -17.5);
 }
 
+TEST(ClientMessages, DistinguishAClockWithoutARateFromAPerfectOne) {
+  SystemStatus status;
+  for (std::uint16_t id = 2; id <= 12; ++id) {
+    NeighborStatus& neighbor = status.estimator.neighbors.emplace_back();
+    neighbor.neighbor = RobotId{id};
+    neighbor.name = "a-rather-long-name";
+    status.clocks.push_back(
+        {.peer = RobotId{id}, .offset_s = 1.5, .skew_ppm = 3.0, .sigma_s = 1e-4});
+  }
+
+  const auto of_all = std::get<Status>(parse(status_json(status)).value());
+  const auto of_one = std::get<Status>(parse(peer_status_json(status, RobotId{2}).value()).value());
+
+  ASSERT_EQ(of_all.clocks.size(), 11U);
+  EXPECT_EQ(of_all.clocks[0].skew_ppm, std::nullopt);
+  EXPECT_EQ(of_all.clocks[0].sigma_s, std::nullopt);
+  ASSERT_EQ(of_one.clocks.size(), 1U);
+  EXPECT_EQ(of_one.clocks[0].skew_ppm, 3.0);
+}
+
 TEST(ClientMessages, ReadAllAboutOneNeighbor) {
   SystemStatus status;
   status.stamp = Timestamp{100s};
@@ -391,7 +411,9 @@ TEST(ClientConnection, WorksWithIpv6) {
 TEST(ClientConnection, RefusesAnAddressThatIsNone) {
   std::string fault;
   EXPECT_FALSE(Connection::open({"localhost:1", 1}, {}, fault));
-  EXPECT_EQ(fault, "'localhost:1' is not a numeric IPv4 or IPv6 address");
+  EXPECT_EQ(fault,
+            "'localhost:1' is not a numeric IPv4 or IPv6 address: names are not resolved; say "
+            "127.0.0.1 for this machine");
 }
 
 }  // namespace

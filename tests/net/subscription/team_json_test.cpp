@@ -125,6 +125,28 @@ TEST(TeamJson, ReportsAPairsFilter) {
   EXPECT_FALSE(pair_status_json(team_of(4, 1), RobotId{9}));
 }
 
+TEST(TeamJson, ShortensAPairsFilterThatDoesNotFit) {
+  SystemStatus status = team_of(4, 1);
+  status.self = RobotId{60001};
+  status.name = std::string(32, 'a');
+  status.uptime_s = 86400.1234;
+  NeighborStatus& neighbor = status.estimator.neighbors.front();
+  neighbor.neighbor = RobotId{60002};
+  neighbor.name = std::string(32, 'b');
+  for (auto& kind : neighbor.measurements) kind.fill(123456789012);
+  neighbor.calibration->value.fill(-1.2345678e-5);
+  neighbor.calibration->sigma.fill(1.2345678e-5);
+
+  const std::string text = pair_status_json(status, neighbor.neighbor).value();
+
+  EXPECT_LE(text.size(), kMaxSubscriptionDatagram);
+  const Json json = Json::parse(text);
+  EXPECT_EQ(json["truncated"], true);
+  EXPECT_EQ(json["pair"]["peer"], 60002);
+  EXPECT_TRUE(json["pair"]["calibration"].contains("range_bias_m"));
+  EXPECT_FALSE(Json::parse(pair_status_json(team_of(4, 1), kOther).value()).contains("truncated"));
+}
+
 TEST(TeamJson, FitsADatagramHoweverLargeTheTeam) {
   for (const int robots : {1, 4, 12, 50}) {
     const std::string text = team_status_json(team_of(robots, 4));

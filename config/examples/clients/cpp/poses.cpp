@@ -2,6 +2,7 @@
 //   ./poses [ADDRESS [PORT [COUNT]]]
 #include <chrono>
 #include <crepes/client.hpp>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -10,11 +11,16 @@
 
 namespace {
 
-void print(const crepes::client::Pose& pose) {
+volatile std::sig_atomic_t is_stopped = 0;
+
+extern "C" void stop(int /*signal*/) { is_stopped = 1; }
+
+// Returns whether anybody reads it.
+bool print(const crepes::client::Pose& pose) {
   const crepes::client::Vector& p = pose.position;
   std::printf("%lld %u %s %.6f %.6f %.6f\n", static_cast<long long>(pose.t_ns), unsigned{pose.peer},
               std::string(name_of(pose.mode)).c_str(), p.x, p.y, p.z);
-  std::fflush(stdout);
+  return std::fflush(stdout) == 0;
 }
 
 // A number of the command line; `otherwise` without one.
@@ -31,9 +37,13 @@ int main(int argc, char** argv) {
   address.port = static_cast<std::uint16_t>(number(argc, argv, 2, address.port));
   long left = number(argc, argv, 3, -1);
 
+  // The end of the connection ends the subscription, which otherwise lasts for its lease.
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, stop);
+  std::signal(SIGPIPE, SIG_IGN);
+
   std::string fault;
   auto daemon = crepes::client::Connection::open(address, {}, fault);
-  while (daemon && left != 0) {
+  while (daemon && left != 0 && is_stopped == 0) {
     const auto answer = daemon->receive(200ms);
     if (!answer) {
       // A robot would fly on and wait: the library asks again by itself.
@@ -41,7 +51,7 @@ int main(int argc, char** argv) {
     } else if (const auto* refusal = std::get_if<crepes::client::Error>(&answer->message)) {
       fault = refusal->message;
     } else if (const auto* pose = std::get_if<crepes::client::Pose>(&answer->message)) {
-      print(*pose);
+      if (!print(*pose)) break;
       if (left > 0) --left;
     }
     if (!fault.empty()) break;

@@ -72,11 +72,17 @@ void check_clocks(const RobotObservation& seen, CheckSection section) {
                     "wait two seconds; if it stays so, packets arrive in one direction only");
       continue;
     }
-    const std::string text = fmt::format("{}: known to {} ms, {} ppm", name,
-                                         fixed(1e3 * clock->sigma_s, 3), fixed(clock->skew_ppm, 1));
-    if (clock->sigma_s > kCoarse) {
+    if (!clock->sigma_s || !clock->skew_ppm) {
+      section.doubt(name + ": known, but not how well",
+                    "the daemon had no room to say it: ask again");
+      continue;
+    }
+    const std::string text =
+        fmt::format("{}: known to {} ms, {} ppm", name, fixed(1e3 * *clock->sigma_s, 3),
+                    fixed(*clock->skew_ppm, 1));
+    if (*clock->sigma_s > kCoarse) {
       section.doubt(text, "many packets are late or lost: see mesh, below");
-    } else if (std::abs(clock->skew_ppm) > kBadSkew) {
+    } else if (std::abs(*clock->skew_ppm) > kBadSkew) {
       section.doubt(text, "one of the two computers has a bad clock, or steps it: see chrony");
     } else {
       section.good(text);

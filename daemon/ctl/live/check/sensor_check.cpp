@@ -2,8 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <string_view>
-
 #include "daemon/ctl/live/light_advice.hpp"
 #include "daemon/ctl/text_table.hpp"
 
@@ -12,11 +10,8 @@ namespace {
 
 using SensorLine = client::Status::Sensor;
 
-constexpr std::string_view kSpots = " spots";
 constexpr const char* kAskAgain =
     "the daemon did not report its counts: ask again; is it as new as crepesctl?";
-
-bool is_spots(const SensorLine& sensor) { return sensor.name.ends_with(kSpots); }
 
 void check_rate(const std::string& name, double rate_hz, double wanted_hz, CheckSection& section) {
   constexpr double kLeast = 0.9;
@@ -33,7 +28,7 @@ void check_spot_rate(const SensorLine& spots, const client::Status& status, Chec
   constexpr double kSlow = 20e3;  // us from a picture to its spots
   constexpr double kShare = 0.9;
   const SensorLine* const camera =
-      sensor_of(status, spots.name.substr(0, spots.name.size() - kSpots.size()));
+      sensor_of(status, spots.name.substr(0, spots.name.size() - kSpotsSuffix.size()));
   const std::string rate = fmt::format("{}: {} Hz", spots.name, fixed(spots.rate_hz, 1));
   const auto delay_us = static_cast<double>(total(spots.counts, "delay_p99_us"));
   if (camera != nullptr && spots.rate_hz < kShare * camera->rate_hz) {
@@ -96,10 +91,10 @@ void check_sensors(const RobotObservation& seen, CheckSection section) {
 void check_rates(const RobotObservation& seen, CheckSection section) {
   for (const SensorLine& sensor : seen.after.sensors) {
     if (sensor.name == "mesh" || sensor.name == "subscription") continue;  // they have no rate
-    if (is_spots(sensor)) {
-      check_spot_rate(sensor, seen.after, section);
-    } else if (sensor.rate_hz <= 0.0) {
+    if (sensor.rate_hz <= 0.0) {
       section.fault(sensor.name + ": silent", "see sensors, above");
+    } else if (is_spots(sensor)) {
+      check_spot_rate(sensor, seen.after, section);
     } else if (!seen.config || sensor.name == "uwb") {
       section.good(fmt::format("{}: {} Hz", sensor.name, fixed(sensor.rate_hz, 1)));
     } else if (sensor.name == "imu") {
@@ -118,7 +113,7 @@ void check_rates(const RobotObservation& seen, CheckSection section) {
 
 void check_exposure(const client::Status& status, CheckSection section) {
   for (const SensorLine& sensor : status.sensors)
-    if (is_spots(sensor)) check_picture(sensor, section);
+    if (is_spots(sensor) && sensor.rate_hz > 0.0) check_picture(sensor, section);
 }
 
 }  // namespace crepes

@@ -140,6 +140,13 @@ TEST(RobotCheck, NoticesSpotsThatFallBehindTheirCamera) {
   EXPECT_EQ(complaints(seen), "rates doubt: cam0 spots: 90.0 Hz, the camera has 200.0");
 }
 
+TEST(RobotCheck, FindsNothingGoodInACameraThatIsSilent) {
+  RobotObservation seen = healthy();
+  for (const char* name : {"cam0", "cam0 spots"}) sensor(seen, name).rate_hz = 0.0;
+
+  EXPECT_EQ(complaints(seen), "rates fault: cam0: silent\nrates fault: cam0 spots: silent");
+}
+
 TEST(RobotCheck, ClaimsNothingAboutSpotsWhoseCountsAreUnknown) {
   RobotObservation seen = healthy();
   sensor(seen, "cam0 spots").counts.clear();
@@ -154,6 +161,13 @@ TEST(RobotCheck, NoticesAClockThatIsNotKnown) {
   seen.after.clocks.clear();
 
   EXPECT_EQ(complaints(seen), "clocks fault: r2: clock offset unknown");
+}
+
+TEST(RobotCheck, DoesNotCallAClockPerfectWhoseErrorIsNotKnown) {
+  RobotObservation seen = healthy();
+  seen.after.clocks = {{2, 3.0, {}, {}}};
+
+  EXPECT_EQ(complaints(seen), "clocks doubt: r2: known, but not how well");
 }
 
 TEST(RobotCheck, JudgesTheExposureByBackgroundAndLights) {

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <sstream>
 
 namespace crepes::watch_screen_test {
@@ -83,6 +84,30 @@ TEST(WatchScreen, ShowsTheLoadOfTheLastSecondNotOfAllTime) {
   screen.handle_message(status_of(12.0, 2.0), kStart + seconds{2});
 
   EXPECT_NE(screen.text(kStart, kFile).find("50.0 % of a core"), std::string::npos);
+}
+
+TEST(WatchScreen, WantsToAskForWhomStatusHadNoRoom) {
+  WatchScreen screen = some_screen();
+  EXPECT_TRUE(screen.polled_neighbors().empty());
+  client::Status status = status_of(11.0, 1.0);
+  for (const std::uint16_t id : {4, 5}) {  // as under "more"
+    client::Status::Neighbor& neighbor = status.neighbors.emplace_back();
+    neighbor.peer = id;
+  }
+  status.neighbors.erase(status.neighbors.begin());
+  screen.handle_message(status, kStart);
+
+  EXPECT_EQ(screen.polled_neighbors(), (std::set{RobotId{4}, RobotId{5}}));
+  EXPECT_NE(screen.text(kStart, kFile).find("not seen"), std::string::npos) << "as r4 was last";
+
+  client::Status answer;
+  answer.neighbors = status_of(11.0, 1.0).neighbors;
+  answer.neighbors[0].peer = 5;
+  answer.neighbors[0].name = "r5";
+  answer.neighbors[0].reason = "never heard";
+  screen.handle_message(answer, kStart);
+
+  EXPECT_NE(screen.text(kStart, kFile).find("never heard"), std::string::npos);
 }
 
 TEST(WatchScreen, SortsByTheNextColumnAtEachS) {

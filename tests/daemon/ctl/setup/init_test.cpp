@@ -76,6 +76,24 @@ TEST_F(Init, WritesAConfigurationThatTheDaemonAccepts) {
   EXPECT_FALSE(config.cameras[0].calibration.calibrated);
 }
 
+TEST_F(Init, WritesSlotsThatASlowCameraCanRead) {
+  options_.id = 1;
+  options_.robots = 2;
+  options_.rate_hz = 30.0;
+
+  const auto report = run();
+
+  ASSERT_TRUE(report) << report.error().message;
+  ASSERT_TRUE(report->faults.empty()) << to_string(report->faults);
+  EXPECT_EQ(load().swarm.slot_ms, 67.0);
+  EXPECT_EQ(to_string(report->warnings).find("frames a slot"), std::string::npos);
+
+  options_.rate_hz = 200.0;
+  options_.force = true;
+  ASSERT_TRUE(run());
+  EXPECT_EQ(text_of("swarm.yaml").find("slot_ms"), std::string::npos);
+}
+
 TEST_F(Init, GuessesALensOfTheFieldOfViewThatLooksWhereConfigured) {
   options_.id = 1;
   options_.robots = 2;

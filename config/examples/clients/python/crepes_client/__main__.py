@@ -2,7 +2,10 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import itertools
+import os
+import signal
 import sys
 
 from crepes_client.blocking import ADDRESS, PORT, RefusedError, poses
@@ -16,9 +19,13 @@ def main() -> int:
     options.add_argument("--rate", type=float, help="poses of each neighbor a second")
     options.add_argument("--count", type=int, help="stop after so many poses")
     asked = options.parse_args()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that each end ends the subscription
     try:
-        for pose in itertools.islice(poses(asked.address, asked.port, rate_hz=asked.rate), asked.count):
-            print(pose.t_ns, pose.peer, pose.mode, *pose.position, flush=True)
+        with contextlib.closing(poses(asked.address, asked.port, rate_hz=asked.rate)) as stream:
+            for pose in itertools.islice(stream, asked.count):
+                print(pose.t_ns, pose.peer, pose.mode, *pose.position, flush=True)
+    except BrokenPipeError:  # nobody reads any more, nor what is still to be flushed
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (OSError, RefusedError) as fault:
         print(fault, file=sys.stderr)
         return 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 import socket
 import time
 from types import TracebackType
-from typing import Any, Iterable, Iterator
+from typing import Any, Generator, Iterable
 
 from crepes_client.conversation import Conversation
 from crepes_client.messages import Error, Message, Pose, Status, Version
@@ -86,7 +86,7 @@ class Connection:
 
 
 def poses(address: str = ADDRESS, port: int = PORT, *, rate_hz: float | None = None,
-          peers: Iterable[int] | None = None, patience_s: float | None = PATIENCE_S) -> Iterator[Pose]:
+          peers: Iterable[int] | None = None, patience_s: float | None = PATIENCE_S) -> Generator[Pose, None, None]:
     """Poses for ever. TimeoutError if the daemon is silent for `patience_s` (None: never);
     RefusedError if it refuses the request."""
     with Connection(address, port, rate_hz=rate_hz, peers=peers) as connection:
