@@ -322,7 +322,7 @@ TEST_F(Reload, HappensOnSighupAndSystemdIsNotified) {
   const MonotonicClock clock;
   const Timestamp end = clock.now() + std::chrono::seconds{20};
   while (!second->exit_reason() && clock.now() < end) ::poll(nullptr, 0, 20);
-  EXPECT_EQ(second->exit_reason(), "exit code 1");
+  EXPECT_EQ(second->exit_reason(), "exit code 3");
   EXPECT_NE(read_text_file(folder.path() / "second").value().find("already runs on this machine"),
             std::string::npos);
 
