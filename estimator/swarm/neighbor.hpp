@@ -30,8 +30,9 @@ class Neighbor {
   /// Keeps the state of the estimation, except for another profile.
   void reconfigure(const FilterSettings& settings);
 
-  /// Our own measurements of it.
+  /// Where our camera sees it.
   void add(const Bearing& bearing);
+  /// Our module's range to it.
   void add(const UwbRange& range);
   /// Its pose by the graph's solution. While anybody sees it, that corrects the published pose
   /// only.
