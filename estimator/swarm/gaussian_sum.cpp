@@ -113,7 +113,7 @@ GaussianPose GaussianSum::mean(const GaussianPose& heaviest) const {
   // Where the other parts know more than the heaviest one did, readings since then may have told as
   // much: only what the sum is more uncertain by counts.
   const Eigen::SelfAdjointEigenSolver<Matrix6d> excess(moment - mean * mean.transpose());
-  const Matrix6d axes = excess.eigenvectors();
+  const Matrix6d& axes = excess.eigenvectors();
   const Vector6d more = excess.eigenvalues().cwiseMax(0.0);
   return {perturbed(heaviest.pose, mean),
           heaviest.covariance + axes * more.asDiagonal() * axes.transpose()};

@@ -109,7 +109,7 @@ void MountingEvidence::fade(double kept) {
 /// Gauss and Newton's method from all right angles.
 Matrix3d MountingEvidence::likeliest() const {
   constexpr int kIterations = 8;
-  static const std::vector<Matrix3d> kStarts = right_angles();
+  static const std::vector<Matrix3d> starts = right_angles();
   constexpr double kTurnWeight = 1.0 / (kTurnSigma * kTurnSigma);
   constexpr double kElevationWeight = 1.0 / (kElevationSigma * kElevationSigma);
   const Information M = kTurnWeight * turns_.M + kElevationWeight * elevations_.M;
@@ -119,7 +119,7 @@ Matrix3d MountingEvidence::likeliest() const {
     return r.dot(M * r) - 2.0 * b.dot(r);
   };
   Matrix3d best = Matrix3d::Identity();
-  for (Matrix3d R : kStarts) {
+  for (Matrix3d R : starts) {
     for (int i = 0; i < kIterations; ++i) {
       Eigen::Matrix<double, 9, 3> J;
       for (int axis = 0; axis < 3; ++axis) J.col(axis) = (hat(Vector3d::Unit(axis)) * R).reshaped();

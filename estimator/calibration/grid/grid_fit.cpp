@@ -104,15 +104,17 @@ std::vector<SightingResidual> residuals_of(const Guess& guess, const GridShape& 
 
 double cost_of(const std::vector<SightingResidual>& residuals, const std::vector<double>& weights) {
   double cost = 0.0;
-  for (std::size_t i = 0; i < residuals.size(); ++i)
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
     cost +=
         weights[i] * (residuals[i].is_valid ? residuals[i].uv.squaredNorm() : kLost_px * kLost_px);
+  }
   return cost;
 }
 
 /// One sigma of a coordinate, from the median of the squared lengths.
 double sigma_of(const std::vector<SightingResidual>& residuals) {
   std::vector<double> squares;
+  squares.reserve(residuals.size());
   for (const SightingResidual& residual : residuals)
     squares.push_back(residual.is_valid ? residual.uv.squaredNorm() : kLost_px * kLost_px);
   if (squares.empty()) return kLost_px;
@@ -121,9 +123,11 @@ double sigma_of(const std::vector<SightingResidual>& residuals) {
 
 std::vector<double> weights_of(const std::vector<SightingResidual>& residuals, double sigma_px) {
   std::vector<double> weights;
-  for (const SightingResidual& residual : residuals)
+  weights.reserve(residuals.size());
+  for (const SightingResidual& residual : residuals) {
     weights.push_back(residual.is_valid ? robust_weight(residual.uv.squaredNorm(), sigma_px, 2.0)
                                         : 0.0);
+  }
   return weights;
 }
 
@@ -184,9 +188,10 @@ class GridEquations {
   /// Of the lens, for residuals of one pixel; empty if it is not determined.
   [[nodiscard]] Eigen::MatrixXd lens_covariance() const {
     Eigen::MatrixXd S = H_lens_;
-    for (const Block& block : blocks_)
+    for (const Block& block : blocks_) {
       S -= block.H_lens * Eigen::LDLT<Matrix6>(damped(block.H, 1e-12))
                               .solve(Eigen::MatrixXd(block.H_lens.transpose()));
+    }
     const Eigen::LLT<Eigen::MatrixXd> factor(S);
     if (factor.info() != Eigen::Success) return {};
     return factor.solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));
@@ -264,7 +269,7 @@ std::optional<Pose> grid_pose(const std::vector<GridLed>& leds, const GridLens& 
     if (!u_C) continue;
     const Eigen::Vector3d x(led.column, led.row, 1.0);  // in pitches: numbers of like size
     Eigen::Matrix<double, 3, 9> J;                      // u x (H x) = 0, H by columns
-    for (int k = 0; k < 3; ++k) J.middleCols<3>(3 * k) = hat(*u_C) * x[k];
+    for (Eigen::Index k = 0; k < 3; ++k) J.middleCols<3>(3 * k) = hat(*u_C) * x[k];
     A += J.transpose() * J;
     pairs.emplace_back(*u_C, x);
   }

@@ -61,9 +61,10 @@ double spot_sigma(const std::vector<SightingResidual>& residuals) {
 
 double range_sigma(const std::vector<std::vector<double>>& residuals) {
   std::vector<double> sizes;
-  for (const std::vector<double>& robot : residuals)
+  for (const std::vector<double>& robot : residuals) {
     for (const double r : robot)
       if (std::isfinite(r)) sizes.push_back(std::abs(r));
+  }
   if (sizes.empty()) return kLeastRangeSigma_m;
   return std::max(kLeastRangeSigma_m, upper_median(sizes) / kMedianOfAbsolute);
 }
@@ -73,9 +74,10 @@ SwarmWeights swarm_weights(const SwarmResiduals& residuals, const std::vector<do
   SwarmWeights weights;
   for (std::size_t r = 0; r < sigma_px.size(); ++r) {
     std::vector<double>& spots = weights.sightings.emplace_back();
-    for (const SightingResidual& residual : residuals.sightings[r])
+    for (const SightingResidual& residual : residuals.sightings[r]) {
       spots.push_back(residual.is_valid ? robust_weight(residual.uv.squaredNorm(), sigma_px[r], 2.0)
                                         : 0.0);
+    }
     std::vector<double>& ranges = weights.ranges.emplace_back();
     for (const double error : residuals.ranges[r])
       ranges.push_back(std::isfinite(error) ? robust_weight(error * error, sigma_m, 1.0) : 0.0);
@@ -108,9 +110,10 @@ SwarmSolution solve_swarm(SwarmProblem& problem, const SwarmState& start,
       sigma_px.push_back(std::max(stage.sigma_px, spot_sigma(robot)));
     const double sigma_m = std::max(stage.sigma_m, range_sigma(residuals.ranges));
     weights = swarm_weights(residuals, sigma_px, sigma_m);
-    if (&stage == kStages.data())
+    if (&stage == kStages.data()) {
       for (std::size_t r = 0; r < sigma_px.size(); ++r)
         for (double& w : weights.sightings[r]) w = std::max(w, 0.05);
+    }
     problem.set_weights(weights);
     problem.set_sigmas(sigma_px, sigma_m);
     solution.sigma_px = sigma_px;
