@@ -175,8 +175,16 @@ void TeamFilter::begin_anew(const TeamInterval& interval) {
   memory_.clear();
 }
 
+/// Whose estimates place nobody. Without this robot's own there is no chain.
+std::set<RobotId> TeamFilter::liars() const {
+  std::set<RobotId> liars;
+  for (const TeamFault& fault : estimates_.faults()) liars.insert(fault.robot);
+  liars.erase(belief_.self);
+  return liars;
+}
+
 RobotId TeamFilter::exchange_member(const TeamInterval& interval) {
-  links_.add(interval, belief_);
+  links_.add(interval, belief_, liars());
   if (belief_.robots.size() < interval.settings.max_robots) return {};
   const auto exchange = links_.exchange(belief_.stamp, belief_);
   if (!exchange) return {};
@@ -321,13 +329,10 @@ void TeamFilter::add_members(const TeamInterval& interval, RobotId first, bool a
   std::map<RobotId, TeamPlace> known;
   for (const auto& [id, robot] : belief_.robots)
     if (are_placed || id == belief_.self) known[id] = TeamPlace::of(belief_, id);
-  std::set<RobotId> liars;
-  for (const TeamFault& fault : estimates_.faults()) liars.insert(fault.robot);
-  liars.erase(interval.self);  // without its own estimates there is no chain
   std::set<RobotId> unplaced;
   for (const auto& [id, robot] : belief_.robots)
     if (!known.contains(id)) unplaced.insert(id);
-  for (const auto& [id, place] : places_by_chains(known, candidates, liars, interval)) {
+  for (const auto& [id, place] : places_by_chains(known, candidates, liars(), interval)) {
     const std::size_t reserved = first != RobotId{} && first != id ? 1 : 0;
     unplaced.erase(id);
     if (belief_.robots.contains(id)) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -69,6 +70,7 @@ class TeamFilter {
   [[nodiscard]] bool recall(const TeamInterval& interval, const std::vector<RobotId>& false_gyros);
   void begin_anew(const TeamInterval& interval);
   [[nodiscard]] std::vector<RobotId> false_gyros(const TeamInterval& interval);
+  [[nodiscard]] std::set<RobotId> liars() const;
   /// Whoever joins in exchange for another one; RobotId{} if nobody does.
   [[nodiscard]] RobotId exchange_member(const TeamInterval& interval);
   void append_cameras(const TeamInterval& interval);

@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <iterator>
-#include <set>
+#include <utility>
+
+#include "estimator/team/belief/place_chains.hpp"
 
 namespace crepes {
 namespace {
@@ -13,10 +15,12 @@ constexpr Duration kBetweenExchanges = std::chrono::seconds{2};
 constexpr double kClearly = 1.5;
 
 /// The filter's robots, and those that could join because an estimate connects them.
-std::set<RobotId> connected(const TeamInterval& interval, const TeamBelief& belief) {
+std::set<RobotId> connected(const TeamInterval& interval, const TeamBelief& belief,
+                            const std::set<RobotId>& liars) {
   std::set<RobotId> robots;
   for (const auto& [id, robot] : belief.robots) robots.insert(id);
   for (const RelativePoseEdge& edge : interval.edges) {
+    if (!can_place(edge, liars)) continue;
     if (belief.robots.contains(edge.from)) robots.insert(edge.to);
     if (belief.robots.contains(edge.to)) robots.insert(edge.from);
   }
@@ -25,10 +29,11 @@ std::set<RobotId> connected(const TeamInterval& interval, const TeamBelief& beli
 
 }  // namespace
 
-void TeamLinks::add(const TeamInterval& interval, const TeamBelief& belief) {
+void TeamLinks::add(const TeamInterval& interval, const TeamBelief& belief,
+                    const std::set<RobotId>& liars) {
   std::map<RobotId, std::set<RobotId>> linked;
   for (const TeamMember& member : interval.members) linked[member.robot];
-  const std::set<RobotId> known = connected(interval, belief);
+  const std::set<RobotId> known = connected(interval, belief, liars);
   for (const TeamBearing& reading : interval.bearings) {
     for (const auto& [a, b] : {std::pair(reading.observer, reading.bearing.neighbor),
                                std::pair(reading.bearing.neighbor, reading.observer)}) {

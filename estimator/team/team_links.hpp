@@ -3,7 +3,7 @@
 
 #include <map>
 #include <optional>
-#include <utility>
+#include <set>
 
 #include "estimator/team/belief/team_belief.hpp"
 
@@ -11,11 +11,11 @@ namespace crepes {
 
 /// Decides whether a robot beyond the filter's size should take the place of one within. A robot's
 /// links are the robots of the filter that it sees or that see it, in the mean of the last seconds;
-/// one that no estimate connects with the filter has none.
+/// one that no estimate connects with the filter has none, because it could not be placed.
 class TeamLinks {
  public:
-  /// Of robots with an IMU over the interval.
-  void add(const TeamInterval& interval, const TeamBelief& belief);
+  /// Of robots with an IMU over the interval. What `liars` estimate connects nobody.
+  void add(const TeamInterval& interval, const TeamBelief& belief, const std::set<RobotId>& liars);
 
   /// Two robots that change places.
   struct Exchange {

@@ -6,13 +6,6 @@
 namespace crepes {
 namespace {
 
-bool is_usable(const RelativePoseEdge& edge) {
-  const Matrix6d& covariance = edge.T_from_to.covariance;
-  return edge.T_from_to.pose.p.allFinite() && edge.T_from_to.pose.q.coeffs().allFinite() &&
-         edge.v_from_to.allFinite() && covariance.allFinite() &&
-         Eigen::LLT<Matrix6d>(covariance).info() == Eigen::Success;
-}
-
 /// One end of the edge by the other, `via`.
 TeamPlace beyond(const TeamPlace& via, const RelativePoseEdge& edge, bool is_forward,
                  RobotId self) {
@@ -33,6 +26,13 @@ Matrix6d start_floor() {
   return variance.asDiagonal();
 }
 
+bool can_place(const RelativePoseEdge& edge, const std::set<RobotId>& liars) {
+  const Matrix6d& covariance = edge.T_from_to.covariance;
+  return !liars.contains(edge.from) && edge.T_from_to.pose.p.allFinite() &&
+         edge.T_from_to.pose.q.coeffs().allFinite() && edge.v_from_to.allFinite() &&
+         covariance.allFinite() && Eigen::LLT<Matrix6d>(covariance).info() == Eigen::Success;
+}
+
 std::vector<std::pair<RobotId, TeamPlace>> places_by_chains(std::map<RobotId, TeamPlace> known,
                                                             std::map<RobotId, TeamPlace> candidates,
                                                             const std::set<RobotId>& liars,
@@ -43,7 +43,7 @@ std::vector<std::pair<RobotId, TeamPlace>> places_by_chains(std::map<RobotId, Te
       const bool is_forward = edge.from == id;
       const RobotId other = is_forward ? edge.to : edge.from;
       if ((!is_forward && edge.to != id) || known.contains(other) ||
-          interval.member(other) == nullptr || !is_usable(edge) || liars.contains(edge.from))
+          interval.member(other) == nullptr || !can_place(edge, liars))
         continue;
       const TeamPlace place = beyond(via, edge, is_forward, interval.self);
       const auto [best, is_first] = candidates.try_emplace(other, place);

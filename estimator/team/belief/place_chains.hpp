@@ -19,6 +19,9 @@ inline constexpr double kStartAttitude = radians(1.0);  // rad
 /// What a peer estimates is not believed to be better, whatever it claims.
 [[nodiscard]] Matrix6d start_floor();
 
+/// Whether an estimate may place a robot: it is no liar's, and a pose with a covariance.
+[[nodiscard]] bool can_place(const RelativePoseEdge& edge, const std::set<RobotId>& liars);
+
 /// Members of the interval that are not known, each by the most certain chain of estimates, the
 /// most certain first. Candidates are known without an estimate, but not better than by a chain. No
 /// chain uses what `liars` estimate.

@@ -94,6 +94,29 @@ TEST(TeamSize, ASmallerSizeHoldsFromTheNextIntervalOn) {
   EXPECT_EQ(filter.belief().robots.size(), 3U);
 }
 
+// Robot 5 sees everybody, but no estimate of it can be used.
+TEST(TeamSize, NobodyLeavesForARobotThatCannotBePlaced) {
+  static constexpr RobotId kPoor{4};
+  static constexpr RobotId kRich{5};
+  SimulatedTeam team(1, 5);
+  team.damage = [](TeamInterval& interval) {
+    interval.settings.max_robots = 4;
+    for (RelativePoseEdge& edge : interval.edges)
+      if (edge.from == kRich || edge.to == kRich) edge.T_from_to.covariance.setZero();
+  };
+  team.sees = [](RobotId a, RobotId b) { return a != kRich && b != kRich; };
+  TeamFilter filter;
+  static_cast<void>(solution_after(team, filter, 3.0));
+  team.sees = [](RobotId a, RobotId b) {
+    const std::set both{a, b};
+    return !both.contains(kPoor) || both.contains(RobotId{2});
+  };
+  for (double t = 0.0; t < 8.0; t += kIntervalSeconds) {
+    static_cast<void>(filter.step(team.next()));
+    ASSERT_TRUE(filter.belief().robots.contains(kPoor)) << t;
+  }
+}
+
 // A chain of estimates has the errors of the others' cameras, too, which the filter has used.
 TEST(TeamSize, RobotsBeyondItsSizeAreHonestOverSeeds) {
   static constexpr RobotId kHidden{6};
