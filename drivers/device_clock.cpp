@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
+
+#include "estimator/core/crystal_skew.hpp"
 
 namespace crepes {
 namespace {
 
-constexpr double kSkewPrior = 50e-6;  // one sigma of a crystal against another
-constexpr double kMaxSkew = 200e-6;   // no crystal is worse
 constexpr double kTolerance = 10e-3;  // s; a clock that gains more at once has jumped
 constexpr double kMaxDelay = 1.0;     // s; no stamp is delayed longer
 constexpr double kWindow = 0.5;       // s

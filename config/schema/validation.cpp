@@ -7,12 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <functional>
 #include <map>
 #include <set>
 #include <utility>
 
 #include "estimator/vision/camera_model.hpp"
+#include "estimator/vision/id_library.hpp"
 #include "net/endpoint.hpp"
 #include "net/mesh/packet_signature.hpp"
 
@@ -21,9 +21,6 @@ namespace {
 
 using RuleFaults = std::vector<RuleFault>;
 
-constexpr std::size_t kMinSlots = 8;
-constexpr std::size_t kMaxSlots = 32;
-constexpr double kMinDutyStep = 0.02;
 constexpr std::size_t kMaxCameras = 16;
 constexpr std::size_t kMaxPush = 8;
 
@@ -62,35 +59,20 @@ void check_unique(const std::string& list, const std::string& key, const std::ve
   }
 }
 
-/// The shortest word whose repetition is the pattern. A camera cannot distinguish the two.
-std::string primitive_root(const std::string& pattern) {
-  const std::size_t period = (pattern + pattern).find(pattern, 1);
-  return pattern.substr(0, period);
-}
-
-/// Whether two patterns that repeat for ever differ in phase only.
-bool are_cyclic_shifts(const std::string& a, const std::string& b) {
-  const std::string root_a = primitive_root(a);
-  const std::string root_b = primitive_root(b);
-  return root_a.size() == root_b.size() && (root_a + root_a).find(root_b) != std::string::npos;
-}
-
 std::string pattern_fault(const std::string& pattern) {
   if (pattern.find_first_not_of("01") != std::string::npos)
     return fmt::format("a pattern is made of 0 and 1 only, not \"{}\"", pattern);
-  if (pattern.size() < kMinSlots || pattern.size() > kMaxSlots)
+  if (pattern.size() < BlinkCode::kMinSlots || pattern.size() > BlinkCode::kMaxSlots)
     return fmt::format("a pattern has 8 to 32 slots, not {}", pattern.size());
-  if (primitive_root(pattern).size() == 1) return "a pattern has both lit and dark slots";
+  if (pattern.find('0') == std::string::npos || pattern.find('1') == std::string::npos)
+    return "a pattern has both lit and dark slots";
   return "";
 }
 
 /// Both members must be free of faults.
 std::string code_conflict(const MemberConfig& a, const MemberConfig& b) {
-  if (a.pattern && b.pattern && are_cyclic_shifts(*a.pattern, *b.pattern))
-    return "the same pattern, shifted, as that of ";
-  if (a.duty && b.duty && std::abs(*a.duty - *b.duty) < kMinDutyStep)
-    return "within 0.02 of the duty of ";
-  return "";
+  if (!blink_alike(a, b)) return "";
+  return a.pattern ? "the same pattern, shifted, as that of " : "within 0.02 of the duty of ";
 }
 
 void check_codes(const std::vector<MemberConfig>& members, RuleFaults& faults) {

@@ -2,8 +2,12 @@
 
 #include <fmt/core.h>
 
-#include <type_traits>
+#include <array>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "daemon/devices/iio_sensor.hpp"
 #include "daemon/devices/imu_preprocessing.hpp"
@@ -96,53 +100,56 @@ OpenDevice device_with(const Parser& parser, const Preprocessing& preprocessing,
   };
 }
 
-/// Opens an inertial sensor with `protocol`; empty if that is not the protocol of an IMU.
-OpenDevice imu_device(SerialProtocol protocol, const ImuSensorSettings& settings,
-                      const Clock& clock, const EventSink& sink) {
-  const ImuPreprocessing preprocessing(settings);
-  if (protocol == SerialProtocol::kWitMotion)
-    return device_with(WitMotionParser(), preprocessing, clock, sink);
-  if (protocol == SerialProtocol::kWitMotionBle)
-    return device_with(WitMotionBleParser(), preprocessing, clock, sink);
-  if (protocol == SerialProtocol::kHipnuc)
-    return device_with(HipnucParser(), preprocessing, clock, sink);
-  if (protocol == SerialProtocol::kXsens)
-    return device_with(XsensParser(), preprocessing, clock, sink);
-  if (protocol == SerialProtocol::kMavlink)
-    return device_with(MavlinkParser(), preprocessing, clock, sink);
-  if (protocol == SerialProtocol::kVectorNav)
-    return device_with(VectorNavParser(), preprocessing, clock, sink);
-  if (protocol == SerialProtocol::kMicroStrain)
-    return device_with(MicroStrainParser(), preprocessing, clock, sink);
-  return nullptr;
+/// What opens a device of a parser.
+template <class Settings>
+using DeviceMaker = OpenDevice (*)(const Settings&, const Clock&, const EventSink&);
+
+template <class Parser>
+OpenDevice imu_device(const ImuSensorSettings& settings, const Clock& clock,
+                      const EventSink& sink) {
+  return device_with(Parser(), ImuPreprocessing(settings), clock, sink);
 }
 
-/// The parser of a ranging module that speaks `protocol`; empty if that is not of one.
-OpenDevice uwb_device(SerialProtocol protocol, const UwbSensorSettings& settings,
-                      const Clock& clock, const EventSink& sink) {
-  const auto with = [&]<class Parser>(std::type_identity<Parser>) {
-    return device_with(Parser(settings.modules, settings.max_range_m, settings.own_module),
-                       UwbPreprocessing{}, clock, sink);
-  };
-  switch (protocol) {
-    case SerialProtocol::kNlink:
-      return with(std::type_identity<NlinkParser>());
-    case SerialProtocol::kDwm1001Shell:
-      return with(std::type_identity<Dwm1001ShellParser>());
-    case SerialProtocol::kDwm1001Tlv:
-      return with(std::type_identity<Dwm1001TlvParser>());
-    case SerialProtocol::kMaUwb:
-      return with(std::type_identity<MaUwbParser>());
-    case SerialProtocol::kFiraUci:
-      return with(std::type_identity<FiraUciParser>());
-    case SerialProtocol::kBu03:
-      return with(std::type_identity<Bu03Parser>());
-    case SerialProtocol::kRangeLine:
-      return with(std::type_identity<RangeLineParser>());
-    default:
-      return nullptr;
-  }
+template <class Parser>
+OpenDevice uwb_device(const UwbSensorSettings& settings, const Clock& clock,
+                      const EventSink& sink) {
+  return device_with(Parser(settings.modules, settings.max_range_m, settings.own_module),
+                     UwbPreprocessing{}, clock, sink);
 }
+
+/// A protocol as it is configured and as it is detected, and who speaks it.
+template <class Protocol, class Settings>
+struct Dialect {
+  Protocol configured;
+  SerialProtocol spoken;
+  DeviceMaker<Settings> device;
+};
+
+using ImuDialect = Dialect<ImuProtocol, ImuSensorSettings>;
+constexpr std::array kImuDialects{
+    ImuDialect{ImuProtocol::kWitMotion, SerialProtocol::kWitMotion, &imu_device<WitMotionParser>},
+    ImuDialect{ImuProtocol::kWitMotionBle, SerialProtocol::kWitMotionBle,
+               &imu_device<WitMotionBleParser>},
+    ImuDialect{ImuProtocol::kHipnuc, SerialProtocol::kHipnuc, &imu_device<HipnucParser>},
+    ImuDialect{ImuProtocol::kXsens, SerialProtocol::kXsens, &imu_device<XsensParser>},
+    ImuDialect{ImuProtocol::kMavlink, SerialProtocol::kMavlink, &imu_device<MavlinkParser>},
+    ImuDialect{ImuProtocol::kVectorNav, SerialProtocol::kVectorNav, &imu_device<VectorNavParser>},
+    ImuDialect{ImuProtocol::kMicroStrain, SerialProtocol::kMicroStrain,
+               &imu_device<MicroStrainParser>}};
+static_assert(kImuDialects.size() + 2 == kImuProtocols.size(), "all but auto and iio");
+
+using UwbDialect = Dialect<UwbProtocol, UwbSensorSettings>;
+constexpr std::array kUwbDialects{
+    UwbDialect{UwbProtocol::kLinkTrack, SerialProtocol::kNlink, &uwb_device<NlinkParser>},
+    UwbDialect{UwbProtocol::kDwm1001Shell, SerialProtocol::kDwm1001Shell,
+               &uwb_device<Dwm1001ShellParser>},
+    UwbDialect{UwbProtocol::kDwm1001Tlv, SerialProtocol::kDwm1001Tlv,
+               &uwb_device<Dwm1001TlvParser>},
+    UwbDialect{UwbProtocol::kMaUwb, SerialProtocol::kMaUwb, &uwb_device<MaUwbParser>},
+    UwbDialect{UwbProtocol::kFiraUci, SerialProtocol::kFiraUci, &uwb_device<FiraUciParser>},
+    UwbDialect{UwbProtocol::kBu03, SerialProtocol::kBu03, &uwb_device<Bu03Parser>},
+    UwbDialect{UwbProtocol::kRangeLine, SerialProtocol::kRangeLine, &uwb_device<RangeLineParser>}};
+static_assert(kUwbDialects.size() + 1 == kUwbProtocols.size(), "all but auto");
 
 /// The mode in which a LinkTrack module sends nothing that could be recognized.
 std::optional<std::string> foreign_meaning(Bytes recent) {
@@ -150,19 +157,23 @@ std::optional<std::string> foreign_meaning(Bytes recent) {
   return std::string(NlinkParser::kForeignMeaning);
 }
 
+/// What a port is searched for, in words.
+struct WantedDevice {
+  std::string kind;
+  std::string protocols;  ///< the names of all that would do
+  /// What bytes without frames mean.
+  std::optional<std::string> (*hint)(Bytes recent) = [](Bytes) {
+    return std::optional<std::string>();
+  };
+};
+
 /// Listens until the protocol is recognized; from then on it is that device.
 class UnknownDevice final : public Device {
  public:
-  using Hint = std::optional<std::string> (*)(Bytes recent);
-
-  /// `kind` is what is wanted, `protocols` are the names of all that would do. `hint` knows bytes
-  /// without frames.
-  UnknownDevice(SerialPort port, std::string kind, std::string protocols, Hint hint,
-                const Clock& clock, std::function<OpenDevice(SerialProtocol)> device_of)
+  UnknownDevice(SerialPort port, WantedDevice wanted, const Clock& clock,
+                std::function<OpenDevice(SerialProtocol)> device_of)
       : port_(std::move(port)),
-        kind_(std::move(kind)),
-        protocols_(std::move(protocols)),
-        hint_(hint),
+        wanted_(std::move(wanted)),
         since_(clock.now()),
         clock_(clock),
         device_of_(std::move(device_of)) {}
@@ -187,21 +198,19 @@ class UnknownDevice final : public Device {
     constexpr Duration kPatience = std::chrono::seconds(1);
     constexpr std::size_t kEnoughBytes = 64;
     if (known_) return known_->diagnosis();
-    if (const auto meaning = hint_(recent_.get()))
+    if (const auto meaning = wanted_.hint(recent_.get()))
       return fmt::format("{}: {}", port_.path(), *meaning);
     if (clock_.now() - since_ < kPatience || recent_.get().size() < kEnoughBytes)
       return std::nullopt;
     if (const auto spoken = detect_protocol(recent_.get()))
-      return fmt::format("{}: no {}: it speaks {}", port_.path(), kind_, name_of(*spoken));
+      return fmt::format("{}: no {}: it speaks {}", port_.path(), wanted_.kind, name_of(*spoken));
     return fmt::format("{}: bytes that are none of {}; wrong baud rate or another kind of device?",
-                       port_.path(), protocols_);
+                       port_.path(), wanted_.protocols);
   }
 
  private:
   SerialPort port_;
-  std::string kind_;
-  std::string protocols_;
-  Hint hint_;
+  WantedDevice wanted_;
   RecentBytes recent_;
   Timestamp since_;
   const Clock& clock_;
@@ -220,64 +229,22 @@ std::string names_of(const Choices& choices) {
   return names;
 }
 
-OpenDevice configured_uwb(const UwbSensorSettings& settings, const Clock& clock,
-                          const EventSink& sink) {
-  const auto device_of = [=, &clock](SerialProtocol protocol) {
-    return uwb_device(protocol, settings, clock, sink);
-  };
-  switch (settings.device.protocol) {
-    case UwbProtocol::kLinkTrack:
-      return device_of(SerialProtocol::kNlink);
-    case UwbProtocol::kDwm1001Shell:
-      return device_of(SerialProtocol::kDwm1001Shell);
-    case UwbProtocol::kDwm1001Tlv:
-      return device_of(SerialProtocol::kDwm1001Tlv);
-    case UwbProtocol::kMaUwb:
-      return device_of(SerialProtocol::kMaUwb);
-    case UwbProtocol::kFiraUci:
-      return device_of(SerialProtocol::kFiraUci);
-    case UwbProtocol::kBu03:
-      return device_of(SerialProtocol::kBu03);
-    case UwbProtocol::kRangeLine:
-      return device_of(SerialProtocol::kRangeLine);
-    case UwbProtocol::kAuto:
-      break;
+/// The device of the configured protocol, or one that detects which of `dialects` it speaks.
+template <class Settings, class Dialects>
+OpenDevice configured_device(const Settings& settings, const Dialects& dialects,
+                             const WantedDevice& wanted, const Clock& clock,
+                             const EventSink& sink) {
+  for (const auto& dialect : dialects) {
+    if (dialect.configured == settings.device.protocol)
+      return dialect.device(settings, clock, sink);
   }
-  return [=, &clock](SerialPort port) {
-    return std::make_unique<UnknownDevice>(std::move(port), "ranging module",
-                                           names_of(kUwbProtocols), &foreign_meaning, clock,
-                                           device_of);
-  };
-}
-
-OpenDevice configured_imu(const ImuSensorSettings& settings, const Clock& clock,
-                          const EventSink& sink) {
-  switch (settings.device.protocol) {
-    case ImuProtocol::kWitMotion:
-      return imu_device(SerialProtocol::kWitMotion, settings, clock, sink);
-    case ImuProtocol::kWitMotionBle:
-      return imu_device(SerialProtocol::kWitMotionBle, settings, clock, sink);
-    case ImuProtocol::kHipnuc:
-      return imu_device(SerialProtocol::kHipnuc, settings, clock, sink);
-    case ImuProtocol::kXsens:
-      return imu_device(SerialProtocol::kXsens, settings, clock, sink);
-    case ImuProtocol::kMavlink:
-      return imu_device(SerialProtocol::kMavlink, settings, clock, sink);
-    case ImuProtocol::kVectorNav:
-      return imu_device(SerialProtocol::kVectorNav, settings, clock, sink);
-    case ImuProtocol::kMicroStrain:
-      return imu_device(SerialProtocol::kMicroStrain, settings, clock, sink);
-    case ImuProtocol::kIio:  // on no serial port
-    case ImuProtocol::kAuto:
-      break;
-  }
-  const auto device_of = [=, &clock](SerialProtocol protocol) {
-    return imu_device(protocol, settings, clock, sink);
+  const auto device_of = [=, &dialects, &clock](SerialProtocol spoken) {
+    for (const auto& dialect : dialects)
+      if (dialect.spoken == spoken) return dialect.device(settings, clock, sink);
+    return OpenDevice();
   };
   return [=, &clock](SerialPort port) {
-    const auto no_hint = [](Bytes) -> std::optional<std::string> { return std::nullopt; };
-    return std::make_unique<UnknownDevice>(std::move(port), "inertial sensor",
-                                           names_of(kImuProtocols), no_hint, clock, device_of);
+    return std::make_unique<UnknownDevice>(std::move(port), wanted, clock, device_of);
   };
 }
 
@@ -314,15 +281,17 @@ ImuSensorSettings imu_sensor_settings(const Config& config) {
 
 Sensor uwb_sensor(const UwbSensorSettings& settings, const Clock& clock, const EventSink& sink,
                   DeviceName& name) {
+  const WantedDevice wanted{"ranging module", names_of(kUwbProtocols), &foreign_meaning};
   return serial_sensor("uwb", settings.device.port, settings.device.baud,
-                       configured_uwb(settings, clock, sink), name);
+                       configured_device(settings, kUwbDialects, wanted, clock, sink), name);
 }
 
 Sensor imu_sensor(const ImuSensorSettings& settings, const Clock& clock, const EventSink& sink,
                   DeviceName& name) {
   if (settings.device.protocol == ImuProtocol::kIio) return iio_sensor(settings, clock, sink);
+  const WantedDevice wanted{.kind = "inertial sensor", .protocols = names_of(kImuProtocols)};
   return serial_sensor("imu", settings.device.port, settings.device.baud,
-                       configured_imu(settings, clock, sink), name);
+                       configured_device(settings, kImuDialects, wanted, clock, sink), name);
 }
 
 }  // namespace crepes

@@ -12,6 +12,8 @@
 #include <system_error>
 #include <utility>
 
+#include "drivers/base/io_failure.hpp"
+
 namespace crepes {
 namespace {
 
@@ -48,17 +50,13 @@ Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
   argv.push_back(nullptr);
 
   const int fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) {
-    return fail(ErrorCode::kIo,
-                fmt::format("{}: {}", log.string(), std::generic_category().message(errno)));
-  }
+  if (fd < 0) return io_failure(log.string());
   const pid_t parent = ::getpid();
   const pid_t pid = ::fork();
   if (pid == 0) become(argv.front(), argv.data(), fd, parent);
   const int reason = errno;
   ::close(fd);
-  if (pid < 0)
-    return fail(ErrorCode::kIo, std::string("fork: ") + std::generic_category().message(reason));
+  if (pid < 0) return io_failure("fork", reason);
   return ChildProcess(pid);
 }
 

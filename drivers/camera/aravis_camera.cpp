@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <string_view>
 #include <utility>
 
 #include "drivers/camera/aravis_call.hpp"
@@ -169,7 +167,7 @@ class AravisCamera final : public Camera {
 
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     constexpr double kTooMany = 0.05;
-    if (is_exposure_long_) return "the exposure is longer than a frame at rate_hz: set exposure_us";
+    if (is_exposure_long_) return kExposureTooLong;
     if (incomplete_share_ < kTooMany) return std::nullopt;
     return fmt::format(
         "one frame in {} comes incomplete: packets get lost; use jumbo frames and packet_size "

@@ -41,6 +41,10 @@ struct Frame {
   [[nodiscard]] std::ptrdiff_t stride() const { return borrowed ? borrowed_stride : width; }
 };
 
+/// The diagnosis of a camera whose exposure leaves no time for its frame rate.
+inline constexpr const char* kExposureTooLong =
+    "the exposure is longer than a frame at rate_hz: set exposure_us";
+
 class Camera {
  public:
   Camera() = default;

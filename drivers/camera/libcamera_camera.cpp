@@ -67,7 +67,7 @@ class LibcameraCamera final : public Camera {
 
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     if (!is_exposure_long_) return std::nullopt;
-    return "the exposure is longer than a frame at rate_hz: set exposure_us";
+    return kExposureTooLong;
   }
 
  private:

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 #include <utility>
 
 #include "drivers/camera/mindvision_library.hpp"
@@ -135,7 +134,7 @@ class MindVisionCamera final : public Camera {
 
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     if (!is_exposure_long_) return std::nullopt;
-    return "the exposure is longer than a frame at rate_hz: set exposure_us";
+    return kExposureTooLong;
   }
 
  private:

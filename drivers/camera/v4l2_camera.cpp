@@ -8,10 +8,9 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <string_view>
-#include <system_error>
 #include <utility>
 
+#include "drivers/base/io_failure.hpp"
 #include "drivers/camera/frame_sequence.hpp"
 #include "drivers/camera/grey_conversion.hpp"
 
@@ -36,10 +35,6 @@ std::string name_of(std::uint32_t format) {
   return name;
 }
 
-tl::unexpected<Error> refusal(const std::string& what, int error) {
-  return fail(ErrorCode::kIo, fmt::format("{}: {}", what, std::generic_category().message(error)));
-}
-
 /// A running device. It lives until all of its buffers have been returned.
 class V4l2Session {
  public:
@@ -62,7 +57,7 @@ class V4l2Session {
     v4l2_buffer buffer = empty_buffer(0);
     const int error = device_->ioctl(VIDIOC_DQBUF, &buffer);
     if (error == EAGAIN) return std::optional<v4l2_buffer>{};
-    if (error != 0) return refusal(fmt::format("{}: the camera is gone", name_), error);
+    if (error != 0) return io_failure(fmt::format("{}: the camera is gone", name_), error);
     if (buffer.index >= buffers_.size())
       return fail(ErrorCode::kIo, fmt::format("{}: a buffer that does not exist", name_));
     return std::optional(buffer);
@@ -94,12 +89,12 @@ class V4l2Session {
       static_cast<void>(set(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL));  // may have none
       const auto units = std::max(1L, std::lround(*light.exposure_us / kExposureUnit));
       if (const int error = set(V4L2_CID_EXPOSURE_ABSOLUTE, static_cast<int>(units)); error != 0)
-        return refusal(fmt::format("{}: exposure_us", name_), error);
+        return io_failure(fmt::format("{}: exposure_us", name_), error);
     }
     if (!light.gain) return {};
     static_cast<void>(set(V4L2_CID_AUTOGAIN, 0));  // may have none
     const int error = set(V4L2_CID_GAIN, static_cast<int>(std::lround(*light.gain)));
-    return error == 0 ? Result<void>{} : refusal(fmt::format("{}: gain", name_), error);
+    return error == 0 ? Result<void>{} : io_failure(fmt::format("{}: gain", name_), error);
   }
 
  private:
@@ -114,7 +109,7 @@ class V4l2Session {
   Result<void> check_abilities() {
     v4l2_capability ability{};
     if (const int error = device_->ioctl(VIDIOC_QUERYCAP, &ability); error != 0)
-      return refusal(fmt::format("{}: no video device", name_), error);
+      return io_failure(fmt::format("{}: no video device", name_), error);
     constexpr std::uint32_t kNeeded = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
     const std::uint32_t able = (ability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
                                    ? ability.device_caps
@@ -141,7 +136,7 @@ class V4l2Session {
                 static_cast<std::uint32_t>(config.calibration.resolution[1])};
     const v4l2_rect wanted = region.r;
     if (const int error = device_->ioctl(VIDIOC_S_SELECTION, &region); error != 0)
-      return refusal(fmt::format("{}: offset", name_), error);
+      return io_failure(fmt::format("{}: offset", name_), error);
     if (region.r.left == wanted.left && region.r.top == wanted.top) return {};
     return fail(ErrorCode::kConfig, fmt::format("{}: offset: the device takes [{}, {}] instead",
                                                 name_, region.r.left, region.r.top));
@@ -157,7 +152,7 @@ class V4l2Session {
       format.fmt.pix.pixelformat = wanted.code;
       format.fmt.pix.field = V4L2_FIELD_NONE;
       const int error = device_->ioctl(VIDIOC_S_FMT, &format);
-      if (error == EBUSY) return refusal(name_, error);
+      if (error == EBUSY) return io_failure(name_, error);
       if (error != 0) continue;
       format_ = format.fmt.pix;
       bits_ = wanted.bits;
@@ -188,7 +183,7 @@ class V4l2Session {
     const int error = device_->ioctl(VIDIOC_S_PARM, &parameters);
     if (error == 0 || error == ENOTTY || error == EINVAL)
       return {};  // FrameHealth reports a wrong rate
-    return refusal(fmt::format("{}: rate_hz", name_), error);
+    return io_failure(fmt::format("{}: rate_hz", name_), error);
   }
 
   int set(std::uint32_t id, int value) {
@@ -202,11 +197,11 @@ class V4l2Session {
     wanted.type = kCapture;
     wanted.memory = V4L2_MEMORY_MMAP;
     if (const int error = device_->ioctl(VIDIOC_REQBUFS, &wanted); error != 0)
-      return refusal(fmt::format("{}: buffers", name_), error);
+      return io_failure(fmt::format("{}: buffers", name_), error);
     for (std::uint32_t i = 0; i < wanted.count; ++i) {
       v4l2_buffer buffer = empty_buffer(i);
       if (const int error = device_->ioctl(VIDIOC_QUERYBUF, &buffer); error != 0)
-        return refusal(fmt::format("{}: buffers", name_), error);
+        return io_failure(fmt::format("{}: buffers", name_), error);
       buffers_.push_back(device_->map(buffer.length, buffer.m.offset));
       if (buffers_.back().size() < frame_size())
         return fail(ErrorCode::kIo, fmt::format("{}: buffers that hold no frame", name_));
@@ -214,7 +209,7 @@ class V4l2Session {
     }
     std::uint32_t type = kCapture;
     const int error = device_->ioctl(VIDIOC_STREAMON, &type);
-    return error == 0 ? Result<void>{} : refusal(fmt::format("{}: start", name_), error);
+    return error == 0 ? Result<void>{} : io_failure(fmt::format("{}: start", name_), error);
   }
 
   std::unique_ptr<V4l2Device> device_;  // closing it stops the stream
@@ -274,7 +269,7 @@ class V4l2Camera final : public Camera {
 
   [[nodiscard]] std::optional<std::string> diagnosis() const override {
     if (!is_exposure_long_) return std::nullopt;
-    return "the exposure is longer than a frame at rate_hz: set exposure_us";
+    return kExposureTooLong;
   }
 
  private:

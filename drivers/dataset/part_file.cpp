@@ -2,9 +2,10 @@
 
 #include <fmt/core.h>
 
-#include <cerrno>
 #include <fstream>
 #include <utility>
+
+#include "drivers/base/io_failure.hpp"
 
 namespace crepes {
 namespace {
@@ -31,8 +32,7 @@ Result<void> write_text(const fs::path& file, std::string_view text, std::ios::o
   out.write(text.data(), static_cast<std::streamsize>(text.size()));
   out.close();
   if (out) return {};
-  return fail(ErrorCode::kIo,
-              fmt::format("{}: {}", file.string(), std::generic_category().message(errno)));
+  return io_failure(file.string());
 }
 
 /// Gives the written part its final name.

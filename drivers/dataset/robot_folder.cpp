@@ -2,9 +2,9 @@
 
 #include <fmt/core.h>
 
-#include <cerrno>
 #include <system_error>
 
+#include "drivers/base/io_failure.hpp"
 #include "drivers/dataset/dataset_rows.hpp"
 #include "drivers/dataset/part_file.hpp"
 
@@ -12,11 +12,6 @@ namespace crepes {
 namespace {
 
 namespace fs = std::filesystem;
-
-tl::unexpected<Error> failure(const fs::path& file) {
-  return fail(ErrorCode::kIo,
-              fmt::format("{}: {}", file.string(), std::generic_category().message(errno)));
-}
 
 std::string_view header_of(const std::string& sensor) {
   if (sensor == "imu0") return kImuHeader;
@@ -68,7 +63,7 @@ Result<void> RobotFolder::append_to(const fs::path& file, std::string_view heade
   }
   out << text << std::flush;
   bytes_ += text.size();
-  if (!out) return failure(file);
+  if (!out) return io_failure(file.string());
   return {};
 }
 

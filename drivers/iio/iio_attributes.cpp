@@ -10,7 +10,6 @@
 #include <cmath>
 #include <limits>
 #include <system_error>
-#include <utility>
 
 #include "drivers/base/number_text.hpp"
 #include "drivers/base/text_file.hpp"

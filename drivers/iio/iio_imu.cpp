@@ -5,9 +5,9 @@
 
 #include <array>
 #include <cerrno>
-#include <cmath>
-#include <system_error>
 #include <utility>
+
+#include "drivers/base/io_failure.hpp"
 
 namespace crepes {
 namespace {
@@ -25,7 +25,7 @@ Result<void> wait_for_data(std::array<pollfd, 2>& waiting, std::size_t count,
                            std::chrono::milliseconds timeout) {
   if (::poll(waiting.data(), count, static_cast<int>(timeout.count())) >= 0 || errno == EINTR)
     return {};
-  return fail(ErrorCode::kIo, "poll: " + std::generic_category().message(errno));
+  return io_failure("poll");
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 /// Bytes for devices that must be asked.
 #pragma once
 
-#include <span>
 #include <string_view>
 
 #include "drivers/serial/frame_decoder.hpp"

@@ -6,16 +6,12 @@
 #include <linux/serial.h>
 #include <sys/ioctl.h>
 
-#include <cerrno>
 #include <cstdlib>
-#include <system_error>
+
+#include "drivers/base/io_failure.hpp"
 
 namespace crepes {
 namespace {
-
-tl::unexpected<Error> io_error(const std::string& name) {
-  return fail(ErrorCode::kIo, fmt::format("{}: {}", name, std::generic_category().message(errno)));
-}
 
 /// Otherwise USB adapters buffer bytes for up to 16 ms. Adapters that never do (cdc_acm) refuse.
 void prefer_low_latency(int fd) {
@@ -30,7 +26,7 @@ void prefer_low_latency(int fd) {
 Result<void> set_raw_line(int fd, int baud, const std::string& name) {
   const auto rate = static_cast<speed_t>(baud);
   termios2 settings{};
-  if (::ioctl(fd, TCGETS2, &settings) != 0) return io_error(name);
+  if (::ioctl(fd, TCGETS2, &settings) != 0) return io_failure(name);
   settings.c_iflag = 0;
   settings.c_oflag = 0;
   settings.c_lflag = 0;
@@ -39,17 +35,17 @@ Result<void> set_raw_line(int fd, int baud, const std::string& name) {
   settings.c_ospeed = rate;
   settings.c_cc[VMIN] = 1;
   settings.c_cc[VTIME] = 0;
-  if (::ioctl(fd, TCSETS2, &settings) != 0) return io_error(name);
+  if (::ioctl(fd, TCSETS2, &settings) != 0) return io_failure(name);
 
   // The driver selects the nearest supported rate without an error, and reports it.
   termios2 taken{};
-  if (::ioctl(fd, TCGETS2, &taken) != 0) return io_error(name);
+  if (::ioctl(fd, TCGETS2, &taken) != 0) return io_failure(name);
   const long off = std::labs(static_cast<long>(taken.c_ospeed) - baud);
   if (50 * off > baud) {
     return fail(ErrorCode::kIo,
                 fmt::format("{}: the device makes {} baud of {}", name, taken.c_ospeed, baud));
   }
-  if (::ioctl(fd, TIOCEXCL) != 0) return io_error(name);
+  if (::ioctl(fd, TIOCEXCL) != 0) return io_failure(name);
   prefer_low_latency(fd);
   static_cast<void>(::ioctl(fd, TCFLSH, TCIFLUSH));
   return {};

@@ -10,7 +10,6 @@
 #include "drivers/sim/seeded_noise.hpp"
 #include "estimator/core/pose.hpp"
 #include "estimator/vision/camera_model.hpp"
-#include "estimator/vision/id_library.hpp"
 
 namespace crepes {
 

@@ -5,12 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <system_error>
 #include <type_traits>
 #include <utility>
 
+#include "drivers/base/io_failure.hpp"
 #include "estimator/core/contract.hpp"
 
 namespace crepes {
@@ -18,16 +17,12 @@ namespace {
 
 static_assert(std::is_trivially_copyable_v<SteeredState>);
 
-Error fault_of(const std::string& name) {
-  return {ErrorCode::kIo, name + ": " + std::generic_category().message(errno)};
-}
-
 }  // namespace
 
 Result<MotionTrackWriter> MotionTrackWriter::create(const std::filesystem::path& file,
                                                     std::size_t robots) {
   UniqueFd fd{::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)};
-  if (!fd) return tl::unexpected(fault_of(file.string()));
+  if (!fd) return io_failure(file.string());
   return MotionTrackWriter(std::move(fd), file.string(), robots);
 }
 
@@ -35,7 +30,7 @@ Result<void> MotionTrackWriter::append(const std::vector<SteeredState>& robots) 
   CREPES_EXPECT(robots.size() == robots_, "a record has all robots");
   const std::size_t bytes = robots_ * sizeof(SteeredState);
   const auto written = ::write(file_.get(), robots.data(), bytes);
-  if (written < 0) return tl::unexpected(fault_of(name_));
+  if (written < 0) return io_failure(name_);
   if (static_cast<std::size_t>(written) != bytes)
     return fail(ErrorCode::kIo, name_ + ": no space for a whole record");
   ++records_;
@@ -45,7 +40,7 @@ Result<void> MotionTrackWriter::append(const std::vector<SteeredState>& robots) 
 Result<MotionTrackReader> MotionTrackReader::open(const std::filesystem::path& file,
                                                   std::size_t robots) {
   UniqueFd fd{::open(file.c_str(), O_RDONLY | O_CLOEXEC)};
-  if (!fd) return tl::unexpected(fault_of(file.string()));
+  if (!fd) return io_failure(file.string());
   return MotionTrackReader(std::move(fd), robots);
 }
 

@@ -1,31 +1,28 @@
 #include "drivers/sim/pseudo_terminal.hpp"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <poll.h>
 #include <termios.h>
 
 #include <array>
-#include <cerrno>
 #include <cstdlib>
-#include <system_error>
+
+#include "drivers/base/io_failure.hpp"
 
 namespace crepes {
 
 Result<PseudoTerminal> PseudoTerminal::open() {
-  const auto io_error = [] {
-    return fail(ErrorCode::kIo,
-                fmt::format("pseudo-terminal: {}", std::generic_category().message(errno)));
-  };
+  const std::string name = "pseudo-terminal";
   UniqueFd master{::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)};
-  if (!master || ::grantpt(master.get()) != 0 || ::unlockpt(master.get()) != 0) return io_error();
+  if (!master || ::grantpt(master.get()) != 0 || ::unlockpt(master.get()) != 0)
+    return io_failure(name);
   std::array<char, 128> path{};
-  if (::ptsname_r(master.get(), path.data(), path.size()) != 0) return io_error();
+  if (::ptsname_r(master.get(), path.data(), path.size()) != 0) return io_failure(name);
   // Raw mode before the other end is opened: bytes received until then must not be echoed.
   termios settings{};
-  if (::tcgetattr(master.get(), &settings) != 0) return io_error();
+  if (::tcgetattr(master.get(), &settings) != 0) return io_failure(name);
   ::cfmakeraw(&settings);
-  if (::tcsetattr(master.get(), TCSANOW, &settings) != 0) return io_error();
+  if (::tcsetattr(master.get(), TCSANOW, &settings) != 0) return io_failure(name);
   return PseudoTerminal(std::move(master), path.data());
 }
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "drivers/sim/world.hpp"
-#include "drivers/uwb/nlink.hpp"
+#include "drivers/uwb/nlink_frame.hpp"
 #include "estimator/core/result.hpp"
 #include "estimator/core/sensor_noise.hpp"
 #include "estimator/core/swarm_config.hpp"

@@ -126,8 +126,8 @@ bool ImuGuard::shows_gravity() const {
 }
 
 bool ImuGuard::is_late(const ImuSample& sample) const {
-  if (held_count_ > 0) return sample.stamp <= held_.at(held_count_ - 1).stamp;
-  return reference_ && sample.stamp <= reference_->last.stamp;
+  const ImuSample* const last = newest();
+  return last != nullptr && sample.stamp <= last->stamp;
 }
 
 bool ImuGuard::agrees(const ImuSample& sample, const ImuMean& mean) const {
@@ -156,14 +156,20 @@ PerSensor ImuGuard::excess(const ImuSample& sample, const Reference& reference) 
 }
 
 ImuGuard::Reference ImuGuard::reference_of_held(std::size_t i) const {
-  return {held_.at(i), i > 0 ? held_.at(i - 1) : reference_->last};
+  return {held_.at(i), before_held(i)};
+}
+
+const ImuSample& ImuGuard::before_held(std::size_t i) const {
+  return i > 0 ? held_.at(i - 1) : reference_->last;
+}
+
+const ImuSample* ImuGuard::newest() const {
+  return held_count_ > 0 || reference_ ? &before_held(held_count_) : nullptr;
 }
 
 void ImuGuard::compare(const ImuSample& sample) {
-  const bool is_continuous =
-      held_count_ > 0 ? sample.stamp - held_.at(held_count_ - 1).stamp <= kLongestGap
-                      : reference_ && sample.stamp - reference_->last.stamp <= kLongestGap;
-  if (!is_continuous) {
+  const ImuSample* const last = newest();
+  if (last == nullptr || sample.stamp - last->stamp > kLongestGap) {
     const bool is_doubtful = has_jumped_ || has_refused_;
     drop_held(ImuFault::kSpike);
     has_jumped_ = is_doubtful && reference_;
@@ -235,8 +241,7 @@ void ImuGuard::follow_force(const ImuSample& sample, const ImuSample& last) {
 
 void ImuGuard::believe_held(std::size_t from) {
   count(ImuFault::kSpike, from);
-  for (std::size_t i = 0; i < from; ++i)
-    refuse_spike(held_.at(i), i > 0 ? held_.at(i - 1) : reference_->last);
+  for (std::size_t i = 0; i < from; ++i) refuse_spike(held_.at(i), before_held(i));
   for (std::size_t i = from; i < held_count_; ++i) believe(held_.at(i));
   clear_held();
 }
@@ -262,7 +267,7 @@ void ImuGuard::clear_held() {
 }
 
 void ImuGuard::hold(const ImuSample& sample) {
-  follow_force(sample, held_count_ > 0 ? held_.at(held_count_ - 1) : reference_->last);
+  follow_force(sample, before_held(held_count_));
   if (held_count_ == kMostHeld) {
     std::shift_left(held_.begin(), held_.end(), 1);
     --held_count_;

@@ -90,6 +90,10 @@ class ImuGuard {
   [[nodiscard]] PerSensor largest_change() const;
   [[nodiscard]] PerSensor excess(const ImuSample& sample, const Reference& reference) const;
   [[nodiscard]] Reference reference_of_held(std::size_t i) const;
+  /// The sample before the held one `i`; the last believed one before the first of them.
+  [[nodiscard]] const ImuSample& before_held(std::size_t i) const;
+  /// The last sample that was held or believed; null before the first.
+  [[nodiscard]] const ImuSample* newest() const;
 
   void compare(const ImuSample& sample);
   void judge(const ImuSample& sample);

@@ -6,22 +6,22 @@
 #include <map>
 #include <numeric>
 #include <set>
-#include <tuple>
 #include <utility>
 #include <variant>
 
 #include "estimator/core/contract.hpp"
 #include "estimator/relative/tilt_filter.hpp"
+#include "estimator/swarm/camera_tracks.hpp"
 #include "estimator/swarm/filter_settings.hpp"
 #include "estimator/swarm/graph_problem_builder.hpp"
 #include "estimator/swarm/imu_mounting.hpp"
 #include "estimator/swarm/neighbor.hpp"
 #include "estimator/swarm/report_composer.hpp"
 #include "estimator/swarm/robot_state.hpp"
+#include "estimator/swarm/settings_change.hpp"
 #include "estimator/swarm/swapped_modules.hpp"
 #include "estimator/swarm/team_intake.hpp"
 #include "estimator/swarm/team_log.hpp"
-#include "estimator/vision/blink_tracker.hpp"
 
 namespace crepes {
 namespace {
@@ -56,34 +56,6 @@ bool connects_three_robots(const GraphProblem& problem) {
   return robots.size() > 2;
 }
 
-/// The same robots without their names, which no filter uses.
-SwarmConfig unnamed(SwarmConfig swarm) {
-  for (MemberConfig& member : swarm.members) member.name.clear();
-  return swarm;
-}
-
-/// What the tracks of lights depend on.
-SwarmConfig as_seen(SwarmConfig swarm) {
-  for (MemberConfig& member : swarm.members) {
-    member.name.clear();
-    member.uwb_id.reset();
-    member.range_delay_m = 0.0;
-    member.p_body_led = member.p_body_uwb = Eigen::Vector3d::Zero();
-  }
-  return swarm;
-}
-
-/// Whether LEDs, antenna or module of a robot that is a member of both are others.
-bool is_mounted_otherwise(const SwarmConfig& before, const SwarmConfig& now) {
-  const auto mounting = [](const MemberConfig& member) {
-    return std::tuple(member.p_body_led, member.p_body_uwb, member.range_delay_m, member.uwb_id);
-  };
-  return std::ranges::any_of(before.members, [&](const MemberConfig& was) {
-    const auto is = std::ranges::find(now.members, was.id, &MemberConfig::id);
-    return is != now.members.end() && mounting(*is) != mounting(was);
-  });
-}
-
 /// What clients have received of a neighbor, whatever filters it had.
 struct PublishedPoses {
   Timestamp newest = kNever;
@@ -108,50 +80,35 @@ void append(const Records& more, Records& all) {
                           more.calibrations.end());
 }
 
-std::vector<BlinkTracker> make_trackers(const EstimatorSettings& settings) {
-  const auto library = IdLibrary::from(settings.swarm);
-  CREPES_EXPECT(library.has_value(), "validated: every member has a code of its own");
-  std::vector<BlinkTracker> trackers;
-  for (const CameraCalibration& camera : settings.cameras) {
-    const auto model = CameraModel::from(camera);
-    CREPES_EXPECT(model.has_value(), "validated: every camera has a calibration");
-    trackers.emplace_back(camera, *model, settings.vision, *library, settings.self);
-  }
-  return trackers;
-}
-
-std::vector<bool> are_calibrated(const EstimatorSettings& settings) {
-  std::vector<bool> all;
-  for (const CameraCalibration& camera : settings.cameras) all.push_back(camera.calibrated);
-  return all;
-}
-
 /// What the antenna delays of both modules add to a range.
 double delay_between(const SwarmConfig& swarm, RobotId a, RobotId b) {
   return member_of(swarm, a).range_delay_m + member_of(swarm, b).range_delay_m;
 }
 
+ExpectedBoard expected_board(const NeighborPose& pose, const Eigen::Vector3d& p_N_M) {
+  return {.robot = pose.neighbor,
+          .stamp = pose.stamp,
+          .p_B_M = pose.T_B_N.pose * p_N_M,
+          .v_B_M = pose.v_B_N,
+          .covariance_m2 = pose.T_B_N.covariance.topLeftCorner<3, 3>()};
+}
+
 }  // namespace
 
 struct Estimator::State {
-  explicit State(const EstimatorSettings& settings)
-      : id(settings.self),
-        tilt_filter(settings.imu),
-        trackers(make_trackers(settings)),
-        is_calibrated(are_calibrated(settings)),
-        composer(settings.self),
-        graph_enabled(settings.solves_graph),
-        uses_team_filter(settings.uses_team_filter),
-        team_size(settings.team_size),
-        report_timer(period_of(settings.report_rate_hz)),
-        graph_timer(period_of(settings.graph_rate_hz)),
-        swarm(settings.swarm),
-        filters(filter_settings(settings.filters, settings.imu, settings.range)),
-        vision(settings.vision) {
+  explicit State(const EstimatorSettings& initial)
+      : id(initial.self),
+        settings(initial),
+        filters(filter_settings(initial)),
+        tilt_filter(initial.imu),
+        cameras(initial),
+        composer(initial.self),
+        report_timer(period_of(initial.report_rate_hz)),
+        graph_timer(period_of(initial.graph_rate_hz)) {
     add_new_members();
   }
 
-  void reconfigure(const EstimatorSettings& settings);
+  void reconfigure(const EstimatorSettings& now);
   void add_new_members();
 
   Outputs handle(const ImuSample& sample);
@@ -164,14 +121,12 @@ struct Estimator::State {
 
   void accept(const ReceivedReport& received, Neighbor& sender);
   [[nodiscard]] bool runs_team_filter() const {
-    return graph_enabled && uses_team_filter && filters.traits.has_team_filter;
+    return settings.solves_graph && settings.uses_team_filter && filters.traits.has_team_filter;
   }
   /// Null without samples.
   [[nodiscard]] const ImuHistory* imu_of(RobotId robot) const;
   [[nodiscard]] GraphProblem graph_problem(const std::vector<NeighborEstimate>& own) const;
   [[nodiscard]] std::optional<TeamInterval> team_interval(Timestamp now);
-  [[nodiscard]] Bearing with_stamp_error(Bearing bearing) const;
-  [[nodiscard]] ExpectedBoard expected_board(const NeighborPose& pose) const;
   [[nodiscard]] std::vector<TeamFault> mounting_faults_of(RobotId robot) const;
   [[nodiscard]] std::vector<TeamFault> faults_of(RobotId robot) const;
   void refuse_wrong_mountings();
@@ -179,26 +134,21 @@ struct Estimator::State {
   void end_team();
 
   RobotId id;
+  EstimatorSettings settings;
+  FilterSettings filters;
   RobotState self;
   TiltFilter tilt_filter;
-  std::vector<BlinkTracker> trackers;
-  std::vector<bool> is_calibrated;  ///< one for each tracker
+  CameraTracks cameras;
   std::map<RobotId, Neighbor> neighbors;
   std::map<RobotId, PublishedPoses> published;
   GraphProblemBuilder graph_builder;
   TeamIntake team_intake;
   Timestamp last_team = kNever;  ///< an interval of three robots
   ReportComposer composer;
-  bool graph_enabled;
-  bool uses_team_filter;
-  std::size_t team_size;
   PeriodicTimer report_timer;
   PeriodicTimer graph_timer;
   Timestamp last_tick = kNever;
   std::vector<ExpectedBoard> expected;  ///< by the poses of the last tick
-  SwarmConfig swarm;
-  FilterSettings filters;
-  VisionConfig vision;
   bool keeps_records = false;
   TeamLog team_log;
   SwappedModules swapped_modules;
@@ -211,44 +161,34 @@ struct Estimator::State {
 
 /// A Neighbor for every member that has none yet.
 void Estimator::State::add_new_members() {
-  const MemberConfig& own = member_of(swarm, id);
-  for (const MemberConfig& member : swarm.members) {
+  const MemberConfig& own = member_of(settings.swarm, id);
+  for (const MemberConfig& member : settings.swarm.members) {
     if (member.id == id) continue;
     const auto [neighbor, is_new] = neighbors.try_emplace(member.id, own, member, filters);
     if (is_new && keeps_records) neighbor->second.outcomes().keep_records();
   }
 }
 
-void Estimator::State::reconfigure(const EstimatorSettings& settings) {
-  CREPES_EXPECT(settings.self == id && settings.cameras.size() == trackers.size(),
+void Estimator::State::reconfigure(const EstimatorSettings& now) {
+  CREPES_EXPECT(now.self == id && now.cameras.size() == cameras.size(),
                 "robot and cameras stay the same");
-  const SwarmConfig before = unnamed(std::exchange(swarm, settings.swarm));
-  const SwarmConfig now = unnamed(swarm);
-  const Priors priors = filters.priors;
-  filters = filter_settings(settings.filters, settings.imu, settings.range);
-  // What the team has learned of a module holds no longer after a calibration.
-  if (is_mounted_otherwise(before, now) || !(priors == filters.priors)) team_intake = {};
-  const bool own_is_same = member_of(before, id) == member_of(now, id);
-  std::erase_if(neighbors, [&](const auto& entry) {
-    const RobotId robot = entry.first;
-    if (own_is_same && std::ranges::count(now.members, member_of(before, robot)) > 0) return false;
+  const SettingsChange change = change_between(settings, now);
+  settings = now;
+  filters = filter_settings(now);
+  if (change.restarts_team) team_intake = {};
+  for (const RobotId robot : change.restarts_neighbors) {
     published[robot].resets_before = published[robot].resets;
-    return true;
-  });
+    neighbors.erase(robot);
+  }
   for (auto& [robot, neighbor] : neighbors) neighbor.reconfigure(filters);
   add_new_members();
 
-  tilt_filter.set_noise(settings.imu);
-  if (!(as_seen(now) == as_seen(before) && settings.vision == vision))
-    trackers = make_trackers(settings);
-  vision = settings.vision;
+  tilt_filter.set_noise(now.imu);
+  if (change.restarts_tracks) cameras = CameraTracks(now);
   swapped_modules = {};
-  graph_enabled = settings.solves_graph;
-  uses_team_filter = settings.uses_team_filter;
-  team_size = settings.team_size;
   if (!runs_team_filter()) end_team();
-  report_timer = PeriodicTimer(period_of(settings.report_rate_hz));
-  graph_timer = PeriodicTimer(period_of(settings.graph_rate_hz));
+  report_timer = PeriodicTimer(period_of(now.report_rate_hz));
+  graph_timer = PeriodicTimer(period_of(now.graph_rate_hz));
 }
 
 Outputs Estimator::State::handle(const ImuSample& sample) {
@@ -259,7 +199,7 @@ Outputs Estimator::State::handle(const ImuSample& sample) {
     }
     ++used_samples;
     self.tilt = tilt_filter.tilt();
-    for (BlinkTracker& tracker : trackers) tracker.add_imu(believed);
+    cameras.add_imu(believed);
   }
   return {};
 }
@@ -279,56 +219,34 @@ Outputs Estimator::State::handle(const UwbRange& range) {
     return {};
   }
   UwbRange corrected = range;
-  corrected.range_m -= delay_between(swarm, id, range.neighbor);
+  corrected.range_m -= delay_between(settings.swarm, id, range.neighbor);
   neighbor->second.add(corrected);
   composer.add(corrected);
   return {};
 }
 
 Outputs Estimator::State::handle(const SpotFrame& frame) {
-  if (frame.camera >= trackers.size()) {
+  if (frame.camera >= cameras.size()) {
     ++refused_samples;
     return {};
   }
-  Outputs outputs;
-  BlinkTracker& tracker = trackers[frame.camera];
-  outputs.bearings = tracker.step(frame, expected);
+  SeenBoards seen = cameras.step(frame, expected, self.imu);
   // A robot that sees its own code sees itself in a mirror.
-  std::erase_if(outputs.bearings,
+  std::erase_if(seen.bearings,
                 [&](const Bearing& bearing) { return !neighbors.contains(bearing.neighbor); });
-  // IDs are read through any lens; a direction through a guessed one would be degrees off.
-  if (!is_calibrated[frame.camera]) return outputs;
   // What was named because a pose expects it there says nothing about the pose until it is read.
-  for (const Bearing& bearing : tracker.confirmed()) {
-    if (neighbors.contains(bearing.neighbor))
-      neighbors.at(bearing.neighbor).add(with_stamp_error(bearing));
+  for (const Bearing& bearing : seen.confirmed) {
+    if (neighbors.contains(bearing.neighbor)) neighbors.at(bearing.neighbor).add(bearing);
   }
-  for (Bearing& bearing : outputs.bearings) {
-    bearing = with_stamp_error(bearing);
-    if (bearing.how != Naming::kRead) continue;
+  for (const Bearing& bearing : seen.bearings) {
+    if (!cameras.is_calibrated(frame.camera) || bearing.how != Naming::kRead) continue;
     neighbors.at(bearing.neighbor).add(bearing);
     imu_mounting.add(id, bearing, self.imu);
     composer.add(bearing);
   }
+  Outputs outputs;
+  outputs.bearings = std::move(seen.bearings);
   return outputs;
-}
-
-/// A stamp that is off by dt turns the direction by w dt.
-Bearing Estimator::State::with_stamp_error(Bearing bearing) const {
-  constexpr Duration kNear = std::chrono::milliseconds{10};
-  if (self.imu.empty()) return bearing;
-  const double w = self.imu.mean(bearing.stamp - kNear, bearing.stamp).gyro_radps.norm();
-  bearing.sigma_rad = std::hypot(bearing.sigma_rad, 1e-3 * vision.stamp_sigma_ms * w);
-  return bearing;
-}
-
-ExpectedBoard Estimator::State::expected_board(const NeighborPose& pose) const {
-  const Eigen::Vector3d p_N_M = member_of(swarm, pose.neighbor).p_body_led;
-  return {.robot = pose.neighbor,
-          .stamp = pose.stamp,
-          .p_B_M = pose.T_B_N.pose * p_N_M,
-          .v_B_M = pose.v_B_N,
-          .covariance_m2 = pose.T_B_N.covariance.topLeftCorner<3, 3>()};
 }
 
 /// Those that need no team.
@@ -348,7 +266,7 @@ std::vector<TeamFault> Estimator::State::faults_of(RobotId robot) const {
 /// For the next ticks. What the team has learned from a wrong IMU until it was found is wrong too.
 void Estimator::State::refuse_wrong_mountings() {
   std::set<RobotId> wrong;
-  for (const MemberConfig& member : swarm.members)
+  for (const MemberConfig& member : settings.swarm.members)
     if (imu_mounting.is_wrong(member.id)) wrong.insert(member.id);
   for (const RobotId robot : wrong) refuse_imu(robot);
   if (!std::ranges::includes(wrongly_mounted, wrong)) end_team();
@@ -405,11 +323,11 @@ void Estimator::State::accept(const ReceivedReport& received, Neighbor& sender) 
       imu_mounting.add(peer, bearing, sender.robot_state().imu);
   }
   if (imu_mounting.is_wrong(peer)) return;
-  graph_builder.add_report(received.report, swarm);
+  graph_builder.add_report(received.report, settings.swarm);
   if (!runs_team_filter()) return;
   const ImuHistory& imu = sender.robot_state().imu;
   const double w = imu.empty() ? 0.0 : imu.newest().gyro_radps.norm();
-  team_intake.add_report(received.report, w * received.clock_sigma_s, swarm, filters);
+  team_intake.add_report(received.report, w * received.clock_sigma_s, settings.swarm, filters);
 }
 
 Outputs Estimator::State::handle(const GraphSolution& solution) {
@@ -445,7 +363,7 @@ Outputs Estimator::State::handle(const TeamSolution& solution) {
   Outputs outputs;
   if (keeps_records) {
     TeamRecord record{solution.stamp, solution.residuals, solution.calibrations, solution.faults};
-    for (const MemberConfig& member : swarm.members)
+    for (const MemberConfig& member : settings.swarm.members)
       std::ranges::copy(mounting_faults_of(member.id), std::back_inserter(record.faults));
     outputs.records.team.push_back(std::move(record));
   }
@@ -471,11 +389,11 @@ std::optional<TeamInterval> Estimator::State::team_interval(Timestamp now) {
   constexpr Duration kTeamMemory = std::chrono::seconds{5};
   const auto imus = [this](RobotId robot) { return imu_of(robot); };
   if (imu_mounting.is_wrong(id)) return std::nullopt;
-  auto interval = team_intake.drain(id, now, swarm, filters, imus);
+  auto interval = team_intake.drain(id, now, settings.swarm, filters, imus);
   if (!interval || interval->members.size() < 2) return std::nullopt;
   if (interval->members.size() > 2) last_team = interval->to;
   if (interval->to - last_team > kTeamMemory) return std::nullopt;
-  interval->settings.max_robots = team_size;
+  interval->settings.max_robots = settings.team_size;
   interval->edges = graph_builder.build(interval->to, id, {}, imus).edges;
   return interval;
 }
@@ -498,7 +416,7 @@ Outputs Estimator::State::handle(const Tick& tick) {
     if (auto estimate = neighbor.output().estimate()) estimates.push_back(*estimate);
     if (auto pose = neighbor.output().published()) {
       if (const auto tilt = self.tilt_at(pose->stamp)) pose->up_B = tilt->up_B;
-      expected.push_back(expected_board(*pose));
+      expected.push_back(expected_board(*pose, member_of(settings.swarm, robot).p_body_led));
       if (published[robot].admit(*pose)) outputs.poses.push_back(std::move(*pose));
     }
   }
@@ -506,10 +424,10 @@ Outputs Estimator::State::handle(const Tick& tick) {
     outputs.report = composer.compose(tick.stamp, self, estimates);
   }
   if (outputs.report && runs_team_filter()) {
-    graph_builder.add_report(*outputs.report, swarm);
-    team_intake.add_own_report(*outputs.report, swarm, filters);
+    graph_builder.add_report(*outputs.report, settings.swarm);
+    team_intake.add_own_report(*outputs.report, settings.swarm, filters);
   }
-  if (graph_enabled && !self.imu.empty() && graph_timer.is_due(tick.stamp)) {
+  if (settings.solves_graph && !self.imu.empty() && graph_timer.is_due(tick.stamp)) {
     if (runs_team_filter()) {
       if (auto interval = team_interval(tick.stamp)) outputs.team_problem = std::move(*interval);
     } else if (GraphProblem problem = graph_problem(estimates); connects_three_robots(problem)) {
@@ -548,21 +466,11 @@ EstimatorStatus Estimator::status() const {
   }
   for (const auto& [robot, neighbor] : state_->neighbors) {
     NeighborStatus one = neighbor.status();
-    for (const BlinkTracker& tracker : state_->trackers) {
-      const auto decodes = tracker.status().decodes;
-      const auto found = decodes.find(robot);
-      if (found != decodes.end()) one.id_decodes += found->second;
-    }
-    one.name = member_of(state_->swarm, robot).name;
+    one.name = member_of(state_->settings.swarm, robot).name;
     one.faults = state_->faults_of(robot);
     status.neighbors.push_back(std::move(one));
   }
-  for (const BlinkTracker& tracker : state_->trackers) {
-    const TrackerStatus seen = tracker.status();
-    status.predicted_ids.confirmed += seen.predicted_ids.confirmed;
-    status.predicted_ids.unconfirmed += seen.predicted_ids.unconfirmed;
-    status.foreign_boards += seen.foreign_boards;
-  }
+  state_->cameras.write_to(status);
   status.tilt = state_->self.tilt;
   status.unknown_senders = state_->unknown_senders;
   status.refused_imu = state_->self.guard.refused();

@@ -13,21 +13,20 @@ constexpr double kBiasTime = 2.0;  // s
 // raw pose from counting them first.
 constexpr double kLooseBearing = 0.05;  // rad
 
-ProfileTraits traits_of(Profile profile) {
-  const bool tight = profile == Profile::kTight;
-  return {.has_bias_states = tight,
-          .fuses_single_readings = tight,
-          .hypotheses_compete = tight,
-          .starts_one_way = tight,
-          .has_team_filter = tight};
-}
+constexpr ProfileTraits kPaperTraits{.has_bias_states = false,
+                                     .fuses_single_readings = false,
+                                     .hypotheses_compete = false,
+                                     .starts_one_way = false,
+                                     .has_team_filter = false};
 
 }  // namespace
 
-FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuNoise& imu,
-                               const RangeNoise& range) {
+FilterSettings filter_settings(const EstimatorSettings& settings) {
+  const EstimatorConfig& estimator = settings.filters;
+  const ImuNoise& imu = settings.imu;
+  const RangeNoise& range = settings.range;
   FilterSettings s;
-  s.traits = traits_of(estimator.profile);
+  if (estimator.profile == Profile::kPaper) s.traits = kPaperTraits;
   s.lag = from_seconds(estimator.lag_ms * 1e-3);
   s.recent = from_seconds(estimator.predicted_after_s);
   s.forget = from_seconds(estimator.forget_after_s);

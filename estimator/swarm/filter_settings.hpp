@@ -1,10 +1,9 @@
 /// The configuration, in the form that the filters use.
 #pragma once
 
-#include "estimator/core/sensor_noise.hpp"
 #include "estimator/relative/neighbor_filter.hpp"
 #include "estimator/relative/propagation.hpp"
-#include "estimator/swarm/estimator_config.hpp"
+#include "estimator/swarm/estimator_settings.hpp"
 
 namespace crepes {
 
@@ -42,8 +41,7 @@ struct FilterSettings {
   double late_path_db = 0.0;
 };
 
-/// Derives the settings of the filters.
-[[nodiscard]] FilterSettings filter_settings(const EstimatorConfig& estimator, const ImuNoise& imu,
-                                             const RangeNoise& range);
+/// Derives the settings of the filters, of `filters`, `imu` and `range`.
+[[nodiscard]] FilterSettings filter_settings(const EstimatorSettings& settings);
 
 }  // namespace crepes

@@ -1,7 +1,6 @@
 #include "estimator/swarm/graph_problem_builder.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "estimator/relative/propagation.hpp"

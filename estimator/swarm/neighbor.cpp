@@ -1,6 +1,5 @@
 #include "estimator/swarm/neighbor.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace crepes {

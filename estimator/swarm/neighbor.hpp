@@ -1,8 +1,6 @@
 /// The estimation of one neighbor.
 #pragma once
 
-#include <string>
-
 #include "estimator/core/outputs.hpp"
 #include "estimator/core/swarm_config.hpp"
 #include "estimator/swarm/filter_settings.hpp"

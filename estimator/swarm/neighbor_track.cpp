@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <type_traits>
-#include <utility>
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/contract.hpp"
@@ -29,6 +28,11 @@ constexpr int kMinRareRanges = 3;
 constexpr double kMostOff = 4.8;  // m; beyond that, a range is more likely false after a reset, too
 constexpr Duration kRareRangesTime = std::chrono::milliseconds{3500};
 constexpr Duration kDoubtfulTime = std::chrono::seconds{1};  // without a range that fits
+
+/// The index of a kind's gated run.
+std::size_t run_of(MeasurementKind kind) {
+  return static_cast<std::size_t>(is_range(kind) ? MeasurementKind::kRange : kind);
+}
 
 double largest_sigma(const Eigen::Matrix3d& covariance) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
@@ -117,7 +121,7 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
   // ranges are rare, and the IMUs misled it. Bearings do not depend on the distance.
   if (tight != nullptr && is_range(measurement.kind) && is_range_diverged()) {
     // Where ranges are many, they reset it again until one is accepted.
-    const GatedRun& gated = gated_run(measurement.kind);
+    const GatedRun& gated = gated_[run_of(measurement.kind)];
     const double off_m = gated.count < kMinGatedRanges ? std::abs(gated.residual) : 0.0;
     tight->reset_distance(std::max(kDistanceSigma, off_m), priors_);
   }
@@ -128,12 +132,8 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
                                      : fuse_tight(*tight, measurement, mounting, gates);
   if (fusion.verdict == Verdict::kFused)
     last_[static_cast<std::size_t>(measurement.kind)] = measurement.stamp;
-  gated_run(measurement.kind).add(measurement.stamp, fusion);
+  gated_[run_of(measurement.kind)].add(measurement.stamp, fusion);
   return fusion;
-}
-
-NeighborTrack::GatedRun& NeighborTrack::gated_run(MeasurementKind kind) {
-  return gated_[static_cast<std::size_t>(is_range(kind) ? MeasurementKind::kRange : kind)];
 }
 
 void NeighborTrack::GatedRun::add(Timestamp stamp, const Fusion& fusion) {
@@ -237,7 +237,7 @@ Timestamp NeighborTrack::last_sighting() const {
 }
 
 bool NeighborTrack::is_range_diverged() const {
-  const GatedRun& gated = gated_[static_cast<std::size_t>(MeasurementKind::kRange)];
+  const GatedRun& gated = gated_[run_of(MeasurementKind::kRange)];
   const auto fits = [this](MeasurementKind other) {
     return last(other) > stamp() - kDivergenceTime;
   };
@@ -250,13 +250,13 @@ bool NeighborTrack::is_range_diverged() const {
 bool NeighborTrack::is_contradicted() const {
   const Timestamp sighted = last_sighting();
   const auto is_contrary = [&](MeasurementKind kind) {
-    const GatedRun& gated = gated_[static_cast<std::size_t>(kind)];
+    const GatedRun& gated = gated_[run_of(kind)];
     // A pose that drifts off leaves no gap between the last bearing that fits and the first that
     // does not.
     return gated.count >= kMinContradicting &&
            (gated.since > sighted + kGlimpseGap || gated.latest >= sighted + kDivergenceTime);
   };
-  const GatedRun& ranges = gated_[static_cast<std::size_t>(MeasurementKind::kRange)];
+  const GatedRun& ranges = gated_[run_of(MeasurementKind::kRange)];
   const bool are_ranges_contrary =  // old ones say nothing, if no more come
       (ranges.count >= kMinContradicting || ranges.length() >= kDoubtfulTime) &&
       stamp() - ranges.latest < kRareRangesTime;
@@ -266,8 +266,8 @@ bool NeighborTrack::is_contradicted() const {
 
 bool NeighborTrack::is_diverged() const {
   const auto is_gated_out = [this](MeasurementKind kind) {
-    const GatedRun& gated = gated_[static_cast<std::size_t>(kind)];
-    return gated.count >= kMinGated && gated.latest - gated.since >= kDivergenceTime;
+    const GatedRun& gated = gated_[run_of(kind)];
+    return gated.count >= kMinGated && gated.length() >= kDivergenceTime;
   };
   return is_gated_out(MeasurementKind::kBearing) || is_gated_out(MeasurementKind::kPeerBearing) ||
          is_gated_out(MeasurementKind::kRawPose);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <optional>
 #include <span>
 #include <variant>
@@ -87,7 +86,6 @@ class NeighborTrack {
     [[nodiscard]] Duration length() const { return count > 0 ? latest - since : Duration{0}; }
     void add(Timestamp stamp, const Fusion& fusion);
   };
-  [[nodiscard]] GatedRun& gated_run(MeasurementKind kind);
 
   std::variant<NeighborFilter, PaperFilter> filter_;
   Priors priors_;
@@ -96,7 +94,7 @@ class NeighborTrack {
     never.fill(kNever);
     return never;
   }();
-  std::array<GatedRun, kMeasurementKindCount> gated_{};  ///< ranges are under kRange
+  std::array<GatedRun, kMeasurementKindCount> gated_{};  ///< all ranges are under kRange
   /// Positions of the cameras in use.
   std::optional<Eigen::Vector3d> p_B_C_;
   std::optional<Eigen::Vector3d> p_N_C_;

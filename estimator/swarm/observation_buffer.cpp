@@ -34,11 +34,11 @@ constexpr double kConfirmationAngle = 0.02;  // rad; kLineRate adds to it
 
 bool is_within(Duration apart, Duration reach) { return apart > Duration{0} && apart <= reach; }
 
-bool is_confirmed(const Bearing& bearing, const BoundedFifo<Bearing, 256>& log,
-                  const ImuHistory& imu, Duration reach = kConfirmationTime) {
+bool is_confirmed(const Bearing& bearing, const std::vector<Bearing>& others, const ImuHistory& imu,
+                  Duration reach = kConfirmationTime) {
   Timestamp from = bearing.stamp;  // start of `turn`; all bearings of a frame share it
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-  return std::any_of(log.all().begin(), log.all().end(), [&](const Bearing& other) {
+  return std::ranges::any_of(others, [&](const Bearing& other) {
     const Duration apart = std::chrono::abs(other.stamp - bearing.stamp);
     if (!is_within(apart, reach)) return false;
     if (other.stamp != std::exchange(from, other.stamp))
@@ -49,12 +49,12 @@ bool is_confirmed(const Bearing& bearing, const BoundedFifo<Bearing, 256>& log,
 }
 
 /// The same where bearings may be far apart: then the next one counts.
-bool is_confirmed_by_next(const Bearing& bearing, const BoundedFifo<Bearing, 256>& log,
+bool is_confirmed_by_next(const Bearing& bearing, const std::vector<Bearing>& others,
                           const ImuHistory& imu) {
-  const bool is_dense = std::ranges::any_of(log.all(), [&](const Bearing& other) {
+  const bool is_dense = std::ranges::any_of(others, [&](const Bearing& other) {
     return is_within(std::chrono::abs(other.stamp - bearing.stamp), kConfirmationTime);
   });
-  return is_confirmed(bearing, log, imu, is_dense ? kConfirmationTime : kSparseConfirmationTime);
+  return is_confirmed(bearing, others, imu, is_dense ? kConfirmationTime : kSparseConfirmationTime);
 }
 
 }  // namespace
@@ -94,7 +94,7 @@ std::vector<Bearing> ObservationBuffer::own_at(Timestamp t, const ImuHistory& im
   const auto distance = [t](const Bearing& bearing) { return std::chrono::abs(bearing.stamp - t); };
   std::vector<Bearing> nearest;
   for (const Bearing& bearing : own_.all()) {
-    if (distance(bearing) > kBearingReach || !is_confirmed(bearing, own_, imu)) continue;
+    if (distance(bearing) > kBearingReach || !is_confirmed(bearing, own_.all(), imu)) continue;
     if (!nearest.empty() && distance(bearing) < distance(nearest.front())) nearest.clear();
     if (nearest.empty() || bearing.stamp == nearest.front().stamp) nearest.push_back(bearing);
   }
@@ -143,7 +143,8 @@ MutualInitializations ObservationBuffer::mutual_initializations(const Bearing& p
   const auto tilt_B = self.tilt_at(t);
   const auto tilt_N = neighbor.tilt_at(t);
   if (!tilt_B || !tilt_N) return NoPoseReason::kTiltUnknown;
-  if (!is_confirmed_by_next(peer_bearing, peer_, neighbor.imu)) return NoPoseReason::kDoesNotSeeUs;
+  if (!is_confirmed_by_next(peer_bearing, peer_.all(), neighbor.imu))
+    return NoPoseReason::kDoesNotSeeUs;
   const std::vector<Bearing> own = own_at(t, self.imu);
   if (own.empty()) return NoPoseReason::kNotSeen;
   const auto measured = range_at(t);
@@ -190,7 +191,7 @@ std::optional<Measurement> ObservationBuffer::one_way_initialization(
   const auto tilt_N = neighbor.tilt_at(bearing.stamp);
   if (!tilt_B || !tilt_N) return std::nullopt;
   // Only now: without a tilt there may be no inertial sample either.
-  if (!is_confirmed(bearing, own_, self.imu)) return std::nullopt;
+  if (!is_confirmed(bearing, own_.all(), self.imu)) return std::nullopt;
   auto poses = poses_by_heading(sighting(bearing, *tilt_B, self_), sighting({}, *tilt_N, neighbor_),
                                 range->range_m, range->sigma_m, kHeadings);
   if (poses.empty()) return std::nullopt;

@@ -5,9 +5,9 @@
 #include <variant>
 #include <vector>
 
+#include "estimator/core/bounded_fifo.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/swarm_config.hpp"
-#include "estimator/swarm/bounded_fifo.hpp"
 #include "estimator/swarm/measurement.hpp"
 #include "estimator/swarm/robot_state.hpp"
 

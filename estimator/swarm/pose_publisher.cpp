@@ -17,6 +17,11 @@ constexpr Duration kPause = std::chrono::milliseconds{200};     // between compa
 constexpr Duration kRestart = std::chrono::seconds{2};          // until a filter is there again
 constexpr Duration kTeamLife = std::chrono::milliseconds{800};  // the longest lag, and a solution
 
+/// The instant that is published: our newest sample's, unless that is too old.
+Timestamp published_instant(Timestamp now, const RobotState& self) {
+  return std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
+}
+
 /// A pose that is wrong, or one that differs from it by so much is.
 std::optional<NeighborPose> doubtful(NeighborPose pose, const Vector6d& difference) {
   pose.T_B_N.covariance += difference * difference.transpose();
@@ -29,21 +34,32 @@ PosePublisher::PosePublisher(RobotId neighbor, PairMounting mounting,
                              const FilterSettings& settings)
     : neighbor_(neighbor),
       mounting_(std::move(mounting)),
-      recent_(settings.recent),
-      predictor_(mounting_, settings.gates),
-      noise_(settings.noise),
-      pose_gate_(settings.gates.pose) {}
+      settings_(settings),
+      predictor_(mounting_, settings.gates) {}
 
 void PosePublisher::reconfigure(const FilterSettings& settings) {
-  recent_ = settings.recent;
-  noise_ = settings.noise;
-  pose_gate_ = settings.gates.pose;
+  settings_ = settings;
   predictor_ = OutputPredictor(mounting_, settings.gates);
+}
+
+NeighborPose PosePublisher::pose_at(Timestamp stamp, Timestamp now, const RobotState& neighbor,
+                                    const LastContact& last) const {
+  const auto is_recent = [&](Timestamp t) { return stamp - t <= settings_.recent; };
+  NeighborPose pose;
+  pose.neighbor = neighbor_;
+  pose.stamp = stamp;
+  pose.published = now;
+  pose.reset_counter = starts_;
+  pose.sources = {.bearing = is_recent(last.seen),
+                  .peer_bearing = is_recent(last.seen_by),
+                  .range = is_recent(last.ranged),
+                  .imu = is_recent(neighbor.imu.newest().stamp)};
+  return pose;
 }
 
 void PosePublisher::update(Timestamp now, const RobotState& self, const RobotState& neighbor,
                            const HypothesisSet& hypotheses, ReadingIntake& intake) {
-  const Timestamp stamp = std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
+  const Timestamp stamp = published_instant(now, self);
   if (hypotheses.stamp() > stamp) return;
   const NeighborTrack track =
       predictor_.predict(stamp, hypotheses, {intake.buffer().pending(), self.imu, neighbor.imu});
@@ -57,27 +73,18 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
   }
   recent_poses_.add({stamp, T_B_N.pose});
 
-  const auto is_recent = [&](Timestamp t) { return stamp - t <= recent_; };
+  const auto is_recent = [&](Timestamp t) { return stamp - t <= settings_.recent; };
   const Timestamp graph = track.last(MeasurementKind::kGraphPose);
   const Timestamp range =
       std::max(track.last(MeasurementKind::kRange), track.last(MeasurementKind::kPeerRange));
-  const LastContact& last = intake.last_contact();
-  NeighborPose pose;
-  pose.neighbor = neighbor_;
-  pose.stamp = stamp;
-  pose.published = now;
+  NeighborPose pose = pose_at(stamp, now, neighbor, intake.last_contact());
   pose.mode = is_recent(track.last_sighting()) ? PoseMode::kDirect
               : is_recent(graph)               ? PoseMode::kGraph
                                                : PoseMode::kPredicted;
   pose.T_B_N = T_B_N;
   pose.v_B_N = track.motion().v_B_N;
   pose.age_s = to_seconds(stamp - std::max({track.last_sighting(), graph, range}));
-  pose.reset_counter = starts_;
-  pose.sources = {.bearing = is_recent(last.seen),
-                  .peer_bearing = is_recent(last.seen_by),
-                  .range = is_recent(last.ranged),
-                  .imu = is_recent(neighbor.imu.newest().stamp),
-                  .graph = is_recent(graph)};
+  pose.sources.graph = is_recent(graph);
   pose_ = pose;
   speed_sigma_ = track.speed_sigma();
   is_by_imus_ = stamp - range > kUnranged && stamp - intake.newest_range() > kRareRanges;
@@ -112,20 +119,17 @@ std::optional<NeighborPose> PosePublisher::graph_corrected_pose() const {
 void PosePublisher::update_team(Timestamp now, const RobotState& self, const RobotState& neighbor,
                                 const LastContact& last) {
   if (!team_) return;
-  const Timestamp stamp = std::clamp(self.imu.newest().stamp, now - kMaxAge, now);
+  const Timestamp stamp = published_instant(now, self);
   if (stamp < team_->stamp || stamp - team_->stamp > kTeamLife) return;
   const TeamPose team =
       predicted(team_->pose, {self.imu, neighbor.imu, team_->bias_B, team_->bias_N}, team_->stamp,
-                stamp, noise_);
+                stamp, settings_.noise);
   // Where it is the only one, a robot that the team placed anew is a jump.
   if (std::exchange(team_since_, team_->pose.since) != team_->pose.since && !pose_) ++starts_;
-  const auto is_recent = [&](Timestamp t) { return stamp - t <= recent_; };
-  const bool team_sees = team_->stamp - team.last_sighting <= recent_;
+  const auto is_recent = [&](Timestamp t) { return stamp - t <= settings_.recent; };
+  const bool team_sees = team_->stamp - team.last_sighting <= settings_.recent;
   const Timestamp sighted = std::max(last.seen, last.seen_by);
-  NeighborPose pose;
-  pose.neighbor = neighbor_;
-  pose.stamp = stamp;
-  pose.published = now;
+  NeighborPose pose = pose_at(stamp, now, neighbor, last);
   pose.mode = is_recent(sighted) ? PoseMode::kDirect
               : team_sees        ? PoseMode::kGraph
                                  : PoseMode::kPredicted;
@@ -133,12 +137,7 @@ void PosePublisher::update_team(Timestamp now, const RobotState& self, const Rob
   pose.T_B_N.covariance = team.pose_covariance();
   pose.v_B_N = team.v_B_N;
   pose.age_s = std::max(0.0, to_seconds(stamp - std::max(sighted, team.last_sighting)));
-  pose.reset_counter = starts_;
-  pose.sources = {.bearing = is_recent(last.seen),
-                  .peer_bearing = is_recent(last.seen_by),
-                  .range = is_recent(last.ranged),
-                  .imu = is_recent(neighbor.imu.newest().stamp),
-                  .graph = true};
+  pose.sources.graph = true;
   if (!is_certain(pose.T_B_N.covariance)) return;
   team_pose_ = pose;
   compare();
@@ -150,7 +149,7 @@ void PosePublisher::compare() {
   if (team_->pose.was_knocked) return dispute_.reset();
   const Vector6d d = pose_difference(pose_->T_B_N.pose, team_pose_->T_B_N.pose);
   const Matrix6d covariance = pose_->T_B_N.covariance + team_pose_->T_B_N.covariance;
-  if (d.dot(covariance.llt().solve(d)) <= pose_gate_) return dispute_.reset();
+  if (d.dot(covariance.llt().solve(d)) <= settings_.gates.pose) return dispute_.reset();
   const Timestamp now = team_pose_->stamp;
   if (!dispute_ || now - dispute_->last > kRestart) dispute_ = Dispute{.since = now};
   if (now - dispute_->last > kPause) dispute_->since = now;

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "estimator/swarm/bounded_fifo.hpp"
+#include "estimator/core/bounded_fifo.hpp"
 #include "estimator/swarm/output_predictor.hpp"
 #include "estimator/swarm/reading_intake.hpp"
 #include "estimator/swarm/robot_state.hpp"
@@ -67,6 +67,9 @@ class PosePublisher {
   [[nodiscard]] std::optional<NeighborPose> published() const;
 
  private:
+  /// What every pose of that instant has, without the state itself, mode and age.
+  [[nodiscard]] NeighborPose pose_at(Timestamp stamp, Timestamp now, const RobotState& neighbor,
+                                     const LastContact& last) const;
   void compare();
   [[nodiscard]] bool is_disputed() const;  ///< at the last tick
   [[nodiscard]] std::optional<NeighborPose> graph_corrected_pose() const;
@@ -93,7 +96,7 @@ class PosePublisher {
 
   RobotId neighbor_;
   PairMounting mounting_;
-  Duration recent_;
+  FilterSettings settings_;
   OutputPredictor predictor_;
   std::uint32_t generation_ = 0;  ///< of the hypothesis published last
   std::uint32_t starts_ = 0;
@@ -103,8 +106,6 @@ class PosePublisher {
   bool is_by_imus_ = false;                     ///< the distance in `pose_`
   BoundedFifo<StampedPose, 128> recent_poses_;  ///< of this hypothesis: half a second at 200 Hz
   std::optional<Correction> correction_;
-  ProcessNoise noise_;
-  double pose_gate_ = 0.0;
   std::optional<TeamEstimate> team_;
   Timestamp team_since_ = kNever;          ///< what the team's pose goes back to
   std::optional<NeighborPose> team_pose_;  ///< at the last tick

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "estimator/swarm/filter_settings.hpp"
-#include "estimator/swarm/neighbor_track.hpp"
 #include "estimator/swarm/outcome_log.hpp"
 #include "estimator/swarm/range_screen.hpp"
 #include "estimator/swarm/reorder_buffer.hpp"

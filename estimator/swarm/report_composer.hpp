@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/core/bounded_fifo.hpp"
 #include "estimator/core/measurements.hpp"
-#include "estimator/swarm/bounded_fifo.hpp"
 #include "estimator/swarm/robot_state.hpp"
 
 namespace crepes {

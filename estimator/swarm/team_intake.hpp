@@ -11,7 +11,6 @@
 #include "estimator/core/swarm_config.hpp"
 #include "estimator/swarm/adaptive_lag.hpp"
 #include "estimator/swarm/filter_settings.hpp"
-#include "estimator/swarm/neighbor_track.hpp"
 #include "estimator/swarm/range_screen.hpp"
 #include "estimator/team/belief/team_interval.hpp"
 

@@ -1,7 +1,6 @@
 #include "estimator/vision/faint_light.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace crepes {

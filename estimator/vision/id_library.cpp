@@ -23,12 +23,12 @@ std::string canonical(const std::string& pattern) {
   return least;
 }
 
-bool are_alike(const MemberConfig& a, const MemberConfig& b) {
+}  // namespace
+
+bool blink_alike(const MemberConfig& a, const MemberConfig& b) {
   if (a.pattern && b.pattern) return canonical(*a.pattern) == canonical(*b.pattern);
   return a.duty && b.duty && std::abs(*a.duty - *b.duty) < kMinDutyDistance;
 }
-
-}  // namespace
 
 Result<BlinkCode> BlinkCode::from_pattern(std::string_view pattern, Duration slot) {
   if (pattern.size() < kMinSlots || pattern.size() > kMaxSlots) {
@@ -109,7 +109,7 @@ Result<IdLibrary> IdLibrary::from(const SwarmConfig& swarm) {
       if (other.id == member.id) {
         return fail(ErrorCode::kConfig, fmt::format("{}: id {} is taken", where, member.id.value));
       }
-      if (are_alike(member, other)) {
+      if (blink_alike(member, other)) {
         return fail(ErrorCode::kConfig,
                     fmt::format("{}: blinks like member {}: they cannot be told apart", where,
                                 other.id.value));

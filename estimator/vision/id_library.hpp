@@ -50,6 +50,10 @@ class BlinkCode {
   std::vector<Interval> lit_;  ///< within one period, in order
 };
 
+/// Whether two members that have a code each blink alike: the same pattern, however shifted, or
+/// duties that frames cannot tell apart.
+[[nodiscard]] bool blink_alike(const MemberConfig& a, const MemberConfig& b);
+
 /// The codes of all members. No two are the same signal, however shifted in time.
 class IdLibrary {
  public:

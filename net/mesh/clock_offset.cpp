@@ -5,13 +5,12 @@
 #include <cmath>
 
 #include "estimator/core/contract.hpp"
+#include "estimator/core/crystal_skew.hpp"
 
 namespace crepes {
 namespace {
 
 constexpr double kUsableSigma = 5e-3;  // s
-constexpr double kSkewPrior = 50e-6;   // one sigma of a crystal against another
-constexpr double kMaxSkew = 200e-6;    // no crystal is worse
 constexpr double kSigmaFloor = 20e-6;  // s: the two directions are never equally fast
 constexpr double kTolerance = 5e-3;    // s: bounds that cross by more contradict each other
 constexpr double kMaxDelay = 10.0;     // s: no packet is older

@@ -14,7 +14,6 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string_view>
 #include <tl/expected.hpp>
 #include <vector>
 

@@ -2,7 +2,6 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
-#include <optional>
 
 #include "net/mesh/crc32.hpp"
 #include "net/mesh/peer_message.hpp"

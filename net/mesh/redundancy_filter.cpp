@@ -1,6 +1,5 @@
 #include "net/mesh/redundancy_filter.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <vector>
 

@@ -141,7 +141,7 @@ MemberConfig member(RobotId id, const Mounting& mounting) {
 void BM_NeighborTick(benchmark::State& state) {
   SimulatedPair pair(1);
   const Neighbor first(member(kSelf, pair.mounting_B), member(kOther, pair.mounting_N),
-                       filter_settings({}, {}, {}));
+                       filter_settings({}));
   std::vector<Neighbor> neighbors(static_cast<std::size_t>(state.range(0)), first);
   RobotState self;
   Timestamp now{};

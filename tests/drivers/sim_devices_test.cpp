@@ -7,6 +7,7 @@
 #include "drivers/sim/sim_imu.hpp"
 #include "drivers/sim/sim_serial.hpp"
 #include "drivers/sim/sim_uwb.hpp"
+#include "drivers/uwb/nlink.hpp"
 #include "estimator/core/constants.hpp"
 #include "tests/support/manual_clock.hpp"
 

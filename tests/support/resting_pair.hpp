@@ -17,9 +17,9 @@ inline const PairMounting kMounting{Eigen::Vector3d::Zero(), Eigen::Vector3d::Ze
                                     Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
 
 inline FilterSettings settings(Profile profile = Profile::kTight) {
-  EstimatorConfig config;
-  config.profile = profile;
-  return filter_settings(config, {}, {});
+  EstimatorSettings settings;
+  settings.filters.profile = profile;
+  return filter_settings(settings);
 }
 
 inline Timestamp at_ms(std::int64_t ms) { return Timestamp{std::chrono::milliseconds{ms}}; }

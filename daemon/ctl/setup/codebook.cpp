@@ -7,14 +7,13 @@
 #include <vector>
 
 #include "daemon/ctl/json_line.hpp"
+#include "estimator/vision/id_library.hpp"
 
 namespace crepes {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMinSlots = 8;
-constexpr std::size_t kMaxSlots = 32;
 constexpr std::size_t kMaxIds = 1000;
 
 std::string library_text(const CodebookOptions& options, const Codebook& book) {
@@ -69,7 +68,7 @@ Error shortfall(const CodebookOptions& options, std::size_t found) {
   std::ranges::reverse(distances);
   const std::string remedies =
       remedy(options, "--distance", &CodebookRules::distance, distances) +
-      remedy(options, "--slots", &CodebookRules::slots, numbers(slots + 1, kMaxSlots)) +
+      remedy(options, "--slots", &CodebookRules::slots, numbers(slots + 1, BlinkCode::kMaxSlots)) +
       remedy(options, "--max-dark", &CodebookRules::max_dark, numbers(max_dark + 1, slots / 2)) +
       (found > 0 ? fmt::format("\n  --ids {}", found) : "");
   return {
@@ -85,7 +84,8 @@ Result<void> check(const CodebookOptions& options) {
   const auto& [slots, distance, max_dark] = options.rules;
   const auto refuse = [](const std::string& why) { return fail(ErrorCode::kUsage, why); };
   if (options.ids < 1 || options.ids > kMaxIds) return refuse("--ids: must be 1 to 1000");
-  if (slots < kMinSlots || slots > kMaxSlots) return refuse("--slots: must be 8 to 32");
+  if (slots < BlinkCode::kMinSlots || slots > BlinkCode::kMaxSlots)
+    return refuse("--slots: must be 8 to 32");
   if (distance < 1 || distance > slots) return refuse("--distance: must be 1 to --slots");
   if (max_dark < 1 || max_dark >= slots) return refuse("--max-dark: must be 1 to --slots less 1");
   return {};

@@ -1,8 +1,6 @@
 /// What an IMU's noise does to a body between two knots.
 #pragma once
 
-#include <Eigen/Core>
-
 #include "estimator/calibration/batch/arrow_system.hpp"
 #include "estimator/core/sensor_noise.hpp"
 

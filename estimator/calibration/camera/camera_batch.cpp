@@ -1,13 +1,12 @@
 #include "estimator/calibration/camera/camera_batch.hpp"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "estimator/calibration/batch/jet_geometry.hpp"
 #include "estimator/calibration/camera/camera_refusal.hpp"
 #include "estimator/calibration/camera/camera_start.hpp"
+#include "estimator/calibration/camera/pixel_derivatives.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -50,36 +49,22 @@ double held_out_rms(const CameraSolution& solution, const std::vector<double>& m
 /// RMS over a circle of this radius of what a body direction's pixel errs by: lens and rotation.
 double lens_sigma_px(const CameraConstants& constants, const Eigen::MatrixXd& covariance,
                      double circle) {
-  constexpr int kDirections = 200;
-  constexpr double kGoldenAngle = 2.399963229728653;
-  constexpr double kStep = 1e-6;
   const Eigen::Matrix<double, 9, 9> P = covariance.topLeftCorner<9, 9>();
   double sum = 0.0;
   int count = 0;
-  for (int k = 0; k < kDirections; ++k) {
-    const double radius = circle * std::sqrt((k + 0.5) / kDirections);
-    const Eigen::Vector2d uv =
-        constants.lens.tail<2>() +
-        radius * Eigen::Vector2d(std::cos(k * kGoldenAngle), std::sin(k * kGoldenAngle));
+  for (const Eigen::Vector2d& uv : points_of_circle(constants.lens.tail<2>(), circle)) {
     const auto u_C = direction_of(constants.lens, uv);
     if (!u_C) continue;
     const Eigen::Vector3d u_B = constants.q_C_B.conjugate() * *u_C;
-    Eigen::Matrix<double, 2, 9> J;
-    bool is_valid = true;
-    for (int i = 0; i < 9; ++i) {
-      const auto seen = [&](double step) {
-        LensVector lens = constants.lens;
-        Eigen::Vector3d turn = Eigen::Vector3d::Zero();
-        if (i < 6) lens[i] += step;
-        if (i >= 6) turn[i - 6] = step;
-        return project_double_sphere<double>(lens, constants.q_C_B * (so3_exp(turn) * u_B));
-      };
-      const auto above = seen(kStep);
-      const auto below = seen(-kStep);
-      is_valid = is_valid && above && below;
-      if (is_valid) J.col(i) = (*above - *below) / (2.0 * kStep);
-    }
-    if (!is_valid) continue;
+    const auto derivatives = pixel_derivatives(9, 1e-6, [&](Eigen::Index i, double step) {
+      LensVector lens = constants.lens;
+      Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+      if (i < 6) lens[i] += step;
+      if (i >= 6) turn[i - 6] = step;
+      return project_double_sphere<double>(lens, constants.q_C_B * (so3_exp(turn) * u_B));
+    });
+    if (!derivatives) continue;
+    const Eigen::Matrix<double, 2, 9> J = *derivatives;
     sum += (J * P * J.transpose()).trace();
     ++count;
   }

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
-#include <functional>
 #include <span>
 #include <string>
 #include <vector>

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "estimator/calibration/camera/camera_problem.hpp"
 #include "estimator/calibration/camera/camera_state.hpp"

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/calibration/camera/camera_solver.hpp"
+
 namespace crepes {
 
 double ResidualMap::Cell::rms_px() const {

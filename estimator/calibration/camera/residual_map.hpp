@@ -5,9 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <span>
-#include <vector>
 
-#include "estimator/calibration/camera/camera_solver.hpp"
+#include "estimator/calibration/camera/camera_problem.hpp"
 
 namespace crepes {
 

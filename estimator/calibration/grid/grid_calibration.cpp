@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 
+#include "estimator/calibration/camera/pixel_derivatives.hpp"
 #include "estimator/calibration/grid/grid_refusal.hpp"
 #include "estimator/core/so3.hpp"
 
@@ -140,37 +141,25 @@ double held_out_rms(const GridFit& fit, const GridShape& shape) {
 /// RMS of the pixels that the lens errs by within `radius_px` of its center, after the small
 /// rotation that is best for each error.
 double lens_sigma_px(const GridLens& lens, const Eigen::MatrixXd& covariance, double radius_px) {
-  constexpr int kDirections = 200;
-  constexpr double kGoldenAngle = 2.399963229728653;
-  constexpr double kStep = 1e-5;
+  const std::vector<Eigen::Vector2d> points = points_of_circle(lens.center(), radius_px);
+  const auto rows = 2 * static_cast<Eigen::Index>(points.size());
   const Eigen::Index n = lens.numbers.size();
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(2 * kDirections, n);
-  Eigen::MatrixXd Q = Eigen::MatrixXd::Zero(2 * kDirections, 3);
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, n);
+  Eigen::MatrixXd Q = Eigen::MatrixXd::Zero(rows, 3);
   int count = 0;
-  for (int k = 0; k < kDirections; ++k) {
-    const double radius = radius_px * std::sqrt((k + 0.5) / kDirections);
-    const Eigen::Vector2d uv = lens.center() + radius * Eigen::Vector2d(std::cos(k * kGoldenAngle),
-                                                                        std::sin(k * kGoldenAngle));
+  for (const Eigen::Vector2d& uv : points) {
     const auto u_C = lens.direction(uv);
     if (!u_C) continue;
-    Eigen::Matrix<double, 2, Eigen::Dynamic> rows(2, n + 3);
-    bool is_valid = true;
-    for (Eigen::Index i = 0; i < n + 3; ++i) {
-      const auto seen = [&](double step) {
-        GridLens other = lens;
-        Eigen::Vector3d turn = Eigen::Vector3d::Zero();
-        if (i < n) other.numbers[i] += step;
-        if (i >= n) turn[i - n] = step;
-        return other.project(so3_exp(turn) * *u_C);
-      };
-      const auto above = seen(kStep);
-      const auto below = seen(-kStep);
-      is_valid = is_valid && above && below;
-      if (is_valid) rows.col(i) = (*above - *below) / (2.0 * kStep);
-    }
-    if (!is_valid) continue;
-    J.middleRows<2>(2 * count) = rows.leftCols(n);
-    Q.middleRows<2>(2 * count) = rows.rightCols<3>();
+    const auto derivatives = pixel_derivatives(n + 3, 1e-5, [&](Eigen::Index i, double step) {
+      GridLens other = lens;
+      Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+      if (i < n) other.numbers[i] += step;
+      if (i >= n) turn[i - n] = step;
+      return other.project(so3_exp(turn) * *u_C);
+    });
+    if (!derivatives) continue;
+    J.middleRows<2>(2 * count) = derivatives->leftCols(n);
+    Q.middleRows<2>(2 * count) = derivatives->rightCols<3>();
     ++count;
   }
   if (count == 0) return 0.0;

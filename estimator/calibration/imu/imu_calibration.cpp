@@ -12,7 +12,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <numeric>
 
 #include "estimator/calibration/imu/imu_refusal.hpp"
 #include "estimator/calibration/imu/wandering_bias.hpp"

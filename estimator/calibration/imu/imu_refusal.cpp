@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <string_view>
 
 #include "estimator/calibration/number_text.hpp"

@@ -11,6 +11,7 @@
 #include "estimator/calibration/number_text.hpp"
 #include "estimator/calibration/range/robust_mean.hpp"
 #include "estimator/core/quantile.hpp"
+#include "estimator/core/sensor_noise.hpp"
 
 namespace crepes {
 namespace {

@@ -9,7 +9,6 @@
 
 #include "estimator/calibration/range/turn_pattern.hpp"
 #include "estimator/core/measurements.hpp"
-#include "estimator/core/sensor_noise.hpp"
 
 namespace crepes {
 

@@ -1,7 +1,6 @@
 /// A body between two knots, carried by its IMU's samples, for numbers that carry derivatives.
 #pragma once
 
-#include <Eigen/Core>
 #include <span>
 #include <vector>
 

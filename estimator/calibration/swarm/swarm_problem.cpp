@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <span>
+#include <type_traits>
 #include <utility>
 
 #include "estimator/calibration/batch/knot_noise.hpp"
@@ -54,6 +56,21 @@ std::vector<std::vector<std::size_t>> knot_samples(const std::vector<std::vector
   return samples;
 }
 
+/// The readings of one kind by one robot, in the order of time, so that a cursor finds those of an
+/// interval.
+template <class Reading>
+struct ReadingCursor {
+  std::size_t robot = 0;
+  std::span<const Reading> readings;
+  std::span<const double> weights;
+  double sigma = 0.0;
+  double shift_s = 0.0;  ///< added to their stamps
+  std::size_t next = 0;
+};
+
+std::size_t other_of(const BoardSighting& sighting) { return sighting.board; }
+std::size_t other_of(const RobotRange& range) { return range.other; }
+
 }  // namespace
 
 /// The robots' intervals around the one that is visited.
@@ -77,12 +94,40 @@ class SwarmWalk {
         .first->second;
   }
 
+  /// Shows the readings of the interval that begins at `knot`, after those before.
+  template <class Reading, class Visitor>
+  void show_readings(std::size_t knot, ReadingCursor<Reading>& cursor, Visitor& visitor) {
+    const std::size_t robot = cursor.robot;
+    const double begin_s = problem_.imu_s_[robot][problem_.first_sample_[robot][knot]];
+    for (; cursor.next < cursor.readings.size(); ++cursor.next) {
+      const Reading& read = cursor.readings[cursor.next];
+      const double weight = cursor.weights[cursor.next];
+      const double stamp_s = problem_.seconds(read.stamp) + cursor.shift_s;
+      const auto place = problem_.place_of(robot, stamp_s);
+      if (!place && (stamp_s < 0.0 || stamp_s < begin_s)) continue;
+      if (!place || place->knot > knot) return;
+      const double common_s = state_.robots[robot].common_s(stamp_s);
+      const std::size_t other = other_of(read);
+      const auto other_place = problem_.place_of(other, state_.robots[other].stamp_s(common_s));
+      if (!other_place || !visitor.wants(weight)) continue;
+      const SwarmReading reading{robot,   other,   cursor.next, place->knot, other_place->knot,
+                                 stamp_s, common_s};
+      const BodyPlace<T> from = at(robot, *place);
+      const BodyPlace<T> to = at(other, *other_place);
+      if constexpr (std::is_same_v<Reading, BoardSighting>) {
+        visitor.sighting(reading, from, to, read.uv, cursor.sigma, weight);
+      } else {
+        visitor.range(reading, from, to, read.range_m, cursor.sigma, weight);
+      }
+    }
+  }
+
+ private:
   BodyPlace<T> at(std::size_t robot, const SwarmProblem::Place& place) {
     return interval(robot, place.knot)
         .at(place.step, seeded<T>(place.tau, interval_columns::kTime));
   }
 
- private:
   const SwarmProblem& problem_;
   const SwarmState& state_;
   std::vector<std::map<std::size_t, BodyInterval<T>>> intervals_;
@@ -132,35 +177,19 @@ std::optional<SwarmProblem::Place> SwarmProblem::place_of(std::size_t robot, dou
 template <class T, class Visitor>
 void SwarmProblem::visit(const SwarmState& state, Visitor& visitor) const {
   SwarmWalk<T> walk(*this, state);
-  std::vector<std::size_t> next_sighting(robots(), 0);
-  std::vector<std::size_t> next_range(robots(), 0);
-  // Readings of one robot are in the order of time, so a cursor finds those of an interval.
-  const auto each = [&](std::size_t k, std::size_t robot, const auto& readings, std::size_t& cursor,
-                        double shift, const auto& is_skipped, const auto& show) {
-    for (; cursor < readings.size(); ++cursor) {
-      const double stamp_s = seconds(readings[cursor].stamp) + shift;
-      const auto place = place_of(robot, stamp_s);
-      if (!place) {
-        if (stamp_s < 0.0 || stamp_s < imu_s_[robot][first_sample_[robot][k]]) continue;
-        return;
-      }
-      if (place->knot > k) return;
-      const double common_s = state.robots[robot].common_s(stamp_s);
-      const auto [other, measured] = [&] {
-        if constexpr (requires { readings[cursor].board; }) {
-          return std::pair(readings[cursor].board, readings[cursor].uv);
-        } else {
-          return std::pair(readings[cursor].other, readings[cursor].range_m);
-        }
-      }();
-      const auto other_place = place_of(other, state.robots[other].stamp_s(common_s));
-      if (!other_place) continue;
-      if (is_skipped(cursor)) continue;
-      const SwarmReading reading{robot,   other,   cursor, place->knot, other_place->knot,
-                                 stamp_s, common_s};
-      show(reading, walk.at(robot, *place), walk.at(other, *other_place), measured);
-    }
-  };
+  std::vector<ReadingCursor<BoardSighting>> sightings;
+  std::vector<ReadingCursor<RobotRange>> ranges;
+  for (std::size_t r = 0; r < robots(); ++r) {
+    sightings.push_back({.robot = r,
+                         .readings = records_[r].sightings,
+                         .weights = weights_.sightings[r],
+                         .sigma = sigma_px_[r],
+                         .shift_s = state.robots[r].camera.shift_s});
+    ranges.push_back({.robot = r,
+                      .readings = records_[r].ranges,
+                      .weights = weights_.ranges[r],
+                      .sigma = sigma_m_});
+  }
   for (std::size_t k = 0; k + 1 < knots(); ++k) {
     for (std::size_t pair = 0; pair < pair_noise_.size(); ++pair) {
       const RangeNoise& noise = pair_noise_[pair];
@@ -171,19 +200,8 @@ void SwarmProblem::visit(const SwarmState& state, Visitor& visitor) const {
     for (std::size_t r = 0; r < robots(); ++r) {
       const double dt = imu_s_[r][first_sample_[r][k + 1]] - imu_s_[r][first_sample_[r][k]];
       visitor.imu(r, k, walk.interval(r, k), knot_whitening(records_[r].noise, dt));
-      each(
-          k, r, records_[r].sightings, next_sighting[r], state.robots[r].camera.shift_s,
-          [&](std::size_t i) { return !visitor.wants(weights_.sightings[r][i]); },
-          [&](const SwarmReading& reading, const auto& from, const auto& to, const auto& uv) {
-            visitor.sighting(reading, from, to, uv, sigma_px_[r],
-                             weights_.sightings[r][reading.index]);
-          });
-      each(
-          k, r, records_[r].ranges, next_range[r], 0.0,
-          [&](std::size_t i) { return !visitor.wants(weights_.ranges[r][i]); },
-          [&](const SwarmReading& reading, const auto& from, const auto& to, double range_m) {
-            visitor.range(reading, from, to, range_m, sigma_m_, weights_.ranges[r][reading.index]);
-          });
+      walk.show_readings(k, sightings[r], visitor);
+      walk.show_readings(k, ranges[r], visitor);
     }
   }
 }

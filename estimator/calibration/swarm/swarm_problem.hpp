@@ -2,7 +2,6 @@
 /// along by its IMU.
 #pragma once
 
-#include <Eigen/Core>
 #include <optional>
 #include <vector>
 

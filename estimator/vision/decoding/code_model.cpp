@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/core/crystal_skew.hpp"
 #include "estimator/vision/decoding/phase_scores.hpp"
 
 namespace crepes {
@@ -13,7 +14,6 @@ constexpr std::size_t kMinPhases = 8;
 constexpr std::size_t kMaxPhases = 320;
 /// Half an exposure: with an edge within, both states are possible.
 constexpr Duration kEdgeBlur = std::chrono::microseconds{500};
-constexpr double kMaxSkew = 200e-6;  // between two crystals
 constexpr Duration kPhaseError = std::chrono::microseconds{2500};
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "estimator/vision/blob_finder.hpp"
-#include "estimator/vision/ring_finder.hpp"
+#include "estimator/vision/rings/light_field.hpp"
 
 namespace crepes {
 

@@ -138,7 +138,7 @@ class Dazzled {
   Nuisance nuisance_;
   RobotState self_;
   Neighbor neighbor_{member(kSelf, pair_.mounting_B), member(kOther, pair_.mounting_N),
-                     filter_settings(EstimatorConfig{}, ImuNoise{}, RangeNoise{})};
+                     filter_settings({})};
   Report report_;
   Timestamp now_{5ms};
   int frames_ = 0;

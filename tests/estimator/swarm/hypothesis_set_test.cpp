@@ -44,7 +44,7 @@ constexpr int kSeconds = 10;
 /// How many readings of each kind `count` filters take in the first and in the last of ten seconds,
 /// of 200, 200 and 50.
 std::array<std::map<MeasurementKind, int>, 2> taken_by(int count) {
-  HypothesisSet hypotheses(filter_settings({}, {}, {}), kMounting);
+  HypothesisSet hypotheses(filter_settings({}), kMounting);
   ImuHistory imu;
   EXPECT_TRUE(hypotheses.initialize(Timestamp{}, headings(count)));
   std::array<std::map<MeasurementKind, int>, kSeconds> taken;

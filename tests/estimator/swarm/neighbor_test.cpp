@@ -41,9 +41,9 @@ struct Ingredients {
 };
 
 FilterSettings settings(Profile profile) {
-  EstimatorConfig estimator;
-  estimator.profile = profile;
-  return filter_settings(estimator, ImuNoise{}, RangeNoise{});
+  EstimatorSettings settings;
+  settings.filters.profile = profile;
+  return filter_settings(settings);
 }
 
 /// Robot 1's view of robot 2, fed from a simulated pair every 10 ms.
