@@ -202,4 +202,12 @@ RelativeMotion propagated_by_imus(const RelativeMotion& motion, const ImuHistory
   return state;
 }
 
+Matrix6d error_rotation(const ImuHistory& imu_B, const ImuHistory& imu_N, Timestamp from,
+                        Timestamp to) {
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = imu_B.rotation(to, from).toRotationMatrix();
+  turn.bottomRightCorner<3, 3>() = imu_N.rotation(to, from).toRotationMatrix();
+  return turn;
+}
+
 }  // namespace crepes

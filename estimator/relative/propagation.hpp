@@ -62,4 +62,9 @@ void propagate(const ImuHistory& imu_B, const ImuHistory& imu_N, Timestamp from,
                                                 const ImuHistory& imu_B, const ImuHistory& imu_N,
                                                 Timestamp from, Timestamp to);
 
+/// What an error [p, theta] of T_B_N at one instant is in the axes that both bodies have at
+/// another, by their gyroscopes. There must be samples.
+[[nodiscard]] Matrix6d error_rotation(const ImuHistory& imu_B, const ImuHistory& imu_N,
+                                      Timestamp from, Timestamp to);
+
 }  // namespace crepes

@@ -26,11 +26,7 @@ RelativePoseEdge propagated_edge(RobotId from, const NeighborEstimate& estimate,
                                  Timestamp stamp) {
   const RelativeMotion motion = propagated_by_imus({estimate.T_B_N.pose, estimate.v_B_N}, imu_from,
                                                    imu_to, estimate.stamp, stamp);
-  Matrix6d turn = Matrix6d::Identity();
-  turn.topLeftCorner<3, 3>() =
-      imu_from.rotation(estimate.stamp, stamp).conjugate().toRotationMatrix();
-  turn.bottomRightCorner<3, 3>() =
-      imu_to.rotation(estimate.stamp, stamp).conjugate().toRotationMatrix();
+  const Matrix6d turn = error_rotation(imu_from, imu_to, estimate.stamp, stamp);
   Matrix6d covariance = turn * estimate.T_B_N.covariance * turn.transpose();
   const double dt = to_seconds(stamp - estimate.stamp);
   covariance.diagonal().head<3>().array() += kSpeedError * kSpeedError * dt * dt;

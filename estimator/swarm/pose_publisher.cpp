@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "estimator/relative/propagation.hpp"
 #include "estimator/team/team_prediction.hpp"
 
 namespace crepes {
@@ -72,6 +73,13 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
     recent_poses_ = {};
   }
   recent_poses_.add({stamp, T_B_N.pose});
+  if (correction_ && stamp - correction_->stamp > kCorrectionLife) correction_.reset();
+  if (correction_) {
+    const Matrix6d turn = error_rotation(self.imu, neighbor.imu, correction_->axes, stamp);
+    correction_->step = turn * correction_->step;
+    correction_->covariance = (turn * correction_->covariance * turn.transpose()).eval();
+    correction_->axes = stamp;
+  }
 
   const auto is_recent = [&](Timestamp t) { return stamp - t <= settings_.recent; };
   const Timestamp graph = track.last(MeasurementKind::kGraphPose);
@@ -93,8 +101,8 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
 void PosePublisher::add_graph_correction(Timestamp stamp, const GraphPose& pose) {
   const auto then = std::ranges::find(recent_poses_.all(), stamp, &StampedPose::stamp);
   if (then == recent_poses_.all().end()) return;
-  correction_ =
-      Correction{stamp, pose_difference(then->T_B_N, pose.T_B_N.pose), pose.T_B_N.covariance};
+  correction_ = Correction{stamp, stamp, pose_difference(then->T_B_N, pose.T_B_N.pose),
+                           pose.T_B_N.covariance};
 }
 
 std::optional<NeighborEstimate> PosePublisher::estimate() const {
@@ -106,10 +114,7 @@ std::optional<NeighborEstimate> PosePublisher::estimate() const {
 }
 
 std::optional<NeighborPose> PosePublisher::graph_corrected_pose() const {
-  if (!pose_ || !correction_ || pose_->mode != PoseMode::kDirect ||
-      pose_->stamp - correction_->stamp > kCorrectionLife) {
-    return pose_;
-  }
+  if (!pose_ || !correction_ || pose_->mode != PoseMode::kDirect) return pose_;
   NeighborPose corrected = *pose_;
   corrected.T_B_N = {perturbed(pose_->T_B_N.pose, correction_->step), correction_->covariance};
   corrected.sources.graph = true;
@@ -140,6 +145,11 @@ void PosePublisher::update_team(Timestamp now, const RobotState& self, const Rob
   pose.sources.graph = true;
   if (!is_certain(pose.T_B_N.covariance)) return;
   team_pose_ = pose;
+  if (dispute_) {
+    dispute_->difference =
+        error_rotation(self.imu, neighbor.imu, dispute_->axes, stamp) * dispute_->difference;
+    dispute_->axes = stamp;
+  }
   compare();
 }
 
@@ -153,7 +163,7 @@ void PosePublisher::compare() {
   const Timestamp now = team_pose_->stamp;
   if (!dispute_ || now - dispute_->last > kRestart) dispute_ = Dispute{.since = now};
   if (now - dispute_->last > kPause) dispute_->since = now;
-  dispute_->last = now;
+  dispute_->last = dispute_->axes = now;
   dispute_->difference = d;
 }
 

@@ -79,9 +79,11 @@ class PosePublisher {
     Pose T_B_N;
   };
 
-  /// Difference of the graph's pose to the filter's at the same instant.
+  /// Difference of the graph's pose to the filter's at the same instant, in the axes that both
+  /// bodies have at `axes`.
   struct Correction {
     Timestamp stamp;
+    Timestamp axes;
     Vector6d step;
     Matrix6d covariance;
   };
@@ -90,6 +92,7 @@ class PosePublisher {
   struct Dispute {
     Timestamp since;  ///< or since the filter last restarted; of comparisons without a pause
     Timestamp last = kNever;
+    Timestamp axes = kNever;  ///< both bodies' axes then are those of the difference
     Vector6d difference = Vector6d::Zero();
     Timestamp restarted = kNever;
   };

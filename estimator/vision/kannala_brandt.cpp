@@ -70,17 +70,21 @@ double KannalaBrandt::slope(double angle) const {
   return 1.0 + t2 * (3.0 * k_[0] + t2 * (5.0 * k_[1] + t2 * (7.0 * k_[2] + t2 * 9.0 * k_[3])));
 }
 
-/// Newton's method within a bracket that every step narrows; halved where a step would leave it.
+/// Newton's method within a bracket that every step narrows. It is halved where a step would leave
+/// it, or is not half of the step before: between two ends that lead to each other Newton's steps
+/// hardly narrow it.
 double KannalaBrandt::angle(double radius_wanted) const {
   double low = 0.0;
   double high = max_angle_rad_;
   double t = std::min(radius_wanted, max_angle_rad_);
+  double step = high;
   for (int i = 0; i < kMaxIterations; ++i) {
     const double excess = radius(t) - radius_wanted;
     (excess > 0.0 ? high : low) = t;
     double next = t - excess / slope(t);
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    if (std::abs(next - t) <= std::numeric_limits<double>::epsilon() * t) return next;
+    if (!(next > low && next < high && std::abs(next - t) <= 0.5 * step)) next = 0.5 * (low + high);
+    step = std::abs(next - t);
+    if (step <= std::numeric_limits<double>::epsilon() * t) return next;
     t = next;
   }
   return t;

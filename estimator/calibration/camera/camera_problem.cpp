@@ -31,11 +31,9 @@ constexpr double kInvalidPx = 200.0;    // what a sighting costs that the lens c
 
 CameraProblem::CameraProblem(std::span<const ImuSample> imu, std::vector<BoardSighting> sightings,
                              const ImuNoise& noise, CameraPriors priors)
-    : imu_(imu),
-      sightings_(std::move(sightings)),
-      weights_(sightings_.size(), 1.0),
-      noise_(noise),
-      priors_(std::move(priors)) {
+    : imu_(imu), sightings_(std::move(sightings)), noise_(noise), priors_(std::move(priors)) {
+  std::erase_if(sightings_, [&](const BoardSighting& s) { return !is_sampled(s.stamp, imu_); });
+  weights_.assign(sightings_.size(), 1.0);
   for (std::size_t i = 0; i < imu_.size(); ++i) {
     if (first_sample_.empty() ||
         seconds(imu_[i].stamp) >= seconds(imu_[first_sample_.back()].stamp) + kKnotSpacing_s * 0.95)

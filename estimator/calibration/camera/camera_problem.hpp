@@ -19,6 +19,11 @@ struct BoardSighting {
   Eigen::Vector2d uv = Eigen::Vector2d::Zero();
 };
 
+/// Whether there are inertial samples on both sides. `imu` is ordered by stamp and not empty.
+[[nodiscard]] inline bool is_sampled(Timestamp t, std::span<const ImuSample> imu) {
+  return t >= imu.front().stamp && t <= imu.back().stamp;
+}
+
 /// One-sigma priors of what a recording may not show. Units as in `CameraConstants`.
 struct CameraPriors {
   LensVector lens = (LensVector() << 0.5, 0.2, 200.0, 200.0, 100.0, 100.0).finished();
@@ -43,7 +48,8 @@ struct SightingResidual {
 /// mean over the interval that ends at its stamp; within it the rate changes linearly.
 class CameraProblem {
  public:
-  /// `imu`, ordered by stamp, outlives the problem. `sightings` are ordered by stamp.
+  /// `imu`, ordered by stamp, outlives the problem. `sightings` are ordered by stamp; those of
+  /// times without samples are left out.
   CameraProblem(std::span<const ImuSample> imu, std::vector<BoardSighting> sightings,
                 const ImuNoise& noise, CameraPriors priors);
 

@@ -125,7 +125,17 @@ std::vector<std::string> refusals_before_fit(std::span<const ImuSample> imu,
         sightings.size(), kLeastSightings));
     return reasons;
   }
-  const double seen_s = to_seconds(sightings.back().stamp - sightings.front().stamp);
+  const auto sampled = static_cast<std::size_t>(std::ranges::count_if(
+      sightings, [&](const BoardSighting& s) { return is_sampled(s.stamp, imu); }));
+  if (sampled < kLeastSightings) {
+    reasons.push_back(fmt::format(
+        "inertial samples at the times of {} of {} sightings only: are the stamps of both of one "
+        "clock, and was the sensor there all the time?",
+        sampled, sightings.size()));
+    return reasons;
+  }
+  const double seen_s = to_seconds(std::min(sightings.back().stamp, imu.back().stamp) -
+                                   std::max(sightings.front().stamp, imu.front().stamp));
   if (seen_s < kLeastRecording_s) {
     reasons.push_back(
         fmt::format("the target is seen for {} s only; record a minute", number_text(seen_s, 0)));

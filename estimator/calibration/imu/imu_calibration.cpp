@@ -6,6 +6,7 @@
 #include <ceres/problem.h>
 #include <ceres/rotation.h>
 #include <ceres/solver.h>
+#include <fmt/core.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -158,6 +159,18 @@ void fit_accelerometer(const ImuCalibrationSettings& settings, ImuCalibration& f
   triad.bias_sigma = {s[6], s[7], s[8]};
 }
 
+/// Whether samples are missing between two rests: how far the body turned there is unknown.
+bool has_gap(std::span<const ImuSample> samples, const Rest& from, const Rest& to) {
+  constexpr double kLongestGap_s = 0.05;
+  constexpr double kPeriods = 2.5;
+  const double period_s = to_seconds(samples.back().stamp - samples.front().stamp) /
+                          static_cast<double>(samples.size() - 1);
+  const double longest_s = std::max(kLongestGap_s, kPeriods * period_s);
+  for (std::size_t i = from.last; i <= to.first; ++i)
+    if (to_seconds(samples[i].stamp - samples[i - 1].stamp) > longest_s) return true;
+  return false;
+}
+
 Eigen::Vector3d up_at(const Rest& rest, const TriadEstimate& accelerometer) {
   return (accelerometer.M * (rest.accel_mps2 - accelerometer.bias)).normalized();
 }
@@ -188,12 +201,21 @@ void fit_gyroscope(std::span<const ImuSample> samples, const ImuCalibrationSetti
   using Cost = ceres::AutoDiffCostFunction<TurnFactor, 2, kGyroParameters>;
   ceres::Problem problem;
   double weighted_sigma2 = 0.0;
+  std::size_t missing = 0;
   for (std::size_t k = 0; k + 1 < rests.size(); ++k) {
+    if (has_gap(samples, rests[k], rests[k + 1])) {
+      ++missing;
+      continue;
+    }
     TurnFactor turn = turn_between(samples, rests[k], rests[k + 1], bias.between(k), found,
                                    settings.gravity_mps2);
     weighted_sigma2 += turn.sigma * turn.sigma;
     problem.AddResidualBlock(owned_by_ceres<Cost>(owned_by_ceres<TurnFactor>(std::move(turn))),
                              owned_by_ceres<ceres::HuberLoss>(3.0), x.data());
+  }
+  if (missing > 0) {
+    found.warnings.push_back(fmt::format(
+        "samples are missing in {} of {} turns, which do not count", missing, rests.size() - 1));
   }
   const Fit fit = solve(problem, x);
 
@@ -205,8 +227,8 @@ void fit_gyroscope(std::span<const ImuSample> samples, const ImuCalibrationSetti
     found.refusals.emplace_back("the turns do not determine the gyroscope's errors");
     return;
   }
-  triad.residual_rms =
-      std::sqrt(fit.chi2 / fit.residuals * weighted_sigma2 / static_cast<double>(rests.size() - 1));
+  triad.residual_rms = std::sqrt(fit.chi2 / fit.residuals * weighted_sigma2 /
+                                 static_cast<double>(rests.size() - 1 - missing));
   triad.M_sigma = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(fit.sigmas.data());
 }
 

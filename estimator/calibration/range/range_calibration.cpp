@@ -96,7 +96,8 @@ void add_turn(const TapedRanges& taped, const RangeErrors& errors, RangeCalibrat
       "ids " + name_of(taped.pair) + ", segment " + std::to_string(taped.segment + 1);
   if (!pattern) {
     found.refusals.push_back(place + ": robot " + std::to_string(taped.turning.value) +
-                             " did not turn by 360 deg; turn it slowly and all the way");
+                             " did not turn by 360 deg, or had no direct path over 90 deg of it; "
+                             "turn it slowly and all the way, with a free view of its antenna");
     return;
   }
   found.patterns.push_back({taped.turning, taped.pair, *pattern});

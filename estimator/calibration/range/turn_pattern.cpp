@@ -16,6 +16,7 @@ namespace {
 using Harmonics = Eigen::Matrix<double, 5, 1>;
 
 constexpr double kLeastTurn_rad = radians(330.0);
+constexpr double kWidestGap_rad = radians(90.0);  // harmonics across a wider one are a guess
 constexpr int kRounds = 10;
 constexpr double kTukey = 4.7;  // sigmas
 constexpr double kSigmaOfMedianAbs = 1.4826;
@@ -23,6 +24,18 @@ constexpr double kSigmaOfMedianAbs = 1.4826;
 Harmonics harmonics_at(double heading_rad) {
   return {1.0, std::cos(heading_rad), std::sin(heading_rad), std::cos(2.0 * heading_rad),
           std::sin(2.0 * heading_rad)};
+}
+
+/// The widest arc of the circle without a heading.
+double widest_gap(std::span<const double> headings_rad) {
+  constexpr double kCircle = 2.0 * std::numbers::pi;
+  std::vector<double> sorted(headings_rad.begin(), headings_rad.end());
+  for (double& heading : sorted) heading -= kCircle * std::floor(heading / kCircle);
+  std::ranges::sort(sorted);
+  double widest = sorted.front() + kCircle - sorted.back();
+  for (std::size_t i = 1; i < sorted.size(); ++i)
+    widest = std::max(widest, sorted[i] - sorted[i - 1]);
+  return widest;
 }
 
 double median_abs(std::vector<double> values) {
@@ -43,7 +56,8 @@ std::optional<TurnPattern> fit_turn_pattern(std::span<const double> errors_m,
                                             std::span<const double> headings_rad) {
   if (errors_m.empty()) return std::nullopt;
   const auto [least, most] = std::ranges::minmax(headings_rad);
-  if (most - least < kLeastTurn_rad) return std::nullopt;
+  if (most - least < kLeastTurn_rad || widest_gap(headings_rad) > kWidestGap_rad)
+    return std::nullopt;
   std::vector<double> weights(errors_m.size(), 1.0);
   std::vector<double> residuals(errors_m.size(), 0.0);
   Harmonics c = Harmonics::Zero();

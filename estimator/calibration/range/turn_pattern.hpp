@@ -23,7 +23,7 @@ struct TurnPattern {
 
 /// Harmonics by least squares, in which outliers weigh nothing (Tukey's biweight). `errors_m` are
 /// measured less taped, `headings_rad` the module's heading at each, from 0 on. Empty unless the
-/// headings cover a full turn.
+/// headings cover a full turn, with gaps of 90 degrees at most.
 [[nodiscard]] std::optional<TurnPattern> fit_turn_pattern(std::span<const double> errors_m,
                                                           std::span<const double> headings_rad);
 

@@ -32,6 +32,15 @@ Window window_of(const std::vector<RobotRecord>& records, const SwarmStart& star
   return window;
 }
 
+/// What was read at other times is compared with nothing, and must not count as outliers.
+void drop_outside(const Window& window, RobotRecord& record) {
+  const auto is_outside = [&window](const auto& reading) {
+    return reading.stamp < window.from || reading.stamp > window.to;
+  };
+  std::erase_if(record.sightings, is_outside);
+  std::erase_if(record.ranges, is_outside);
+}
+
 /// Fifty pictures a second say nearly what all say: between them the IMU's noise counts for more
 /// than the spots'.
 void thin_pictures(std::vector<BoardSighting>& sightings) {
@@ -115,7 +124,10 @@ SwarmBatchResult calibrate_swarm(std::vector<RobotRecord> records,
   result.refusals = refusals_of_length(result.seconds);
   if (!result.refusals.empty()) return result;
 
-  for (RobotRecord& record : records) thin_pictures(record.sightings);
+  for (RobotRecord& record : records) {
+    drop_outside(window, record);
+    thin_pictures(record.sightings);
+  }
   SwarmProblem problem(std::move(records), window.from, window.to);
   std::vector<RobotPriors> priors;
   for (const RobotConstants& robot : guess) {

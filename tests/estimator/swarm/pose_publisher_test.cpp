@@ -233,6 +233,71 @@ TEST_F(TeamAndFilter, AFilterThatContradictsAnUnwitnessedTeamPoseIsPublished) {
   EXPECT_LT(std::sqrt(pose->T_B_N.covariance(0, 0)), 0.5);
 }
 
+/// Turns by 2 rad/s about its vertical from `begin_ms` on.
+ImuHistory imu_that_turns(int begin_ms, int end_ms) {
+  ImuHistory imu = imu_at_rest(begin_ms);
+  for (int ms = begin_ms + 10; ms <= end_ms; ms += 10)
+    imu.push({at_ms(ms), {0.0, 0.0, 2.0}, {0.0, 0.0, kGravityMps2}});
+  return imu;
+}
+
+/// A vector in the body's axes, in those after a turn of `ms`.
+Eigen::Vector3d after_turn(const Eigen::Vector3d& v_B, int ms) {
+  return Eigen::AngleAxisd(-2.0 * 1e-3 * ms, Eigen::Vector3d::UnitZ()) * v_B;
+}
+
+// What a team's pose differed by is a vector in the world.
+TEST_F(TeamAndFilter, WhatMakesATeamsPoseDoubtfulTurnsWithTheRobot) {
+  const Eigen::Vector3d difference(0.8, 0.0, 0.0);
+  for (int ms = 1000; ms <= 2000; ms += 100) {
+    go_on_until(ms);
+    EXPECT_TRUE(with_filter_at({kTruth.p + difference, kTruth.q}, ms - 100, ms)) << ms;
+    EXPECT_EQ(publisher_.take_restart(), ms == 2000) << ms;
+  }
+  self_.imu = imu_that_turns(2000, 2800);
+  neighbor_.imu = imu_at_rest(2800);
+  for (int ms = 2020; ms <= 2800; ms += 20) {
+    add(ms - 100, ms - 100);
+    ASSERT_TRUE(at(ms)) << ms;
+  }
+
+  const Eigen::Matrix3d P = publisher_.published()->T_B_N.covariance.topLeftCorner<3, 3>();
+  const Eigen::Vector3d along = after_turn(difference, 800).normalized();
+  EXPECT_GT(std::sqrt(along.dot(P * along)), 0.8);
+  EXPECT_LT(std::sqrt(along.unitOrthogonal().dot(P * along.unitOrthogonal())), 0.2);
+}
+
+// Its step is a vector in the world, too, and knows the distance worse than the direction.
+TEST(GraphCorrection, TurnsWithTheRobot) {
+  RobotState self{.imu = imu_at_rest(1000), .tilt = {}};
+  RobotState neighbor{.imu = imu_at_rest(1300), .tilt = {}};
+  HypothesisSet hypotheses(settings(), kMounting);
+  ASSERT_TRUE(hypotheses.initialize(at_ms(1000), sighting()));
+  ReadingIntake intake(kNeighbor, settings());
+  PosePublisher publisher(kNeighbor, kMounting, settings());
+  publisher.update(at_ms(1000), self, neighbor, hypotheses, intake);
+  ASSERT_TRUE(publisher.pose());
+  GraphPose graph{kNeighbor, publisher.pose()->T_B_N};
+  graph.T_B_N.pose.p.x() += 0.3;
+  graph.T_B_N.covariance = 1e-4 * Matrix6d::Identity();
+  graph.T_B_N.covariance(0, 0) = 0.01;
+  publisher.add_graph_correction(at_ms(1000), graph);
+
+  self.imu = imu_that_turns(1000, 1300);
+  for (int ms = 1020; ms <= 1300; ms += 20) {
+    publisher.clear();
+    publisher.update(at_ms(ms), self, neighbor, hypotheses, intake);
+  }
+
+  const auto pose = publisher.published();
+  ASSERT_TRUE(pose);
+  EXPECT_TRUE(pose->sources.graph);
+  EXPECT_LT((pose->T_B_N.pose.p - after_turn(graph.T_B_N.pose.p, 300)).norm(), 0.02);
+  const Eigen::Vector3d line = after_turn(Eigen::Vector3d::UnitX(), 300);
+  const Eigen::Matrix3d P = pose->T_B_N.covariance.topLeftCorner<3, 3>();
+  EXPECT_NEAR(line.dot(P * line), 0.01, 1e-4);
+}
+
 // A graph that agrees with the filter corrects nothing, however long its answer takes.
 TEST(GraphCorrection, IsThatOfThePoseOfItsOwnInstant) {
   for (const Duration delay : {0ms, 20ms, 60ms}) {

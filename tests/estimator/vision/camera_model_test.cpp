@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -105,6 +106,16 @@ TEST(CameraModel, SeesMoreThanHalfOfTheWorld) {
     EXPECT_LT(round_trip_error(double_sphere, u, 3.0), 1e-13) << degrees;
     EXPECT_LT(round_trip_error(kannala, u, 3.0), 1e-13) << degrees;
   }
+}
+
+// At some radii two angles, a right one apart, lead to each other by Newton's steps.
+TEST(CameraModel, UnprojectsEveryRadiusOfASteepLens) {
+  const CameraModel camera = *CameraModel::from(kannala_brandt({0.0, 0.05, -0.01, -0.001}));
+  double worst = 0.0;
+  for (double angle = 1.63; angle < 1.65; angle += 1e-6)
+    worst = std::max(worst, round_trip_error(camera, direction(angle, 0.3), 1.0));
+
+  EXPECT_LT(worst, 1e-10);
 }
 
 TEST(CameraModel, SeesAllTheWorldThroughALensThatNeverFolds) {

@@ -138,6 +138,24 @@ TEST(CameraBatch, FlagsAQuarterThatWasNeverSeen) {
   EXPECT_GT(found.map.at(3, 6).count, 0U);
 }
 
+// As if the sensor had failed: what the camera saw afterwards contradicts nobody.
+TEST(CameraBatch, LeavesOutWhatWasSeenWithoutInertialSamples) {
+  auto recording = simulated::hand_held(1, kShort, kNoise);
+  recording.imu.resize(recording.imu.size() * 3 / 4);
+  const CameraBatchResult found = calibrated(recording);
+
+  ASSERT_TRUE(found.refusals.empty()) << found.refusals.front();
+  EXPECT_LT(found.outliers, 0.02);
+  EXPECT_LT(error_px(found.constants, recording.truth), 0.6);
+}
+
+TEST(CameraBatch, SaysThatInertialSamplesAreOfAnotherTime) {
+  auto recording = simulated::hand_held(1, kShort, kNoise);
+  for (ImuSample& sample : recording.imu) sample.stamp += std::chrono::hours{1};
+
+  EXPECT_TRUE(mentions(calibrated(recording).refusals, "of one clock"));
+}
+
 TEST(CameraBatch, RefusesWithoutBoards) {
   auto recording = simulated::hand_held(1, {.duration_s = 2.0}, kNoise);
   recording.sightings.clear();

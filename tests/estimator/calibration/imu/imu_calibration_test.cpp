@@ -41,6 +41,35 @@ TEST(ImuCalibration, FindsBiasesAndMatricesWithinWhatIsAsked) {
   }
 }
 
+/// Every eighth turn lacks its middle 0.3 s.
+std::vector<ImuSample> without_some_of_turns(const std::vector<ImuSample>& all) {
+  const std::vector<Rest> rests = find_rests(all).rests;
+  std::vector<ImuSample> kept;
+  std::size_t from = 0;
+  for (std::size_t k = 0; k + 1 < rests.size(); k += 8) {
+    const std::size_t middle = (rests[k].last + rests[k + 1].first) / 2;
+    kept.insert(kept.end(), all.begin() + static_cast<std::ptrdiff_t>(from),
+                all.begin() + static_cast<std::ptrdiff_t>(middle - 15));
+    from = middle + 15;
+  }
+  kept.insert(kept.end(), all.begin() + static_cast<std::ptrdiff_t>(from), all.end());
+  return kept;
+}
+
+// How far the sensor turned meanwhile is unknown. All turns together were refused for it.
+TEST(ImuCalibration, LeavesOutTurnsInWhichSamplesAreMissing) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const simulated::ImuRecording recording = simulated::imu_protocol(seed, {}, kNoise);
+    const ImuCalibration found = calibrate_imu(without_some_of_turns(recording.samples),
+                                               {.noise = kNoise, .gravity_mps2 = 9.81});
+
+    ASSERT_TRUE(found.refusals.empty()) << seed << ": " << found.refusals.front();
+    EXPECT_TRUE(mentions(found.warnings, "missing in 6 of 44 turns"));
+    EXPECT_LT(rms(found.gyroscope.M * recording.errors.S_gyro - Eigen::Matrix3d::Identity()), 3e-4);
+    EXPECT_LT(rms(found.gyroscope.M_sigma), 5e-4);
+  }
+}
+
 TEST(ImuCalibration, KnowsItsErrors) {
   double accel_bias = 0.0;
   double gyro_bias = 0.0;

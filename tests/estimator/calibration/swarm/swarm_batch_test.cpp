@@ -149,6 +149,21 @@ TEST(SwarmBatch, SaysWhatTwoRobotsCannotTellApart) {
   EXPECT_LT(pair_delay_sigma(found, 0, 1), 0.5 * found.robots[0].sigma(swarm_constants::kDelay));
 }
 
+// A minute is used at most, and only from when everybody has been placed.
+TEST(SwarmBatch, CountsNoOutliersAtTimesThatItDoesNotUse) {
+  auto flight = simulated::fly(3, {.robots = 2, .duration_s = 27.0}, kSwarmNoise);
+  const auto is_early = [](const EstimatedPose& pose) {
+    return pose.stamp < Timestamp{from_seconds(12.0)};
+  };
+  for (std::vector<EstimatedPose>& poses : flight.start.poses) std::erase_if(poses, is_early);
+  const SwarmBatchResult found = calibrated(flight);
+
+  ASSERT_TRUE(found.refusals.empty()) << found.refusals.front();
+  EXPECT_NEAR(found.seconds, 15.0, 0.1);
+  for (const CalibratedRobot& robot : found.robots) EXPECT_LT(robot.outliers, 0.05);
+  EXPECT_LT(found.range_outliers, 0.05);
+}
+
 TEST(SwarmBatch, RefusesARobotThatNobodySees) {
   auto flight = simulated::fly(4, {.duration_s = 5.0}, kSwarmNoise);
   for (RobotRecord& record : flight.records)
