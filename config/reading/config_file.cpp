@@ -47,10 +47,11 @@ void add_key_fault(const Config& config, ReadLog& log) {
   }
 }
 
-std::vector<ConfigFault> warnings_of(const Config& config, const ConfigNode& root) {
-  std::vector<ConfigFault> warnings;
+/// Those of the reader, and doubtful settings.
+std::vector<ConfigFault> warnings_of(const Config& config, ReadLog& log) {
+  std::vector<ConfigFault> warnings = std::move(log.warnings);
   for (RuleFault& doubt : doubtful_settings(config)) {
-    const Place place = place_of(root, doubt.key);
+    const Place place = place_of(log.root, doubt.key);
     warnings.push_back({place.file, place.line, std::move(doubt.key), std::move(doubt.reason)});
   }
   return warnings;
@@ -86,7 +87,7 @@ CheckedConfig read_config(const ConfigNode& root, std::vector<ConfigFault> fault
   std::ranges::stable_sort(
       faults, {}, [](const ConfigFault& fault) { return std::tie(fault.file, fault.line); });
   checked.faults = std::move(faults);
-  if (checked.faults.empty()) checked.warnings = warnings_of(checked.config, root);
+  if (checked.faults.empty()) checked.warnings = warnings_of(checked.config, log);
   return checked;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <iterator>
 #include <limits>
@@ -49,6 +50,14 @@ std::string read_matrix(const ConfigNode& node, std::string_view what,
     });
   });
 }
+
+/// A key that an earlier version had.
+struct RetiredKey {
+  std::string_view path;
+  std::string_view reason;
+};
+constexpr std::array kRetiredKeys{RetiredKey{
+    "estimator.forget_after_s", "has no effect; a neighbor without inertial samples is forgotten"}};
 
 }  // namespace
 
@@ -159,6 +168,12 @@ void ConfigReader::finish() {
   for (std::size_t i = 0; i < node_.keys.size() && !ignores_unknown_keys_; ++i) {
     const std::string& key = node_.keys[i];
     if (std::ranges::count(known_, key) > 0) continue;
+    const auto retired = std::ranges::find(kRetiredKeys, path_of(key), &RetiredKey::path);
+    if (retired != kRetiredKeys.end()) {
+      const Place& place = node_.items[i].place;
+      log_.warnings.push_back({place.file, place.line, path_of(key), std::string(retired->reason)});
+      continue;
+    }
     std::string reason = "unknown key";
     const auto nearest = nearest_key(key);
     if (nearest) {

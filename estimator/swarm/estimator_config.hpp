@@ -22,7 +22,6 @@ struct EstimatorConfig {
   double camera_lens_mrad = 0.6;
   double gate_probability = 0.999;
   double predicted_after_s = 0.5;
-  double forget_after_s = 30.0;
 
   [[nodiscard]] bool operator==(const EstimatorConfig&) const = default;
 
@@ -42,8 +41,6 @@ struct EstimatorConfig {
             "measurements less likely than this are refused");
     v.field("predicted_after_s", predicted_after_s, Bounds{0.05, 60},
             "a pose without a measurement for this long is called predicted");
-    v.field("forget_after_s", forget_after_s, Bounds{1, 3600},
-            "a neighbor that is silent for this long is forgotten");
   }
 };
 

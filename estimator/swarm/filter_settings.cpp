@@ -29,7 +29,6 @@ FilterSettings filter_settings(const EstimatorSettings& settings) {
   if (estimator.profile == Profile::kPaper) s.traits = kPaperTraits;
   s.lag = from_seconds(estimator.lag_ms * 1e-3);
   s.recent = from_seconds(estimator.predicted_after_s);
-  s.forget = from_seconds(estimator.forget_after_s);
 
   s.noise.gyro_density = imu.gyroscope_noise_density;
   s.noise.accel_density = imu.accelerometer_noise_density;

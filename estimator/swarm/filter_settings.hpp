@@ -30,7 +30,6 @@ struct FilterSettings {
   ProfileTraits traits;
   Duration lag{};
   Duration recent{};  ///< a measurement within this makes a pose direct
-  Duration forget{};  ///< a neighbor silent for longer is forgotten
   ProcessNoise noise;
   Priors priors;
   Gates gates;

@@ -20,7 +20,6 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
       self_id_(self.id),
       mounting_(mounting_of(self, neighbor)),
       recent_(settings.recent),
-      forget_(settings.forget),
       intake_(neighbor.id, settings),
       initiator_(self, neighbor, settings),
       hypotheses_(settings, mounting_),
@@ -28,7 +27,6 @@ Neighbor::Neighbor(const MemberConfig& self, const MemberConfig& neighbor,
 
 void Neighbor::reconfigure(const FilterSettings& settings) {
   recent_ = settings.recent;
-  forget_ = settings.forget;
   intake_.reconfigure(settings);
   initiator_.reconfigure(settings);
   hypotheses_.reconfigure(settings);
@@ -91,9 +89,7 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
   publisher_.clear();
   // Bearings do not show either robot's roll about the line of sight. Without both IMUs, the
   // covariance of a filter would be too small.
-  if (now - intake_.last_contact().heard > forget_ || self.lacks_imu(now) || body_.lacks_imu(now)) {
-    hypotheses_.clear();
-  }
+  if (self.lacks_imu(now) || body_.lacks_imu(now)) hypotheses_.clear();
   initiator_.tick(now, self, body_, hypotheses_, intake_);
   fuse_released(now, self);
   if (const auto stamp = intake_.take_earliest_new()) publisher_.invalidate_from(*stamp);

@@ -64,7 +64,6 @@ class Neighbor {
   RobotId self_id_;
   PairMounting mounting_;
   Duration recent_;
-  Duration forget_;
 
   RobotState body_;
   ReadingIntake intake_;

@@ -55,6 +55,17 @@ TEST(ConfigFile, ReportsAnUnknownKeyThatIsLikeNoOther) {
             "f:11: telemetry: unknown key");
 }
 
+// A robot whose configuration is older than its program starts all the same.
+TEST(ConfigFile, WarnsOfAKeyThatHasNoEffectAnyMore) {
+  const CheckedConfig checked =
+      check_config_text(replaced("uwb: {noise_m: 0.05}", "estimator: {forget_after_s: 30}"), "f");
+  EXPECT_TRUE(checked.faults.empty()) << to_string(checked.faults);
+  ASSERT_FALSE(checked.warnings.empty());
+  EXPECT_EQ(to_string(checked.warnings.front()),
+            "f:11: estimator.forget_after_s: has no effect; a neighbor without inertial samples is "
+            "forgotten");
+}
+
 TEST(ConfigFile, SaysWhatWasExpectedAndWhatWasFound) {
   EXPECT_EQ(faults_of(replaced("0.05", "loud")),
             R"(f:11: uwb.noise_m: expected a number, found "loud")");
