@@ -29,12 +29,13 @@ class ImuPreprocessing {
   /// How strongly it is pulled and how fast it turns, after the correction: at rest 9.81 m/s^2 and
   /// nothing.
   [[nodiscard]] Totals counts() const;
-  [[nodiscard]] std::optional<std::string> diagnosis() const { return health_.diagnosis(); }
+  [[nodiscard]] std::optional<std::string> diagnosis() const;
 
  private:
   BundleSpacing spacing_;
   ImuHealth health_;
   ImuCorrection correction_;
+  std::uint64_t samples_ = 0;
   double force_mps2_ = 0.0;
   double turn_radps_ = 0.0;
 };

@@ -7,8 +7,8 @@
 
 namespace crepes {
 
-/// Logging is active from construction to destruction, in a thread of spdlog. Under overload it
-/// drops lines but never blocks. Only one object may exist at a time.
+/// Logging is active from construction to destruction, in a thread of spdlog. Under overload, and
+/// where nobody reads, it drops lines but never blocks. Only one object may exist at a time.
 class LogSession {
  public:
   explicit LogSession(LogLevel least);

@@ -8,6 +8,7 @@ namespace crepes {
 namespace {
 
 constexpr double kOldestRangeMs = 1000.0;
+constexpr Duration kRefusalMemory = std::chrono::seconds{2};  // of what was refused
 
 std::uint32_t module_of(const MemberConfig& member) {
   return static_cast<std::uint32_t>(member.uwb_id.value_or(member.id.value));
@@ -41,8 +42,10 @@ bool UwbRanges::is_plausible(const UwbDistance& distance) const {
 void UwbRanges::forward(const UwbReading& reading, Timestamp arrival,
                         const std::function<void(const UwbRange&)>& sink) {
   no_ranges_ = reading.no_ranges;
-  stranger_.reset();
-  refused_.reset();
+  if (reading.distances.empty() || arrival - refused_at_ > kRefusalMemory) {
+    stranger_.reset();
+    refused_.reset();
+  }
   if (!no_ranges_.empty()) {
     ++counts_.without_ranges;
     return;
@@ -55,12 +58,15 @@ void UwbRanges::forward(const UwbReading& reading, Timestamp arrival,
     const auto robot = modules_.find(*module);
     if (robot == modules_.end()) {
       ++counts_.unknown_modules;
-      stranger_ = module;
+      stranger_ = std::min(*module, stranger_.value_or(*module));
+      refused_at_ = arrival;
       continue;
     }
     if (!is_plausible(distance)) {
       ++counts_.implausible;
-      refused_ = Refused{robot->second, distance.age_ms > kOldestRangeMs};
+      if (!refused_ || robot->second <= refused_->robot)
+        refused_ = Refused{robot->second, distance.age_ms > kOldestRangeMs};
+      refused_at_ = arrival;
       continue;
     }
     ++counts_.ranges;

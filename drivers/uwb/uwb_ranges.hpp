@@ -66,7 +66,8 @@ class UwbRanges {
   void forward(const UwbReading& reading, Timestamp arrival,
                const std::function<void(const UwbRange&)>& sink);
 
-  /// Why the last reading had no ranges; `advice` is that of the protocol.
+  /// Why the last reading had no ranges. Of several that are refused in turn it names the one with
+  /// the lowest id, so that the reason is steady. `advice` is that of the protocol.
   [[nodiscard]] std::string no_measurement_reason(std::string_view advice) const;
   [[nodiscard]] const UwbCounts& counts() const { return counts_; }
 
@@ -85,9 +86,10 @@ class UwbRanges {
   std::optional<std::uint32_t> own_;
   DeviceClock clock_;
   UwbCounts counts_;
-  std::string_view no_ranges_;             ///< of the last reading, as the two below
-  std::optional<std::uint32_t> stranger_;  ///< a module that no member carries
-  std::optional<Refused> refused_;
+  std::string_view no_ranges_;             ///< of the last reading
+  std::optional<std::uint32_t> stranger_;  ///< of the last seconds, a module that no member carries
+  std::optional<Refused> refused_;         ///< of the last seconds
+  Timestamp refused_at_ = kNever;          ///< the last of either
 };
 
 /// One frame is one reading:  `static UwbReading read(Bytes frame)`,  a pure function.

@@ -15,8 +15,9 @@ void name_unknown_clocks(SystemStatus& status) {
         neighbor.reason == NoPoseReason::kNeverHeard || neighbor.reason == NoPoseReason::kSilent;
     const bool is_clock_known =
         std::ranges::count(status.clocks, neighbor.neighbor, &ClockStatus::peer) > 0;
-    if (is_unheard && !is_clock_known && arrives(neighbor.neighbor))
-      neighbor.reason = NoPoseReason::kNoClockOffset;
+    if (!is_unheard || is_clock_known || !arrives(neighbor.neighbor)) continue;
+    neighbor.reason =
+        status.estimator.tilt ? NoPoseReason::kNoClockOffset : NoPoseReason::kNoOwnImu;
   }
 }
 

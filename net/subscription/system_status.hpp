@@ -56,7 +56,8 @@ struct SystemStatus {
 };
 
 /// The estimator receives reports of a robot once its clock is known. Where datagrams arrive and
-/// the clock is unknown, that is the reason, and not that the robot was never heard.
+/// the clock is unknown, that is the reason, and not that the robot was never heard. A robot whose
+/// own IMU does not show gravity sends nothing, so no clock can become known; then that is it.
 void name_unknown_clocks(SystemStatus& status);
 
 }  // namespace crepes

@@ -89,6 +89,15 @@ TEST(RangeLine, RefusesRangesThatCannotBeWithAReason) {
             std::string::npos);
 }
 
+TEST(RangeLine, NamesOneOfSeveralStrangersSteadily) {
+  RangeLineParser parser(modules_of({3}), 200.0);
+  for (const char* line : {"range 7 4.1\n", "range 9 5.2\n", "range 7 4.1\n", "range 9 5.2\n"}) {
+    EXPECT_TRUE(ranges_in(parser, bytes_in(line)).empty());
+    EXPECT_NE(parser.no_measurement_reason().find("such as 7 "), std::string::npos)
+        << parser.no_measurement_reason();
+  }
+}
+
 // Lines of real modules, as users of the module published them.
 constexpr const char* kLec =
     "DIST,4,AN0,022E,7.94,8.03,0.00,3.44,AN1,9280,7.95,0.00,0.00,5.68,AN2,DCAE,0.00,8.03,0.00,7.76,"

@@ -62,6 +62,8 @@ std::vector<std::string> names_of(const BoardSightings& found, const SwarmConfig
 }  // namespace
 
 Result<CalibrationReport> calibrate_camera(const CalibrateCameraOptions& options) {
+  if (const auto free = check_results({options.out}, "camera", options.force); !free)
+    return tl::unexpected(free.error());
   CalibrationReport report;
   const auto recording =
       load_robot(options.robot_dir, {.imu = true, .ranges = false, .cameras = true}, report.faults);

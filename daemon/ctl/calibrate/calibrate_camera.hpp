@@ -16,6 +16,7 @@ struct CalibrateCameraOptions {
   std::filesystem::path out;
   std::optional<double> fov_deg;  ///< if given, crepesd.yaml's lens is not used as a guess
   bool kannala_brandt = false;    ///< write that model instead of Double Sphere
+  bool force = false;             ///< replace whatever has the name of the result
   bool json = false;
   std::function<void(double)> on_progress;  ///< 0..1; optional
 };

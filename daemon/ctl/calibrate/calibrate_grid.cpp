@@ -230,6 +230,8 @@ Result<GridShape> parse_grid(const std::string& text, double pitch_m) {
 }
 
 Result<CalibrationReport> calibrate_grid(const CalibrateGridOptions& options) {
+  if (const auto free = check_results({options.out}, "camera", options.force); !free)
+    return tl::unexpected(free.error());
   CalibrationReport report;
   const auto body = read_body(options.pictures, report.faults);
   if (!body) return tl::unexpected(body.error());

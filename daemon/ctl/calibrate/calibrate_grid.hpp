@@ -20,6 +20,7 @@ struct CalibrateGridOptions {
   GridShape grid;
   std::optional<double> fov_deg;
   bool kannala_brandt = false;
+  bool force = false;  ///< replace whatever has the name of the result
   bool json = false;
   std::function<void(double)> on_progress;  ///< 0..1; optional
 };

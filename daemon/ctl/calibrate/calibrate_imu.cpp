@@ -246,6 +246,9 @@ Result<CalibrationReport> measure_noise(const CalibrateImuOptions& options,
 }  // namespace
 
 Result<CalibrationReport> calibrate_imu(const CalibrateImuOptions& options) {
+  const auto free =
+      check_results({options.out, beside(options.out, ".kalibr.yaml")}, "imu", options.force);
+  if (!free) return tl::unexpected(free.error());
   DatasetFaults faults;
   const auto recording =
       load_robot(options.robot_dir, {.imu = true, .ranges = false, .cameras = false}, faults);

@@ -16,7 +16,8 @@ struct CalibrateImuOptions {
   std::filesystem::path robot_dir;
   std::filesystem::path out;
   double gravity_mps2 = kNominalGravityMps2;
-  bool rest = false;  ///< the recording is of an hour at rest: noise alone
+  bool rest = false;   ///< the recording is of an hour at rest: noise alone
+  bool force = false;  ///< replace whatever has the name of the result
   bool json = false;
   std::function<void(double)> on_progress{};  ///< 0..1; optional
 };

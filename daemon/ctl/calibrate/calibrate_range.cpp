@@ -222,6 +222,35 @@ bool knows_every_pair(const RangeCalibration& found, const SwarmDataset& swarm) 
   });
 }
 
+double configured_delay_m(const SwarmConfig& swarm, RobotId id) {
+  const auto member = std::ranges::find(swarm.members, id, &MemberConfig::id);
+  return member == swarm.members.end() ? 0.0 : member->range_delay_m;
+}
+
+/// Pairs whose bias the configuration does not allow; empty if there are none. It is rather the
+/// tape that is wrong.
+std::string unexpected_biases(const RangeCalibration& found, const Config& config) {
+  constexpr double kSigmas = 2.0;
+  constexpr double kLeast_m = 0.1;  // what temperature and mounting may change
+  const RangeNoise& noise = config.uwb.noise;
+  const double most_m =
+      std::max(kLeast_m, kSigmas * std::hypot(noise.bias_sigma_m, noise.bias_drift_m));
+  std::string pairs;
+  for (const PairBias& pair : found.pairs) {
+    const double expected_m = configured_delay_m(config.swarm, pair.pair.a) +
+                              configured_delay_m(config.swarm, pair.pair.b);
+    if (std::abs(pair.bias_m - expected_m) <= most_m) continue;
+    pairs += fmt::format("{}pair {},{}: {} m instead of {} m", pairs.empty() ? "" : ", ",
+                         pair.pair.a.value, pair.pair.b.value, fixed(pair.bias_m, 2),
+                         fixed(expected_m, 2));
+  }
+  if (pairs.empty()) return "";
+  return fmt::format(
+      "biases further from range_delay_m than uwb.bias_sigma_m allows, {} m: {}; is the tape "
+      "right, from antenna to antenna?",
+      fixed(most_m, 2), pairs);
+}
+
 /// By which a range changes as antennas turn: between rests, or in a module's turn.
 double drift_of(const RangeCalibration& found) {
   double drift = found.direction_sigma_m;
@@ -334,6 +363,9 @@ std::string text_of(const RangeCalibration& found, bool knows_all,
 Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options) {
   if (options.tape.empty() && options.distances.empty())
     return fail(ErrorCode::kUsage, "no distances: give --tape, or --distance r1,r2=5.00");
+  const auto free =
+      check_results({options.out, beside(options.out, kMembersSuffix)}, "range", options.force);
+  if (!free) return tl::unexpected(free.error());
   const auto swarm = load_swarm(options.swarm_dir);
   if (!swarm) return tl::unexpected(swarm.error());
   if (const auto checked = check_modules(*swarm); !checked) return tl::unexpected(checked.error());
@@ -349,6 +381,8 @@ Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options) 
         "bias_drift_m "
         "stay as configured; measure all three distances of every robot with two others");
   }
+  if (std::string biases = unexpected_biases(found, swarm->robots.front().config); !biases.empty())
+    found.warnings.push_back(std::move(biases));
   if (found.refusals.empty()) {
     if (const auto written = write_files(found, knows_all, options.out); !written)
       return tl::unexpected(written.error());

@@ -17,6 +17,7 @@ struct CalibrateRangeOptions {
   std::filesystem::path tape{};          ///< empty: `distances` alone
   std::vector<std::string> distances{};  ///< "r1,r2=5.00": at rest during the whole recording
   std::filesystem::path out;
+  bool force = false;  ///< replace whatever has the name of the result
   bool json = false;
   std::function<void(double)> on_progress{};  ///< 0..1; optional
 };

@@ -13,14 +13,19 @@ namespace {
 
 constexpr double kShareOfMeasuring = 0.4;
 
+/// The file for Kalibr and the fragment.
+std::vector<std::filesystem::path> result_files(const std::filesystem::path& out,
+                                                const std::string& robot) {
+  return {out / (robot + ".yaml"), out / (robot + ".fragment.yaml")};
+}
+
 Result<void> write_robots(const SwarmBatchResult& found, const SwarmDataset& dataset,
                           const std::filesystem::path& out) {
   for (std::size_t r = 0; r < dataset.robots.size(); ++r) {
-    const std::string& name = dataset.robots[r].robot.name;
-    auto written =
-        write_text_file(out / (name + ".yaml"), calibration_text(found, dataset, r)).and_then([&] {
-          return write_text_file(out / (name + ".fragment.yaml"), fragment_text(found, dataset, r));
-        });
+    const auto files = result_files(out, dataset.robots[r].robot.name);
+    auto written = write_text_file(files[0], calibration_text(found, dataset, r)).and_then([&] {
+      return write_text_file(files[1], fragment_text(found, dataset, r));
+    });
     if (!written) return written;
   }
   return {};
@@ -33,6 +38,11 @@ Result<CalibrationReport> calibrate_swarm(const CalibrateSwarmOptions& options) 
   if (!dataset) return tl::unexpected(dataset.error());
   if (const auto checked = check_modules(*dataset); !checked)
     return tl::unexpected(checked.error());
+  for (const RobotRecording& robot : dataset->robots) {
+    const auto free =
+        check_results(result_files(options.out, robot.robot.name), "swarm", options.force);
+    if (!free) return tl::unexpected(free.error());
+  }
   const auto progress = [&](double done) {
     if (options.on_progress) options.on_progress(done);
   };

@@ -13,6 +13,7 @@ namespace crepes {
 struct CalibrateSwarmOptions {
   std::filesystem::path swarm_dir;
   std::filesystem::path out;
+  bool force = false;  ///< replace whatever has the name of the result
   bool json = false;
   std::function<void(double)> on_progress;  ///< 0..1; optional
 };

@@ -29,6 +29,10 @@ struct CalibrationReport {
 /// One line each.
 [[nodiscard]] std::string warning_lines(const std::vector<std::string>& warnings);
 
+/// Whether `crepesctl calibrate TOOL` may write these files: see `check_replaceable`.
+[[nodiscard]] Result<void> check_results(const std::vector<std::filesystem::path>& files,
+                                         const std::string& tool, bool force);
+
 /// `file` with `suffix` in the place of its extension, as imu.yaml and imu.kalibr.yaml.
 [[nodiscard]] std::filesystem::path beside(const std::filesystem::path& file,
                                            const std::string& suffix);

@@ -51,6 +51,7 @@ Result<CalibrationReport> calibrate_grid_with_progress(const CameraCommand& comm
                          .grid = *grid,
                          .fov_deg = command.options.fov_deg,
                          .kannala_brandt = command.model == "kb",
+                         .force = command.options.force,
                          .json = command.options.json,
                          .on_progress = progress.sink()});
 }
@@ -62,6 +63,8 @@ Result<CalibrationReport> calibrate_camera_with_progress(const CameraCommand& co
   CalibrateCameraOptions options = command.options;
   options.kannala_brandt = command.model == "kb";
   if (command.live) {
+    if (const auto free = check_results({options.out}, "camera", options.force); !free)
+      return tl::unexpected(free.error());
     auto folder = record_for_camera(
         {.dir = options.robot_dir, .socket = command.socket, .is_quiet = options.json});
     if (!folder) return tl::unexpected(folder.error());
@@ -70,6 +73,10 @@ Result<CalibrationReport> calibrate_camera_with_progress(const CameraCommand& co
   const TerminalProgress progress;
   options.on_progress = progress.sink();
   return calibrate_camera(options);
+}
+
+void add_force_flag(CLI::App* sub, bool& force) {
+  sub->add_flag("--force", force, "replace files that are no earlier results of this command");
 }
 
 /// Runs `calibrate` with a bar on the terminal.
@@ -96,6 +103,7 @@ void add_imu(CommandLine& line, CLI::App* calibrate) {
   sub->add_option("--gravity", options.gravity_mps2, "gravity at this place [m/s^2]")
       ->capture_default_str()
       ->check(CLI::Range(9.7, 9.9));
+  add_force_flag(sub, options.force);
   add_json_flag(sub, options.json);
   line.run(sub, [&options] {
     return finish(with_progress(options, [](const auto& o) { return calibrate_imu(o); }),
@@ -121,6 +129,7 @@ void add_range(CommandLine& line, CLI::App* calibrate) {
                   "biases of pairs and modules, YAML; a fragment of crepesd.yaml with delays and "
                   "noise is written beside it as NAME.members.yaml")
       ->required();
+  add_force_flag(sub, options.force);
   add_json_flag(sub, options.json);
   line.run(sub, [&options] {
     return finish(with_progress(options, [](const auto& o) { return calibrate_range(o); }),
@@ -163,6 +172,7 @@ void add_camera(CommandLine& line, CLI::App* calibrate) {
           ->check(CLI::Range(0.001, 10.0));
   pitch->needs(grid);
   grid->needs(pitch);
+  add_force_flag(sub, options.force);
   add_json_flag(sub, options.json);
   line.run(sub, [&command] {
     return finish(calibrate_camera_with_progress(command), command.options.json);
@@ -180,6 +190,7 @@ void add_swarm(CommandLine& line, CLI::App* calibrate) {
                   "directory for <robot>.yaml; a fragment of crepesd.yaml for crepesd.d/ of each "
                   "robot is written beside it as <robot>.fragment.yaml")
       ->required();
+  add_force_flag(sub, options.force);
   add_json_flag(sub, options.json);
   line.run(sub, [&options] {
     return finish(with_progress(options, [](const auto& o) { return calibrate_swarm(o); }),

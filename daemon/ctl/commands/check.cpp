@@ -21,7 +21,8 @@ void add_check(CommandLine& line) {
                   "serial port of this robot's LED board: compare its pattern with --config's");
   CLI::Option* walk = sub->add_option("--walk", options.walk,
                                       "a neighbor, by name or id: say step by step where to carry "
-                                      "it, and whether its pose follows");
+                                      "it, and whether its pose follows")
+                          ->check(robot_name_or_id());
   sub->add_option("--distance", options.distance_m,
                   "with --walk: from robot to robot in the first step, by tape [m]")
       ->needs(walk)

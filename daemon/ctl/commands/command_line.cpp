@@ -12,6 +12,7 @@
 
 #include "config/reading/spelling.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
+#include "daemon/ctl/replaceable.hpp"
 #include "drivers/base/number_text.hpp"
 
 namespace crepes {
@@ -41,6 +42,16 @@ void check_numbers(CLI::App& app) {
     if (option->get_type_name().starts_with("UINT")) option->check(natural);
   }
   for (CLI::App* sub : app.get_subcommands({})) check_numbers(*sub);
+}
+
+CLI::Validator robot_name_or_id() {
+  const auto refuse = [](const std::string& text) -> std::string {
+    constexpr double kLastId = 65534.0;
+    double id = 0.0;
+    const bool is_wrong = parse_number(text, id).empty() && !(id >= 1.0 && id <= kLastId);
+    return is_wrong ? text + " is no id of a robot, 1 to 65534" : "";
+  };
+  return CLI::Validator(refuse, "");
 }
 
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon) {
@@ -73,13 +84,21 @@ Result<void> print_result(const Result<std::string>& text) {
   return fail(ErrorCode::kIo, "standard output: " + std::generic_category().message(errno));
 }
 
-Result<void> write_output(const std::string& text, const std::string& file) {
-  if (file.empty()) return print_result(text);
-  std::ofstream out(file, std::ios::binary);
+void add_output_options(CLI::App* sub, OutputFile& file) {
+  CLI::Option* out = sub->add_option("--out", file.name, "output file; default: standard output");
+  sub->add_flag("--force", file.force, "replace a file that is no earlier result of this command")
+      ->needs(out);
+}
+
+Result<void> write_output(const std::string& text, const OutputFile& file, std::string_view mark) {
+  if (file.name.empty()) return print_result(text);
+  if (!file.force)
+    if (auto free = check_replaceable(file.name, mark); !free) return free;
+  std::ofstream out(file.name, std::ios::binary);
   out << text;
   out.close();
   if (out) return {};
-  return fail(ErrorCode::kIo, file + ": " + std::generic_category().message(errno));
+  return fail(ErrorCode::kIo, file.name + ": " + std::generic_category().message(errno));
 }
 
 TerminalProgress::TerminalProgress()

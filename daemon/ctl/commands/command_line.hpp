@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "config/schema/config.hpp"
@@ -69,6 +70,9 @@ void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<
 /// let pass, and whole numbers below zero or above 2^64 - 1, which would be taken for others.
 void check_numbers(CLI::App& app);
 
+/// Refuses numbers that are no robot's id.
+[[nodiscard]] CLI::Validator robot_name_or_id();
+
 /// --address and --port of the daemon.
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon);
 
@@ -82,8 +86,16 @@ void print_skipped(const DatasetFaults& faults);
 /// Prints the text, or returns its error. A failure to write is an error, too.
 [[nodiscard]] Result<void> print_result(const Result<std::string>& text);
 
-/// Writes to `file`, or to standard output if the name is empty.
-[[nodiscard]] Result<void> write_output(const std::string& text, const std::string& file);
+/// --out and --force of a command that writes one file.
+struct OutputFile {
+  std::string name;  ///< empty: standard output
+  bool force = false;
+};
+void add_output_options(CLI::App* sub, OutputFile& file);
+
+/// Writes to the file; without --force it may only be replaced if `mark` is in its first line.
+[[nodiscard]] Result<void> write_output(const std::string& text, const OutputFile& file,
+                                        std::string_view mark);
 
 /// A progress bar with the time left on standard error, if that is a terminal; its end removes it.
 class TerminalProgress {

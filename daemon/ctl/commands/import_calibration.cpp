@@ -7,18 +7,18 @@ namespace crepes {
 
 void add_import_calibration(CommandLine& line) {
   auto& files = line.make<std::vector<std::filesystem::path>>();
-  auto& out = line.make<std::string>();
+  auto& out = line.make<OutputFile>();
   auto& json = line.make<bool>();
   CLI::App* sub = line.add(
       "import-calibration",
       "Read calibrations of Kalibr (camchain-imucam.yaml, imu.yaml) or Basalt (calibration.json) "
       "and write the sections cameras and imu of a configuration");
   sub->add_option("FILE", files, "calibration files of one robot")->required();
-  sub->add_option("--out", out, "output file; default: standard output");
+  add_output_options(sub, out);
   add_json_flag(sub, json, "these sections, which are also valid in a configuration");
   line.run(sub, [&files, &out, &json] {
     return import_calibration(files, json).and_then([&](const std::string& text) {
-      return write_output(text, out);
+      return write_output(text, out, json ? "{\"" : "crepesctl import-calibration");
     });
   });
 }

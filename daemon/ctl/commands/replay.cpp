@@ -85,7 +85,7 @@ void add_replay(CommandLine& line) {
   delay("--uwb-delay", options.delays.uwb_s, "a range");
   delay("--imu-delay", options.delays.imu_s, "an inertial sample");
   sub->add_option("--delayed", options.delays.robots,
-                  "names of the robots whose sensors have these delays; without it, all")
+                  "robots whose sensors have these delays, by name or id; without it, all")
       ->delimiter(',');
   sub->add_flag("--sealed", options.sealed,
                 "seal and sign the datagrams, with keys made for the replay");

@@ -11,11 +11,9 @@ void add_waitpose(CommandLine& line) {
       line.add("waitpose",
                "Wait for a neighbor's pose; exit code 1 and the reason if there is none in time");
   add_daemon_options(sub, options.daemon);
-  sub->add_option_function<int>(
-         "--peer", [&options](int id) { options.peer = RobotId{static_cast<std::uint16_t>(id)}; },
-         "the neighbor's id")
+  sub->add_option("--peer", options.peer, "the neighbor's name or id")
       ->required()
-      ->check(CLI::Range(1, 65534));
+      ->check(robot_name_or_id());
   sub->add_option("--timeout", options.timeout_s, "seconds to wait")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 1e6));

@@ -1,8 +1,11 @@
 #include "daemon/ctl/dataset/record.hpp"
 
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <limits>
 #include <map>
@@ -15,6 +18,7 @@
 #include "daemon/ctl/dataset/recorded_manifest.hpp"
 #include "daemon/ctl/live/daemon_access.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
+#include "daemon/ctl/text_table.hpp"
 #include "daemon/recording/block.hpp"
 #include "daemon/recording/recipient.hpp"
 #include "daemon/recording/unix_socket.hpp"
@@ -28,7 +32,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Duration kManifestPeriod = 5s;
+constexpr Duration kSavePeriod = 1s;  // what a loss of power costs at most
 constexpr int kPatienceMs = 100;
 
 /// The stamp of a row.
@@ -36,6 +40,13 @@ std::optional<Timestamp> stamp_at(std::string_view text) {
   std::int64_t t_ns = 0;
   if (!parse_number(text.substr(0, text.find(',')), t_ns).empty()) return std::nullopt;
   return Timestamp{Duration{t_ns}};
+}
+
+/// Waits until all that was written is on the disk.
+Result<void> sync_disk(const std::filesystem::path& dir) {
+  const UniqueFd folder(::open(dir.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder && ::syncfs(folder.get()) == 0) return {};
+  return fail(ErrorCode::kIo, dir.string() + ": " + std::generic_category().message(errno));
 }
 
 /// Writes the blocks to the data set.
@@ -57,13 +68,14 @@ class Recording {
     return append_rows(block);
   }
 
-  /// swarm.yaml for the measurements so far.
-  [[nodiscard]] Result<void> write_manifest(const std::vector<client::Status::Clock>& clocks) {
+  /// Writes swarm.yaml for the measurements so far: from now on they outlast whatever happens.
+  [[nodiscard]] Result<void> save(const std::vector<client::Status::Clock>& clocks) {
     std::error_code status;
     if (!folder_ || first_ > last_ || !std::filesystem::exists(folder_->path(), status)) return {};
     const std::string folder = folder_->path().filename().string();  // its name at the beginning
     return write_text_file(dir_ / "swarm.yaml",
-                           recorded_manifest(config_, folder, first_, last_, clocks));
+                           recorded_manifest(config_, folder, first_, last_, clocks))
+        .and_then([&] { return sync_disk(dir_); });
   }
 
   [[nodiscard]] const Config& config() const { return config_; }
@@ -72,6 +84,14 @@ class Recording {
     return {.progress = progress(),
             .folder = folder_ ? folder_->path() : dir_,
             .end_reason = std::move(why)};
+  }
+  /// Why it ended early, and what there is nevertheless.
+  [[nodiscard]] Error with_remainder(Error failure) const {
+    if (has_begun()) {
+      failure.message += fmt::format("; {} s until then are in {}", fixed(progress().seconds, 1),
+                                     folder_->path().string());
+    }
+    return failure;
   }
   [[nodiscard]] RecordProgress progress() const {
     RecordProgress progress = progress_;
@@ -282,7 +302,7 @@ Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recor
                         KnownClocks& known, StopSignals& signals) {
   const MonotonicClock clock;
   const Timestamp start = clock.now();
-  Timestamp next_manifest = start;
+  Timestamp next_save = start;
   for (;;) {
     const Result<bool> goes_on = daemon.receive(kPatienceMs);
     if (!goes_on) return tl::unexpected(goes_on.error());
@@ -297,11 +317,11 @@ Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recor
     if (std::string why = end_reason(options, recording.progress(), elapsed, signals); !why.empty())
       return why;
     if (!*goes_on) return "the daemon hung up";
-    if (recording.has_begun()) known.update(recording.config());
-    if (clock.now() < next_manifest) continue;
-    next_manifest = clock.now() + kManifestPeriod;
-    if (auto written = recording.write_manifest(known.clocks()); !written)
-      return tl::unexpected(written.error());
+    if (!recording.has_begun()) continue;
+    known.update(recording.config());
+    if (clock.now() < next_save) continue;
+    if (auto saved = recording.save(known.clocks()); !saved) return tl::unexpected(saved.error());
+    next_save = clock.now() + kSavePeriod;
   }
 }
 
@@ -323,11 +343,11 @@ Result<RecordSummary> record(const RecordOptions& options) {
     return tl::unexpected(asked.error());
   Recording recording(options);
   KnownClocks known;
-  const Result<std::string> why = run(options, daemon, recording, known, signals);
+  Result<std::string> why = run(options, daemon, recording, known, signals);
   if (recording.has_begun()) known.refresh(recording.config());
-  const Result<void> written = recording.write_manifest(known.clocks());
-  if (!why) return tl::unexpected(why.error());
-  if (!written) return tl::unexpected(written.error());
+  const Result<void> saved = recording.save(known.clocks());
+  if (why && !saved) why = tl::unexpected(saved.error());
+  if (!why) return tl::unexpected(recording.with_remainder(why.error()));
   if (!recording.has_begun()) return fail(ErrorCode::kIo, "record: nothing came; " + *why);
   RecordSummary summary = recording.summary(*why);
   summary.warning = known.fault(recording.config());

@@ -50,7 +50,8 @@ struct RecordSummary {
 };
 
 /// Records until a signal, `duration_s`, `max_bytes`, `is_enough`, or the end of the daemon. `dir`
-/// must not contain a data set. The data set is complete at the end and every few seconds before.
+/// must not contain a data set. It is one from the first measurement on; whatever ends the program
+/// or the machine costs the last second at most. If the disk is full, the error says what there is.
 [[nodiscard]] Result<RecordSummary> record(const RecordOptions& options);
 
 }  // namespace crepes

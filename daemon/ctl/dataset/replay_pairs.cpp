@@ -25,8 +25,9 @@ Result<std::vector<Record>> optional_records(Result<std::vector<Record>> records
 std::vector<PairName> pairs_in(const fs::path& results) {
   std::vector<PairName> pairs;
   std::error_code status;
+  const bool is_data_set = fs::exists(results / "swarm.yaml", status);
   for (const auto& dir : fs::directory_iterator(results, status)) {
-    if (!dir.is_directory(status)) continue;
+    if (!dir.is_directory(status) || (is_data_set && dir.path().filename() == "truth")) continue;
     for (const auto& file : fs::directory_iterator(dir.path(), status)) {
       const fs::path stem = file.path().stem();  // a robot's name may have dots
       const bool is_record =
@@ -39,6 +40,16 @@ std::vector<PairName> pairs_in(const fs::path& results) {
     return std::tie(a.observer, a.neighbor) < std::tie(b.observer, b.neighbor);
   });
   return pairs;
+}
+
+Error no_pairs_in(const fs::path& results) {
+  std::error_code status;
+  std::string why;
+  if (!fs::is_directory(results, status)) why = ": there is no such directory";
+  if (fs::exists(results / "swarm.yaml", status))
+    why = ": it is a data set, of which crepesctl replay makes results";
+  return {ErrorCode::kNotFound,
+          results.string() + ": no <observer>/<neighbor>.csv of a replay" + why};
 }
 
 Result<PairFiles> read_pair(const fs::path& results, const PairName& pair) {

@@ -16,8 +16,11 @@ struct PairName {
   std::string neighbor;
 };
 
-/// Every DIR/<observer>/<neighbor>.csv, in order.
+/// Every DIR/<observer>/<neighbor>.csv, in order. The truth/ of a data set looks alike.
 [[nodiscard]] std::vector<PairName> pairs_in(const std::filesystem::path& results);
+
+/// The error for a directory without pairs.
+[[nodiscard]] Error no_pairs_in(const std::filesystem::path& results);
 
 /// The rows of one pair. The last two are empty without --debug-innovations.
 struct PairFiles {

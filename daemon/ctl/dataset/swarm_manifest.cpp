@@ -96,6 +96,10 @@ SwarmManifest manifest_from(const YAML::Node& root) {
 
 }  // namespace
 
+bool is_named(const SwarmRobot& robot, const std::string& name_or_id) {
+  return name_or_id == robot.name || name_or_id == std::to_string(robot.id.value);
+}
+
 std::string robot_text(const SwarmRobot& robot) {
   std::string text =
       fmt::format("- {{id: {}, name: {}, dir: {}, clock: {{offset_s: ", robot.id.value, robot.name,
@@ -129,9 +133,16 @@ Result<SwarmManifest> load_manifest(const std::filesystem::path& dir) {
     return fail(ErrorCode::kFormat, fmt::format("{}:{}: {}", file.string(), line, message));
   };
   const Result<std::string> text = read_text_file(file);
+  std::error_code status;
+  if (!text && std::filesystem::exists(dir / "report.json", status)) {
+    return fail(ErrorCode::kNotFound, file.string() + ": no such file; " + dir.string() +
+                                          " is the output of a replay, not a data set");
+  }
   if (!text) return tl::unexpected(text.error());
   try {
-    return manifest_from(YAML::Load(*text));
+    const YAML::Node root = YAML::Load(*text);
+    if (root.IsNull()) return fault(1, "the file is empty");
+    return manifest_from(root);
   } catch (const Fault& e) {
     return fault(e.line, e.message);
   } catch (const YAML::Exception& e) {

@@ -28,6 +28,9 @@ struct SwarmRobot {
   RobotClock clock;
 };
 
+/// Whether a user means this robot: by its name or its id.
+[[nodiscard]] bool is_named(const SwarmRobot& robot, const std::string& name_or_id);
+
 /// swarm.yaml.
 struct SwarmManifest {
   std::string scenario;

@@ -43,6 +43,7 @@ Result<Trajectory> Trajectory::load(const std::filesystem::path& file) {
     }
   }
   if (!faults.empty()) return fail(ErrorCode::kFormat, faults.list().front());
+  if (samples.empty()) return fail(ErrorCode::kFormat, file.string() + ": has no rows");
   return Trajectory(std::move(samples));
 }
 

@@ -12,6 +12,7 @@
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/live/check/robot_check.hpp"
 #include "daemon/ctl/live/full_status.hpp"
+#include "daemon/ctl/live/neighbor_view.hpp"
 #include "daemon/ctl/live/own_board.hpp"
 #include "daemon/ctl/live/walk_around.hpp"
 #include "drivers/base/monotonic_clock.hpp"
@@ -105,17 +106,12 @@ Result<SwarmConfig> members_of(const CheckOptions& options, const RobotObservati
 
 /// The newest pose of a neighbor, watched for a second each time.
 Result<std::vector<CheckFinding>> walk(const CheckOptions& options, const client::Status& status) {
-  const auto same = [&](const client::Status::Neighbor& neighbor) {
-    return neighbor.name == options.walk || std::to_string(neighbor.peer) == options.walk;
-  };
-  const auto neighbor = std::ranges::find_if(status.neighbors, same);
-  if (neighbor == status.neighbors.end())
-    return fail(ErrorCode::kUsage, "--walk: there is no neighbor " + options.walk);
-  const RobotId id{neighbor->peer};
+  const std::optional<RobotId> id = neighbor_named(status, options.walk);
+  if (!id) return fail(ErrorCode::kUsage, "--walk: there is no neighbor " + options.walk);
   const auto pose_now = [&]() -> std::optional<client::Pose> {
     const auto poses = watch_poses(options.daemon, 1.0);
-    if (!poses || !poses->contains(id)) return std::nullopt;
-    return poses->at(id);
+    if (!poses || !poses->contains(*id)) return std::nullopt;
+    return poses->at(*id);
   };
   return walk_around(options.walk, options.distance_m, pose_now, std::cin, std::cerr);
 }

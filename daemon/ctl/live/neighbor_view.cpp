@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
+
+#include "drivers/base/number_text.hpp"
 
 namespace crepes {
 namespace {
@@ -21,6 +24,16 @@ double largest_sigma(const Eigen::Matrix3d& covariance) {
 PoseSigma sigma_of(const Matrix6d& covariance) {
   return {largest_sigma(covariance.topLeftCorner<3, 3>()),
           largest_sigma(covariance.bottomRightCorner<3, 3>())};
+}
+
+std::optional<RobotId> neighbor_named(const client::Status& status, const std::string& name_or_id) {
+  using Neighbor = client::Status::Neighbor;
+  auto found = std::ranges::find(status.neighbors, name_or_id, &Neighbor::name);
+  std::uint16_t id = 0;
+  if (found == status.neighbors.end() && parse_number(name_or_id, id).empty())
+    found = std::ranges::find(status.neighbors, id, &Neighbor::peer);
+  if (found == status.neighbors.end()) return std::nullopt;
+  return RobotId{found->peer};
 }
 
 void NeighborView::update(const NeighborPose& pose, Timestamp now) {

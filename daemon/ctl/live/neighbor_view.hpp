@@ -16,6 +16,10 @@ struct PoseSigma {
 };
 [[nodiscard]] PoseSigma sigma_of(const Matrix6d& covariance);
 
+/// The neighbor that a user means: by its name as `crepesctl status` shows it, or by its id.
+[[nodiscard]] std::optional<RobotId> neighbor_named(const client::Status& status,
+                                                    const std::string& name_or_id);
+
 /// Collects messages about one neighbor; times are the client's.
 class NeighborView {
  public:

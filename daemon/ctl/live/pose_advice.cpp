@@ -10,7 +10,7 @@ namespace {
 constexpr std::array<std::string_view, 14> kAdvice{
     "",
     "Check the mesh, net.interface, a firewall on UDP 47474, the key, and whether its crepesd "
-    "runs.",
+    "runs and its IMU works: without gravity it sends nothing.",
     "Out of reach, or its battery or daemon has stopped.",
     "Wait two seconds. If it stays, packets arrive in one direction only.",
     "See the IMU among the sensors.",

@@ -10,6 +10,7 @@
 #include "daemon/ctl/live/full_status.hpp"
 #include "daemon/ctl/live/light_advice.hpp"
 #include "daemon/ctl/live/pose_advice.hpp"
+#include "daemon/ctl/live/screen_text.hpp"
 #include "daemon/ctl/text_table.hpp"
 #include "estimator/core/constants.hpp"
 
@@ -40,6 +41,13 @@ std::string one_line(const std::string& lines) {
   return text;
 }
 
+/// "imu: silent: is it powered?", in lines as wide as the tables.
+std::string note(const std::string& about, const std::string& text) {
+  constexpr std::size_t kColumns = 100;
+  constexpr std::size_t kIndent = 2;
+  return wrapped(fmt::format("{}: {}", about, one_line(text)), kColumns, kIndent) + "\n";
+}
+
 /// What is not as the configuration files say; empty if all is.
 std::string config_text(const ConfigState& config) {
   std::string text;
@@ -55,12 +63,13 @@ std::string config_text(const ConfigState& config) {
 
 std::string sensors_of(const client::Status& status) {
   Rows rows{{"sensor", "rate Hz", "state", "faults", "counts"}};
+  std::string notes;
   for (const auto& sensor : status.sensors) {
-    const std::string what = sensor.message.empty() ? "fault" : sensor.message;
     rows.push_back({sensor.name, sensor.rate_hz > 0 ? fixed(sensor.rate_hz, 1) : "-",
-                    sensor.ok ? "ok" : what, text_of(sensor.faults), text_of(sensor.counts)});
+                    sensor.ok ? "ok" : "fault", text_of(sensor.faults), text_of(sensor.counts)});
+    if (!sensor.ok && !sensor.message.empty()) notes += note(sensor.name, sensor.message);
   }
-  return text_table(rows, LastColumn::kWords);
+  return text_table(rows, LastColumn::kWords) + notes;
 }
 
 std::string neighbors_of(const client::Status& status) {
@@ -96,7 +105,7 @@ std::string advice_of(const client::Status& status) {
   std::string text;
   for (const auto& [reason, names] : neighbors) {
     if (const std::string_view advice = advice_for(reason); !advice.empty())
-      text += fmt::format("{} ({}): {}\n", reason, names, advice);
+      text += note(fmt::format("{} ({})", reason, names), std::string(advice));
   }
   return text;
 }
@@ -107,7 +116,7 @@ std::string light_of(const client::Status& status) {
   for (const auto& sensor : status.sensors) {
     if (!is_spots(sensor) || sensor.rate_hz <= 0.0 || sensor.counts.empty()) continue;
     const std::string advice = light_advice(sensor.counts);
-    if (!advice.empty()) text += fmt::format("{}: {}\n", sensor.name, advice);
+    if (!advice.empty()) text += note(sensor.name, advice);
   }
   return text;
 }
@@ -115,10 +124,9 @@ std::string light_of(const client::Status& status) {
 /// What the team finds wrong with a robot; on a healthy team this is empty.
 std::string faults_of(const client::Status& status) {
   std::string text;
-  for (const std::string& fault : status.faults) text += fmt::format("this robot: {}\n", fault);
+  for (const std::string& fault : status.faults) text += note("this robot", fault);
   for (const auto& neighbor : status.neighbors) {
-    for (const std::string& fault : neighbor.faults)
-      text += fmt::format("{}: {}\n", neighbor.name, fault);
+    for (const std::string& fault : neighbor.faults) text += note(neighbor.name, fault);
   }
   return text;
 }
@@ -174,7 +182,7 @@ std::string mesh_of(const client::Status& status) {
   std::string text =
       fmt::format("mesh: {}; {} % of the air, {} % with all that are heard\n", keys,
                   fixed(100.0 * mesh.airtime, 1), fixed(100.0 * mesh.airtime_of_all, 1));
-  if (!mesh.warning.empty()) text += fmt::format("mesh: {}\n", mesh.warning);
+  if (!mesh.warning.empty()) text += note("mesh", mesh.warning);
   return text;
 }
 

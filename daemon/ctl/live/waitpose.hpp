@@ -11,7 +11,7 @@ namespace crepes {
 /// Options of `crepesctl waitpose`.
 struct WaitposeOptions {
   DaemonAddress daemon;
-  RobotId peer{};
+  std::string peer;  ///< its name or id
   double timeout_s = 10.0;
   std::optional<double> max_sigma_m;  ///< the largest acceptable sigma of the position
   bool json = false;

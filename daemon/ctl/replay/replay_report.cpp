@@ -130,6 +130,11 @@ std::string recording_text(const std::string& scenario, double duration_s) {
   return fmt::format("scenario {}, {} s", scenario, duration_s);
 }
 
+Error no_report(const std::filesystem::path& file) {
+  return {ErrorCode::kFormat,
+          file.string() + ": not the whole report of a replay; was it cut off? Replay again"};
+}
+
 }  // namespace
 
 std::string report_json(const ReplayReport& report, const ReplayOutput::Names& names) {
@@ -162,8 +167,8 @@ Result<std::vector<ClockSample>> read_clock_samples(const std::filesystem::path&
     std::vector<ClockSample> samples;
     for (const Json& sample : report.at("clocks")) samples.push_back(clock_from(sample, names));
     return samples;
-  } catch (const nlohmann::json::exception& e) {
-    return fail(ErrorCode::kFormat, fmt::format("{}: {}", file.string(), e.what()));
+  } catch (const nlohmann::json::exception&) {
+    return tl::unexpected(no_report(file));
   }
 }
 
@@ -187,8 +192,8 @@ Result<void> check_same_recording(const std::filesystem::path& results,
                 fmt::format("{} is of another recording ({}) than the truth ({})", file.string(),
                             recording_text(scenario, duration_s),
                             recording_text(manifest.scenario, manifest.duration_s)));
-  } catch (const nlohmann::json::exception& e) {
-    return fail(ErrorCode::kFormat, fmt::format("{}: {}", file.string(), e.what()));
+  } catch (const nlohmann::json::exception&) {
+    return tl::unexpected(no_report(file));
   }
 }
 

@@ -82,7 +82,9 @@ Result<ReplaySummary> replay_swarm(const ReplayOptions& options) {
   ReplayOutput::Names names;
   for (const RobotRecording& robot : dataset->robots) names[robot.robot.id] = robot.robot.name;
   for (const std::string& delayed : options.delays.robots) {
-    if (std::ranges::none_of(names, [&](const auto& name) { return name.second == delayed; })) {
+    if (std::ranges::none_of(dataset->robots, [&](const RobotRecording& recording) {
+          return is_named(recording.robot, delayed);
+        })) {
       return fail(ErrorCode::kUsage, fmt::format("--delayed: no robot \"{}\" in {}", delayed,
                                                  options.swarm_dir.string()));
     }

@@ -23,7 +23,7 @@ namespace crepes {
 
 /// What passes from a measurement to its arrival in the daemon: exposure, transfer, detection.
 struct SensorDelays {
-  std::vector<std::string> robots;  ///< by name; empty: of all
+  std::vector<std::string> robots;  ///< by name or id; empty: of all
   double camera_s = 0.0;
   double uwb_s = 0.0;
   double imu_s = 0.0;

@@ -34,8 +34,10 @@ bool is_own_reading(const Event& event) {
          std::holds_alternative<SpotFrame>(event);
 }
 
-bool concerns(const SensorDelays& delays, const std::string& name) {
-  return delays.robots.empty() || std::ranges::count(delays.robots, name) > 0;
+bool concerns(const SensorDelays& delays, const SwarmRobot& robot) {
+  return delays.robots.empty() || std::ranges::any_of(delays.robots, [&](const auto& delayed) {
+           return is_named(robot, delayed);
+         });
 }
 
 bool is_tick(const VirtualInput& input) {
@@ -82,7 +84,7 @@ void VirtualSwarm::schedule_at(Timestamp local, std::size_t robot, VirtualInput 
 
 void VirtualSwarm::schedule_recording(std::size_t index) {
   RobotRecording& recording = robots_[index].recording;
-  const SensorDelays delays = concerns(delays_, recording.robot.name) ? delays_ : SensorDelays{};
+  const SensorDelays delays = concerns(delays_, recording.robot) ? delays_ : SensorDelays{};
   for (const ImuSample& sample : recording.imu)
     schedule_at(sample.stamp, index, Event(sample), delays.imu_s);
   for (const UwbRange& range : recording.ranges)

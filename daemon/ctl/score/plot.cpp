@@ -164,10 +164,7 @@ std::string page_of(const PlotOptions& options, const std::vector<PairData>& pai
 
 Result<fs::path> plot(const PlotOptions& options) {
   const std::vector<PairName> names = pairs_in(options.results);
-  if (names.empty()) {
-    return fail(ErrorCode::kNotFound,
-                options.results.string() + ": no <observer>/<neighbor>.csv of a replay");
-  }
+  if (names.empty()) return tl::unexpected(no_pairs_in(options.results));
   std::optional<PlottedRecording> recording;
   if (!options.swarm.empty()) {
     auto loaded = load_recording(options);

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <utility>
 
+#include "daemon/ctl/dataset/replay_pairs.hpp"
 #include "daemon/ctl/replay/replay_output.hpp"
 #include "drivers/dataset/pose_file.hpp"
 
@@ -83,10 +84,7 @@ Result<SwarmScore> score_swarm(const fs::path& results, const SwarmManifest& man
         on_progress(static_cast<double>(swarm.pairs.size()) / static_cast<double>(pairs));
     }
   }
-  if (files == 0) {
-    return fail(ErrorCode::kNotFound, fmt::format("{}: no <observer>/<neighbor>.csv of {}",
-                                                  results.string(), manifest.scenario));
-  }
+  if (files == 0) return tl::unexpected(no_pairs_in(results));
   auto clocks = read_clock_samples(results / "report.json", names);
   if (clocks) {
     swarm.clocks = score_clocks(*clocks, manifest);

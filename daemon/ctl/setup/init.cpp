@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <system_error>
@@ -11,7 +13,6 @@
 #include "daemon/ctl/json_line.hpp"
 #include "daemon/ctl/setup/swarm_members.hpp"
 #include "drivers/base/number_text.hpp"
-#include "drivers/dataset/robot_folder.hpp"
 #include "estimator/vision/codebook.hpp"
 
 namespace crepes {
@@ -304,17 +305,24 @@ Result<void> refuse_to_replace(const std::vector<PlannedFile>& files) {
 /// is replaced keeps a copy, NAME~.
 Result<void> write_files(const std::vector<PlannedFile>& files) {
   constexpr auto kNew = ".new";
+  const auto failure = [&files](const fs::path& path, const std::error_code& reason) {
+    std::error_code ignored;
+    for (const PlannedFile& one : files) fs::remove(with_suffix(one.path, kNew), ignored);
+    return fail(ErrorCode::kIo, path.string() + ": " + reason.message());
+  };
   std::error_code error;
   for (const PlannedFile& file : files) {
-    auto written = write_text_file(with_suffix(file.path, kNew), file.text);
-    if (written) continue;
-    for (const PlannedFile& one : files) fs::remove(with_suffix(one.path, kNew), error);
-    return written;
+    fs::create_directories(file.path.parent_path(), error);
+    if (error) return failure(file.path.parent_path(), error);
+    std::ofstream out(with_suffix(file.path, kNew), std::ios::binary);
+    out << file.text;
+    out.close();
+    if (!out) return failure(file.path, {errno, std::generic_category()});
   }
   for (const PlannedFile& file : files) {
     if (fs::exists(file.path, error)) fs::rename(file.path, with_suffix(file.path, "~"), error);
     if (!error) fs::rename(with_suffix(file.path, kNew), file.path, error);
-    if (error) return fail(ErrorCode::kIo, file.path.string() + ": " + error.message());
+    if (error) return failure(file.path, error);
   }
   return {};
 }

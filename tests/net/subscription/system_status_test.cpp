@@ -14,6 +14,7 @@ NeighborStatus neighbor(std::uint16_t id, NoPoseReason reason) {
 
 TEST(SystemStatus, SaysThatAClockIsUnknownWhereDatagramsArrive) {
   SystemStatus status;
+  status.estimator.tilt = Tilt{};
   status.estimator.neighbors = {
       neighbor(2, NoPoseReason::kNeverHeard), neighbor(3, NoPoseReason::kSilent),
       neighbor(4, NoPoseReason::kNeverHeard), neighbor(5, NoPoseReason::kNeverHeard),
@@ -29,6 +30,18 @@ TEST(SystemStatus, SaysThatAClockIsUnknownWhereDatagramsArrive) {
   EXPECT_EQ(status.estimator.neighbors[2].reason, NoPoseReason::kNeverHeard) << "long ago";
   EXPECT_EQ(status.estimator.neighbors[3].reason, NoPoseReason::kNeverHeard);
   EXPECT_EQ(status.estimator.neighbors[4].reason, NoPoseReason::kNotSeen);
+}
+
+TEST(SystemStatus, SaysThatTheOwnImuIsWhyNoClockBecomesKnown) {
+  SystemStatus status;
+  status.estimator.neighbors = {neighbor(2, NoPoseReason::kNeverHeard),
+                                neighbor(3, NoPoseReason::kNeverHeard)};
+  status.traffic = {{.peer = RobotId{2}, .received = 9, .age_s = 0.1}};
+
+  name_unknown_clocks(status);
+
+  EXPECT_EQ(status.estimator.neighbors[0].reason, NoPoseReason::kNoOwnImu);
+  EXPECT_EQ(status.estimator.neighbors[1].reason, NoPoseReason::kNeverHeard);
 }
 
 }  // namespace

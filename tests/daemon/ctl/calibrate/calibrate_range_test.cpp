@@ -144,6 +144,23 @@ TEST_F(CalibrateRange, TakesDistancesFromTheCommandLineByNameOrId) {
   EXPECT_NE(report->text.find("ranges.members.yaml"), std::string::npos);
 }
 
+TEST_F(CalibrateRange, ReplacesItsEarlierResultsButNoOtherFileUnlessForced) {
+  write_swarm(2);
+  ASSERT_TRUE(run());
+  EXPECT_TRUE(run());
+
+  std::ofstream(etc() / "ranges.members.yaml") << "swarm: {members: []}  # measured by hand\n";
+  const auto refused = run();
+
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("ranges.members.yaml: exists"), std::string::npos)
+      << refused.error().message;
+  EXPECT_TRUE(calibrate_range({.swarm_dir = scratch_.path(),
+                               .tape = scratch_.path() / "tape.yaml",
+                               .out = etc() / "ranges.yaml",
+                               .force = true}));
+}
+
 TEST_F(CalibrateRange, SaysWhatIsWrongWithADistance) {
   write_swarm(2);
   for (const std::string text : {"r1=3.0", "r1,r9=3.0", "r1,r1=3.0", "r1,r2=far", "r1,r2=-3"}) {
@@ -152,6 +169,19 @@ TEST_F(CalibrateRange, SaysWhatIsWrongWithADistance) {
     EXPECT_EQ(report.error().code, ErrorCode::kUsage);
     EXPECT_NE(report.error().message.find(text), std::string::npos) << report.error().message;
   }
+}
+
+TEST_F(CalibrateRange, WarnsOfATapeThatIsHalfAMeterWrong) {
+  write_swarm(3);
+
+  const auto wrong = run_with({"r2,r3=3.50", "r1,r3=4.50"});
+  const auto right = run_with({"r2,r3=4.00", "r1,r3=5.00"});
+
+  ASSERT_TRUE(wrong && right);
+  EXPECT_NE(wrong->text.find("pair 1,3: 0.55 m instead of 0.00 m, pair 2,3: 0.70 m"),
+            std::string::npos)
+      << wrong->text;
+  EXPECT_EQ(right->text.find("is the tape right"), std::string::npos) << right->text;
 }
 
 TEST_F(CalibrateRange, WritesTheNoiseThatTheRangesHave) {

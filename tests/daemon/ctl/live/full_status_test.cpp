@@ -2,51 +2,16 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "daemon/ctl/live/status.hpp"
-#include "daemon/stages/worker.hpp"
-#include "net/subscription/subscription_service.hpp"
-#include "net/udp_socket.hpp"
+#include "net/subscription/subscription_json.hpp"
+#include "tests/daemon/ctl/live/served_status.hpp"
 
 namespace crepes::full_status_test {
 namespace {
-
-using namespace std::chrono_literals;
-
-/// Serves a status at a port of this machine.
-class Daemon {
- public:
-  explicit Daemon(SystemStatus status)
-      : socket_(UdpSocket::bind("127.0.0.1", 0).value()),
-        service_(
-            {}, "1", [status = std::move(status)] { return status; }, HashKey{}),
-        worker_("daemon", [this](const std::stop_token& stop) { serve(stop); }) {}
-
-  [[nodiscard]] DaemonAddress address() const {
-    return {.address = "127.0.0.1", .port = socket_.local().port};
-  }
-
- private:
-  void serve(const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
-      const auto datagram = socket_.receive(20ms);
-      if (!datagram || !*datagram) continue;
-      const std::string request((*datagram)->bytes.begin(), (*datagram)->bytes.end());
-      const auto answer = service_.answer((*datagram)->from, request, Timestamp{1000s});
-      if (answer)
-        (void)socket_.send_to(std::vector<std::uint8_t>(answer->begin(), answer->end()),
-                              (*datagram)->from);
-    }
-  }
-
-  UdpSocket socket_;
-  SubscriptionService service_;
-  Worker worker_;
-};
 
 TEST(FullStatus, HasTheCountsOfEverySensorHoweverManyThereAre) {
   SystemStatus status;
@@ -72,7 +37,7 @@ TEST(FullStatus, HasTheCountsOfEverySensorHoweverManyThereAre) {
   }
   status.sensors.push_back({"imu", 100.0, true, "", {{}, {{"samples", 500}}}});
   ASSERT_EQ(status_json(status, StatusPart::kSensors).find("counts"), std::string::npos);
-  const Daemon daemon(status);
+  const ServedStatus daemon(status);
 
   const Result<FullStatus> full = request_full_status(daemon.address());
 
@@ -89,7 +54,7 @@ TEST(Status, NamesARefusedReloadAndWhatWaitsForARestart) {
   state.self = RobotId{1};
   state.config.fault = "r1.yaml:20: uwb.noise: unknown key\nr1.yaml:21: uwb.bias: unknown key";
   state.config.restart = {"cameras", "imu"};
-  const Daemon daemon(state);
+  const ServedStatus daemon(state);
 
   const Result<std::string> text = status({.daemon = daemon.address()});
 
@@ -103,7 +68,7 @@ TEST(Status, NamesARefusedReloadAndWhatWaitsForARestart) {
 TEST(Status, SaysNothingOfAConfigurationThatIsInUse) {
   SystemStatus state;
   state.self = RobotId{1};
-  const Daemon daemon(state);
+  const ServedStatus daemon(state);
 
   const Result<std::string> text = status({.daemon = daemon.address()});
 

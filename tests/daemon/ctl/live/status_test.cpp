@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <sstream>
+#include <string>
+
 namespace crepes::status_test {
 namespace {
 
@@ -25,6 +28,23 @@ TEST(Status, AdvisesNothingOnTheLightOfACameraThatIsSilent) {
   status.sensors[1].rate_hz = 0.0;
 
   EXPECT_EQ(status_text(status, {}).find("cam0 spots: put"), std::string::npos);
+}
+
+TEST(Status, WrapsFaultsOfSensorsBelowTheTable) {
+  client::Status status;
+  const std::string message =
+      "/dev/serial/by-id/usb-FTDI_FT230X_Basic_UART_D30A1XYZ-if00-port0: no frames with a good "
+      "checksum: is the baud rate right, and is it the module that is meant?";
+  status.sensors = {{"uwb", 0.0, false, message, {}, {}}, {"imu", 100.0, true, "", {}, {}}};
+  status.faults = {
+      "its camera is turned by 3.10 +- 0.20 deg against its calibration; calibrate it "
+      "again, and measure where it is mounted"};
+
+  const std::string text = status_text(status, {});
+
+  EXPECT_NE(text.find("uwb: /dev/serial"), std::string::npos) << text;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100U) << line;
 }
 
 }  // namespace

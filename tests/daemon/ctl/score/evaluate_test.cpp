@@ -343,6 +343,43 @@ TEST_F(Evaluate, SaysWhatIsMissing) {
             std::string::npos);
 }
 
+TEST_F(Evaluate, SaysWhichDirectoryIsNotWhatItShouldBe) {
+  write_results(0.1);
+  const auto message = [](EvaluateOptions options) {
+    const auto text = evaluate(options);
+    return text ? *text : text.error().message;
+  };
+  EvaluateOptions swapped = options();
+  std::swap(swapped.results, swapped.swarm);
+  EvaluateOptions same = options();
+  same.results = same.swarm;
+  EvaluateOptions nowhere = options();
+  nowhere.results /= "nowhere";
+
+  EXPECT_NE(message(swapped).find("out is the output of a replay, not a data set"),
+            std::string::npos);
+  EXPECT_NE(message(same).find("it is a data set"), std::string::npos);
+  EXPECT_NE(message(nowhere).find("nowhere: no <observer>/<neighbor>.csv of a replay: there is no "
+                                  "such directory"),
+            std::string::npos);
+}
+
+TEST_F(Evaluate, SaysWhichFileIsCutOffOrEmpty) {
+  write_results(0.1);
+  const auto message = [&] {
+    const auto text = evaluate(options());
+    return text ? *text : text.error().message;
+  };
+  swarm_.write("truth/r2.csv", "#\n");
+  EXPECT_NE(message().find("truth/r2.csv: has no rows"), std::string::npos) << message();
+  swarm_.write("truth/r2.csv", "#\n0,2,0,0,1,0,0,0,0,0,0\n");
+  swarm_.write("out/report.json", "{\n \"scenario\": \"ti");
+  EXPECT_NE(message().find("report.json: not the whole report of a replay"), std::string::npos)
+      << message();
+  swarm_.write("swarm.yaml", "");
+  EXPECT_NE(message().find("swarm.yaml:1: the file is empty"), std::string::npos) << message();
+}
+
 TEST_F(Evaluate, RefusesTheTruthOfAnotherRecording) {
   write_results(0.1);
   swarm_.write("out/report.json", R"({"scenario":"manual","duration_s":0.2,"clocks":[]})");

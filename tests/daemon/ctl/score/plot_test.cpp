@@ -215,6 +215,14 @@ TEST_F(Plot, SaysWhatIsMissing) {
   EXPECT_NE(message(swarm_.dir()).find("no robot 'stranger'"), std::string::npos);
 }
 
+TEST_F(Plot, TakesNoTruthForResults) {
+  const auto file = plot({.results = swarm_.dir(), .swarm = {}, .out = {}});
+
+  ASSERT_FALSE(file);
+  EXPECT_NE(file.error().message.find("it is a data set"), std::string::npos)
+      << file.error().message;
+}
+
 TEST_F(Plot, RefusesTheTruthOfAnotherRecording) {
   write_results(ReplayOutput::Detail::kPoses);
   swarm_.write("out/report.json", R"({"scenario":"manual"})");

@@ -1,6 +1,7 @@
 #include "daemon/ctl/setup/init.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -74,6 +75,27 @@ TEST_F(Init, WritesAConfigurationThatTheDaemonAccepts) {
   EXPECT_EQ(config.cameras[0].calibration.resolution, (std::array{1280, 800}));
   EXPECT_EQ(config.cameras[0].calibration.rate_hz, 120.0);
   EXPECT_FALSE(config.cameras[0].calibration.calibrated);
+}
+
+TEST_F(Init, NamesTheFileThatItMayNotWriteAndWhy) {
+  constexpr uid_t kNobody = 65534;
+  options_.id = 1;
+  options_.robots = 2;
+  options_.p_body_led = {0.0, 0.0, 0.0};
+  fs::create_directories(options_.dir);
+  for (const fs::path& dir : {folder_.path(), options_.dir}) fs::permissions(dir, fs::perms{0555});
+
+  const uid_t self = ::geteuid();
+  ASSERT_EQ(::seteuid(self == 0 ? kNobody : self), 0);  // root may write everywhere
+  const auto report = run();
+  ASSERT_EQ(::seteuid(self), 0);
+  fs::permissions(folder_.path(), fs::perms::owner_all);  // to be removed
+  fs::permissions(options_.dir, fs::perms::owner_all);
+
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().message,
+            (options_.dir / "crepesd.yaml").string() + ": Permission denied");
+  EXPECT_TRUE(fs::is_empty(options_.dir));
 }
 
 TEST_F(Init, WritesSlotsThatASlowCameraCanRead) {
