@@ -12,6 +12,10 @@ using E = ErrorState;
 // Where the curvature's variance exceeds this share of the range's, ranges correct along the line.
 constexpr double kMaxCurvature = 0.1;
 
+// What a range says of the distance depends on the direction. Where that is less certain than this,
+// both axes together, ranges correct nothing.
+constexpr double kLostDirection = 0.15;  // rad
+
 // The part of a position's covariance across the line of sight.
 Eigen::Matrix3d covariance_across(const Eigen::RowVector3d& line, const Eigen::Matrix3d& cov_p) {
   const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - line.transpose() * line;
@@ -43,8 +47,8 @@ bool is_range_accepted(double innovation_m, double variance_m2, double gate_nis)
 RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double gate_nis,
                             E::Covariance& P, double shared_m2) {
   const Eigen::RowVector3d line = z.H.middleCols<3>(E::kP);
-  const RangeCurvature curvature =
-      curvature_of(covariance_across(line, P.block<E::kP, E::kP, 3, 3>()), distance_m);
+  const Eigen::Matrix3d across = covariance_across(line, P.block<E::kP, E::kP, 3, 3>());
+  const RangeCurvature curvature = curvature_of(across, distance_m);
   const double curved = curvature.variance_m2;
   const E::Vector PHt = P.seen_columns().lazyProduct(z.H.transpose());
   const double predicted = z.H * PHt.head<E::kSeen>();
@@ -62,7 +66,8 @@ RangeUpdate update_by_range(const RangeInnovation& z, double distance_m, double 
   const double is_true = probability_true(residual, expected);
   const bool fits = is_range_accepted(residual, expected, gate_nis);
   fusion.verdict = fits ? Verdict::kFused : Verdict::kGated;
-  if (fusion.verdict == Verdict::kGated || predicted <= shared) return update;
+  const bool is_lost = across.trace() > std::pow(kLostDirection * distance_m, 2);
+  if (fusion.verdict == Verdict::kGated || predicted <= shared || is_lost) return update;
 
   // The error across hardly changes between ranges, so that their curvature does not average out.
   // The variance after the update is at least that of the curvature and of what is shared (compare
