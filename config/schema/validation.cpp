@@ -70,12 +70,14 @@ std::string pattern_fault(const std::string& pattern) {
 }
 
 /// Both members must be free of faults.
-std::string code_conflict(const MemberConfig& a, const MemberConfig& b) {
-  if (!blink_alike(a, b)) return "";
-  return a.pattern ? "the same pattern, shifted, as that of " : "within 0.02 of the duty of ";
+std::string code_conflict(const MemberConfig& a, const MemberConfig& b, const SwarmConfig& swarm) {
+  if (!blink_alike(a, b, swarm)) return "";
+  if (a.pattern && b.pattern) return "the same pattern, shifted, as that of ";
+  return a.pattern ? "within 0.02 of the pattern of " : "within 0.02 of the duty of ";
 }
 
-void check_codes(const std::vector<MemberConfig>& members, RuleFaults& faults) {
+void check_codes(const SwarmConfig& swarm, RuleFaults& faults) {
+  const std::vector<MemberConfig>& members = swarm.members;
   std::vector<bool> sound(members.size(), true);
   for (std::size_t i = 0; i < members.size(); ++i) {
     const MemberConfig& member = members[i];
@@ -89,7 +91,7 @@ void check_codes(const std::vector<MemberConfig>& members, RuleFaults& faults) {
     }
     sound[i] = faults.size() == before;
     for (std::size_t j = 0; sound[i] && j < i; ++j) {
-      const std::string conflict = sound[j] ? code_conflict(members[j], member) : "";
+      const std::string conflict = sound[j] ? code_conflict(members[j], member, swarm) : "";
       if (conflict.empty()) continue;
       faults.push_back({key + (member.pattern ? ".pattern" : ".duty"),
                         fmt::format("{}{}: no camera can tell the two apart", conflict,
@@ -117,7 +119,7 @@ void check_members(const Config& config, RuleFaults& faults) {
         return m.uwb_id ? std::to_string(*m.uwb_id) : id_text(m.id.value);
       },
       faults);
-  check_codes(members, faults);
+  check_codes(config.swarm, faults);
 
   const auto has_member = [&](RobotId id) {
     return std::ranges::count(members, id, &MemberConfig::id) > 0;

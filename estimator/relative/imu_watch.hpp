@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -11,20 +12,25 @@
 
 namespace crepes {
 
-/// Noise changes every axis from sample to sample. If all six values repeat for ten samples, the
-/// sensor hangs. If one large value repeats for five samples, the axis is saturated. (After
-/// rounding for a datagram, two of thirty samples may be equal by chance.) One axis hangs if it
-/// repeats far more often in a row than it used to, while the other two of its sensor never repeat:
-/// a coarse sensor at rest repeats on all.
+/// Noise changes every axis from sample to sample. If all six values repeat for ten samples and 50
+/// ms, the sensor hangs; for less, it is read more often than it measures. If one large value
+/// repeats for five samples, while others change, the axis is saturated. (After rounding for a
+/// datagram, two of thirty samples may be equal by chance.) One axis hangs if it repeats far more
+/// often in a row than it used to, while the other two of its sensor never repeat: a coarse sensor
+/// at rest repeats on all.
 class ImuWatch {
  public:
   /// False for a sample that does not measure the motion.
   [[nodiscard]] bool accept(const ImuSample& sample) {
     if (last_ && sample.stamp <= last_->stamp) return true;  // late: not next to the last
-    if (last_) compare(*last_, sample);
+    const bool is_held =
+        last_ && sample.gyro_radps == last_->gyro_radps && sample.accel_mps2 == last_->accel_mps2;
+    if (last_ && !is_held) compare(*last_, sample);
+    held_ = is_held ? held_ + 1 : 0;
+    if (!is_held) changed_ = sample.stamp;
     last_ = sample;
     is_saturated_ = reads_range_limit(sample);
-    const bool hangs = *std::min_element(repeats_.begin(), repeats_.end()) >= kHanging;
+    const bool hangs = held_ >= kHanging && sample.stamp - changed_ >= kLongestPeriod;
     return !hangs && !is_saturated_ && !an_axis_hangs();
   }
 
@@ -33,6 +39,7 @@ class ImuWatch {
 
  private:
   static constexpr int kHanging = 10;
+  static constexpr Duration kLongestPeriod = std::chrono::milliseconds{50};  // of a sensor
   static constexpr int kSaturated = 4;
   static constexpr double kByChance = 1e-9;  // of a run of repeats
   static constexpr double kMemory = 500.0;   // samples in the share of repeats
@@ -76,8 +83,10 @@ class ImuWatch {
   }
 
   std::optional<ImuSample> last_;
+  Timestamp changed_ = kNever;  ///< the last sample that differed from the one before
+  int held_ = 0;                ///< samples since then
   bool is_saturated_ = false;
-  std::array<int, 6> repeats_{};   ///< of each axis, in a row
+  std::array<int, 6> repeats_{};   ///< of each axis, in a row, of samples that differ
   std::array<int, 6> changes_{};   ///< the same
   std::array<double, 6> share_{};  ///< of repeats among the latest samples
 };

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/relative/propagation.hpp"
 #include "estimator/relative/range_update.hpp"
 
 namespace crepes {
@@ -98,8 +99,10 @@ bool GaussianSum::is_compatible_with(const GaussianSum& other) const {
 
 const NeighborTrack& GaussianSum::heaviest() const { return parts_[heaviest_].track; }
 
-GaussianPose GaussianSum::mean(const GaussianPose& heaviest) const {
-  if (parts_.size() == 1) return heaviest;
+GaussianPose GaussianSum::mean(const NeighborTrack& heaviest, const ImuHistory& imu_B,
+                               const ImuHistory& imu_N) const {
+  const GaussianPose now = heaviest.pose();
+  if (parts_.size() == 1) return now;
   const GaussianPose center = this->heaviest().pose();
   Vector6d mean = Vector6d::Zero();
   Matrix6d moment = Matrix6d::Zero();
@@ -113,10 +116,12 @@ GaussianPose GaussianSum::mean(const GaussianPose& heaviest) const {
   // Where the other parts know more than the heaviest one did, readings since then may have told as
   // much: only what the sum is more uncertain by counts.
   const Eigen::SelfAdjointEigenSolver<Matrix6d> excess(moment - mean * mean.transpose());
-  const Matrix6d& axes = excess.eigenvectors();
+  // Both bodies may have turned since then.
+  const Matrix6d turn = error_rotation(imu_B, imu_N, this->heaviest().stamp(), heaviest.stamp());
+  const Matrix6d axes = turn * excess.eigenvectors();
   const Vector6d more = excess.eigenvalues().cwiseMax(0.0);
-  return {perturbed(heaviest.pose, mean),
-          heaviest.covariance + axes * more.asDiagonal() * axes.transpose()};
+  return {perturbed(now.pose, turn * mean),
+          now.covariance + axes * more.asDiagonal() * axes.transpose()};
 }
 
 }  // namespace crepes

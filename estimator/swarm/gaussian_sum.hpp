@@ -42,9 +42,10 @@ class GaussianSum {
   [[nodiscard]] const NeighborTrack& heaviest() const;
   [[nodiscard]] std::size_t size() const { return parts_.size(); }
 
-  /// Mean and covariance of the sum. `heaviest` is the pose of the heaviest part, propagated to a
-  /// later instant; the result is at that instant.
-  [[nodiscard]] GaussianPose mean(const GaussianPose& heaviest) const;
+  /// Mean and covariance of the sum. `heaviest` is the heaviest part, propagated to a later instant
+  /// by these IMUs; the result is at that instant.
+  [[nodiscard]] GaussianPose mean(const NeighborTrack& heaviest, const ImuHistory& imu_B,
+                                  const ImuHistory& imu_N) const;
 
  private:
   struct Part {

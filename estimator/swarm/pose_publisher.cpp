@@ -64,7 +64,7 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
   if (hypotheses.stamp() > stamp) return;
   const NeighborTrack track =
       predictor_.predict(stamp, hypotheses, {intake.buffer().pending(), self.imu, neighbor.imu});
-  const GaussianPose T_B_N = hypotheses.leader().mean(track.pose());
+  const GaussianPose T_B_N = hypotheses.leader().mean(track, self.imu, neighbor.imu);
   if (!is_certain(T_B_N.covariance) || track.is_contradicted()) return;
   if (hypotheses.generation() != std::exchange(generation_, hypotheses.generation())) {
     ++starts_;

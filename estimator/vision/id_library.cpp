@@ -23,11 +23,31 @@ std::string canonical(const std::string& pattern) {
   return least;
 }
 
+/// Lit once a period, for a share of it.
+struct Duty {
+  double share;
+  Duration period;
+};
+
+/// Empty for a pattern that is lit more than once before it repeats.
+std::optional<Duty> duty_of(const MemberConfig& member, const SwarmConfig& swarm) {
+  if (member.duty) return Duty{*member.duty, from_ms(swarm.period_ms)};
+  if (!member.pattern) return std::nullopt;
+  const std::string slots = canonical(*member.pattern);  // begins with the longest dark time
+  if (slots.find("10") != std::string::npos) return std::nullopt;
+  const auto lit = static_cast<double>(std::ranges::count(slots, '1'));
+  return Duty{lit / static_cast<double>(slots.size()),
+              from_ms(swarm.slot_ms) * static_cast<std::int64_t>(slots.size())};
+}
+
 }  // namespace
 
-bool blink_alike(const MemberConfig& a, const MemberConfig& b) {
+bool blink_alike(const MemberConfig& a, const MemberConfig& b, const SwarmConfig& swarm) {
   if (a.pattern && b.pattern) return canonical(*a.pattern) == canonical(*b.pattern);
-  return a.duty && b.duty && std::abs(*a.duty - *b.duty) < kMinDutyDistance;
+  const auto duty_a = duty_of(a, swarm);
+  const auto duty_b = duty_of(b, swarm);
+  return duty_a && duty_b && duty_a->period == duty_b->period &&
+         std::abs(duty_a->share - duty_b->share) < kMinDutyDistance;
 }
 
 Result<BlinkCode> BlinkCode::from_pattern(std::string_view pattern, Duration slot) {
@@ -109,7 +129,7 @@ Result<IdLibrary> IdLibrary::from(const SwarmConfig& swarm) {
       if (other.id == member.id) {
         return fail(ErrorCode::kConfig, fmt::format("{}: id {} is taken", where, member.id.value));
       }
-      if (blink_alike(member, other)) {
+      if (blink_alike(member, other, swarm)) {
         return fail(ErrorCode::kConfig,
                     fmt::format("{}: blinks like member {}: they cannot be told apart", where,
                                 other.id.value));

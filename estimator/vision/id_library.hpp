@@ -51,8 +51,9 @@ class BlinkCode {
 };
 
 /// Whether two members that have a code each blink alike: the same pattern, however shifted, or
-/// duties that frames cannot tell apart.
-[[nodiscard]] bool blink_alike(const MemberConfig& a, const MemberConfig& b);
+/// duties that frames cannot tell apart. A pattern that is lit once a period is a duty, too.
+[[nodiscard]] bool blink_alike(const MemberConfig& a, const MemberConfig& b,
+                               const SwarmConfig& swarm);
 
 /// The codes of all members. No two are the same signal, however shifted in time.
 class IdLibrary {

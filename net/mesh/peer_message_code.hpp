@@ -202,6 +202,9 @@ class BodyReader {
   std::optional<PeerMessageError> fault_;
 };
 
+/// Of measurements and estimates. What a robot sends has happened, but for errors of its stamps.
+inline constexpr Bounds kAges{-kMaxAhead, kMaxAge};
+
 /// The age of the item `i` from those before it.
 template <class Stream, class Item>
 void code_age(Stream& stream, std::vector<Item>& items, std::size_t i, unsigned k) {
@@ -210,7 +213,7 @@ void code_age(Stream& stream, std::vector<Item>& items, std::size_t i, unsigned 
   const std::int64_t predicted = i == 0   ? 0
                                  : i == 1 ? items[0].age
                                           : 2 * items[i - 1].age - items[i - 2].age;
-  stream.delta(age, predicted, i < 2 ? kFirst : k, up_to(kMaxAge), PeerMessageError::kBadStamp);
+  stream.delta(age, predicted, i < 2 ? kFirst : k, kAges, PeerMessageError::kBadStamp);
 }
 
 /// A direction.
@@ -366,7 +369,7 @@ void code_estimate(Stream& stream, CodedEstimate& estimate) {
   constexpr unsigned kStamp = 9;
   stream.bits(estimate.neighbor, kIdBits);
   stream.expect(estimate.neighbor >= 1 && estimate.neighbor <= kMaxId, PeerMessageError::kBadId);
-  stream.delta(estimate.age, 0, kStamp, up_to(kMaxAge), PeerMessageError::kBadStamp);
+  stream.delta(estimate.age, 0, kStamp, kAges, PeerMessageError::kBadStamp);
   for (std::int64_t& x : estimate.p)
     stream.delta(x, 0, kPlace, up_to(kMaxCoordinateCode), PeerMessageError::kOutOfRange);
   stream.bits(estimate.largest, 2);

@@ -17,7 +17,7 @@ inline constexpr std::int64_t kTick = 10'000;  // ns
 inline constexpr std::int64_t kMaxStamp = 4'000'000'000'000'000'000;
 
 // Ages are in ticks.
-inline constexpr std::int64_t kMaxAge = 100'000;        // of measurements
+inline constexpr std::int64_t kMaxAge = 100'000;        // of measurements and estimates
 inline constexpr std::int64_t kMaxReportAge = 200'000;  // of a report when it leaves
 inline constexpr std::int64_t kMaxTiltAge = 1'000'000'000;
 inline constexpr std::int64_t kMaxAhead = 10'000;  // of stamps, whose clock is one

@@ -158,14 +158,15 @@ class Quantizer {
  private:
   [[nodiscard]] std::int64_t age_of(Timestamp stamp) const { return base_tick_ - tick_of(stamp); }
 
-  /// What can be written and is not too old.
+  /// What can be written and is neither too old nor of the future.
   template <class Item>
   std::vector<const Item*> newest_first(const std::vector<Item>& items) {
     std::vector<const Item*> chosen;
     for (const Item& item : items) {
+      const std::int64_t age = age_of(item.stamp);
       if (!is_writable(item)) {
         ++refused_;
-      } else if (std::abs(age_of(item.stamp)) <= kMaxAge) {
+      } else if (age >= kAges.min && age <= kAges.max) {
         chosen.push_back(&item);
       }
     }

@@ -32,6 +32,19 @@ inline ImuHistory imu_at_rest(int end_ms) {
   return imu;
 }
 
+/// Turns by 2 rad/s about its vertical from `begin_ms` on.
+inline ImuHistory imu_that_turns(int begin_ms, int end_ms) {
+  ImuHistory imu = imu_at_rest(begin_ms);
+  for (int ms = begin_ms + 10; ms <= end_ms; ms += 10)
+    imu.push({at_ms(ms), {0.0, 0.0, 2.0}, {0.0, 0.0, kGravityMps2}});
+  return imu;
+}
+
+/// A vector in the body's axes, in those after a turn of `ms`.
+inline Eigen::Vector3d after_turn(const Eigen::Vector3d& v_B, int ms) {
+  return Eigen::AngleAxisd(-2.0 * 1e-3 * ms, Eigen::Vector3d::UnitZ()) * v_B;
+}
+
 inline Eigen::Vector3d horizontal(double azimuth_rad) {
   return {std::cos(azimuth_rad), std::sin(azimuth_rad), 0.0};
 }

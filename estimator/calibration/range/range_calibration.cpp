@@ -276,8 +276,8 @@ void fit_modules(RangeCalibration& found) {
   check_pairs(alone, found);
 }
 
-/// The noise of single ranges, and the least difference of powers above which nine of ten ranges
-/// are outliers.
+/// The noise of single ranges, and the least difference of powers above which nine of ten ranges,
+/// of twenty or more, are outliers.
 void describe_noise(std::span<const TapedRanges> taped, RangeCalibration& found) {
   constexpr double kOutlierSigmas = 5.0;
   constexpr int kLeastDb = 3;
@@ -304,7 +304,7 @@ void describe_noise(std::span<const TapedRanges> taped, RangeCalibration& found)
         bad += error > kOutlierSigmas * same->scatter_m ? 1U : 0U;
       }
     }
-    if (all == 0) return;
+    if (all < kLeastRanges) return;
     if (10 * bad > 9 * all) found.late_path_db = db;
   }
 }

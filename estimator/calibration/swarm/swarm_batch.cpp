@@ -121,13 +121,11 @@ SwarmBatchResult calibrate_swarm(std::vector<RobotRecord> records,
   if (!result.refusals.empty()) return result;
   const Window window = window_of(records, start);
   result.seconds = to_seconds(window.to - window.from);
-  result.refusals = refusals_of_length(result.seconds);
+  for (RobotRecord& record : records) drop_outside(window, record);
+  result.refusals = refusals_of_window(records, window.from, window.to, settings.names);
   if (!result.refusals.empty()) return result;
 
-  for (RobotRecord& record : records) {
-    drop_outside(window, record);
-    thin_pictures(record.sightings);
-  }
+  for (RobotRecord& record : records) thin_pictures(record.sightings);
   SwarmProblem problem(std::move(records), window.from, window.to);
   std::vector<RobotPriors> priors;
   for (const RobotConstants& robot : guess) {

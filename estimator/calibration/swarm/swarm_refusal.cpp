@@ -21,10 +21,13 @@ constexpr double kMostSwarmOutliers = 0.3;  // of a camera's sightings
 constexpr double kMostRangeOutliers = 0.4;
 constexpr double kMostRotationSigma = radians(0.5);
 
-double longest_gap(const std::vector<ImuSample>& imu) {
+/// Of those that reach into [from, to].
+double longest_gap(const std::vector<ImuSample>& imu, Timestamp from, Timestamp to) {
   double gap_s = 0.0;
-  for (std::size_t i = 1; i < imu.size(); ++i)
-    gap_s = std::max(gap_s, to_seconds(imu[i].stamp - imu[i - 1].stamp));
+  for (std::size_t i = 1; i < imu.size(); ++i) {
+    if (imu[i].stamp > from && imu[i - 1].stamp < to)
+      gap_s = std::max(gap_s, to_seconds(imu[i].stamp - imu[i - 1].stamp));
+  }
   return gap_s;
 }
 
@@ -36,15 +39,8 @@ std::size_t times_seen(const std::vector<RobotRecord>& records, std::size_t robo
   return count;
 }
 
-void check_robot(const std::vector<RobotRecord>& records, std::size_t r, const std::string& name,
-                 std::vector<std::string>& reasons) {
-  const std::vector<ImuSample>& imu = records[r].imu;
-  if (imu.size() < 2) {
-    reasons.push_back(fmt::format("{} has no inertial samples", name));
-  } else if (const double gap_s = longest_gap(imu); gap_s > kLongestSwarmGap_s) {
-    reasons.push_back(
-        fmt::format("{} has a gap of {} s in its inertial samples", name, number_text(gap_s, 2)));
-  }
+void check_sightings(const std::vector<RobotRecord>& records, std::size_t r,
+                     const std::string& name, std::vector<std::string>& reasons) {
   if (const std::size_t own = records[r].sightings.size(); own < kLeastSwarmSightings)
     reasons.push_back(
         fmt::format("{} sees others {} times, at least {} are needed: fly in view of its camera",
@@ -91,7 +87,8 @@ std::vector<std::string> refusals_before_fit(const std::vector<RobotRecord>& rec
     return {fmt::format("{} robots, at most {} can be calibrated at once: record them in groups",
                         records.size(), kMostRobots)};
   for (std::size_t r = 0; r < records.size(); ++r) {
-    check_robot(records, r, names[r], reasons);
+    if (records[r].imu.size() < 2)
+      reasons.push_back(fmt::format("{} has no inertial samples", names[r]));
     if (r != start.reference && start.poses[r].empty())
       reasons.push_back(fmt::format(
           "the present calibration gives no pose of {} by {} to start from: run calibrate camera "
@@ -101,10 +98,21 @@ std::vector<std::string> refusals_before_fit(const std::vector<RobotRecord>& rec
   return reasons;
 }
 
-std::vector<std::string> refusals_of_length(double seconds) {
-  if (seconds >= kLeastSwarm_s) return {};
-  return {fmt::format("all robots have poses for {} s only; record half a minute or more",
-                      number_text(std::max(0.0, seconds), 0))};
+std::vector<std::string> refusals_of_window(const std::vector<RobotRecord>& records, Timestamp from,
+                                            Timestamp to, const std::vector<std::string>& names) {
+  if (const double seconds = to_seconds(to - from); seconds < kLeastSwarm_s) {
+    return {fmt::format("all robots have poses for {} s only; record half a minute or more",
+                        number_text(std::max(0.0, seconds), 0))};
+  }
+  std::vector<std::string> reasons;
+  for (std::size_t r = 0; r < records.size(); ++r) {
+    if (const double gap_s = longest_gap(records[r].imu, from, to); gap_s > kLongestSwarmGap_s) {
+      reasons.push_back(fmt::format("{} has a gap of {} s in its inertial samples", names[r],
+                                    number_text(gap_s, 2)));
+    }
+    check_sightings(records, r, names[r], reasons);
+  }
+  return reasons;
 }
 
 void judge_swarm(const SwarmSolution& solution, const std::vector<std::string>& names,

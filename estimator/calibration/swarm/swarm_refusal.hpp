@@ -9,14 +9,16 @@
 
 namespace crepes {
 
-/// Number of robots, robots that nobody sees or that see nobody, robots without a pose to start
-/// from, gaps in the IMU's samples.
+/// Number of robots, robots without inertial samples or without a pose to start from.
 [[nodiscard]] std::vector<std::string> refusals_before_fit(const std::vector<RobotRecord>& records,
                                                            const SwarmStart& start,
                                                            const std::vector<std::string>& names);
 
-/// Too short.
-[[nodiscard]] std::vector<std::string> refusals_of_length(double seconds);
+/// Of what is used, [from, to]: too short, gaps in the IMU's samples, robots that nobody sees or
+/// that see nobody. The sightings are those of this time.
+[[nodiscard]] std::vector<std::string> refusals_of_window(const std::vector<RobotRecord>& records,
+                                                          Timestamp from, Timestamp to,
+                                                          const std::vector<std::string>& names);
 
 /// Adds refusals (residuals, contradictions, cameras that remain uncertain) and warnings.
 void judge_swarm(const SwarmSolution& solution, const std::vector<std::string>& names,

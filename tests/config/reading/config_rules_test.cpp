@@ -31,6 +31,16 @@ TEST(ConfigRules, RefusesCodesThatNoCameraCanTellApart) {
             "can tell the two apart");
 }
 
+TEST(ConfigRules, KnowsAPatternThatIsLitOnceForADuty) {
+  std::string text = replaced("011111111111111111", "11110000");
+  text.replace(text.find("duty: 0.3"), 9, "duty: 0.51");
+  text.replace(text.find("swarm:"), 6, "swarm:\n  slot_ms: 5\n  period_ms: 40");
+
+  EXPECT_EQ(faults_of(text),
+            "f:7: swarm.members[1].duty: within 0.02 of the pattern of swarm.members[0]: no camera "
+            "can tell the two apart");
+}
+
 TEST(ConfigRules, KnowsARepeatedPatternForTheSameLight) {
   std::string text = replaced("011111111111111111", "0111101111");
   text.replace(text.find("duty: 0.3"), 9, "pattern: \"110111101111011\"");

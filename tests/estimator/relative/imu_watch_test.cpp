@@ -77,5 +77,45 @@ TEST(ImuWatch, RefusesAnAxisAtTheEndOfItsRangeWhileOthersMove) {
   EXPECT_FALSE(watch.is_saturated());
 }
 
+/// How many samples are refused of a second of a sensor at 1 kHz that measures anew every `period`.
+int refused_of(Duration period, double rate_radps) {
+  RandomGeometry random(5);
+  ImuWatch watch;
+  ImuSample measured;
+  int refused = 0;
+  for (Timestamp t{}; t < Timestamp{1s}; t += 1ms) {
+    if (t.time_since_epoch() % period == Duration{}) {
+      measured = resting(random, 0);
+      measured.gyro_radps.z() += rate_radps;
+    }
+    measured.stamp = t;
+    refused += watch.accept(measured) ? 0 : 1;
+  }
+  return refused;
+}
+
+TEST(ImuWatch, ASensorThatIsReadMoreOftenThanItMeasuresDoesNotHang) {
+  EXPECT_EQ(refused_of(20ms, 0.0), 0);
+  EXPECT_GT(refused_of(200ms, 0.0), 500);
+}
+
+TEST(ImuWatch, ASensorThatIsReadMoreOftenThanItMeasuresIsNotSaturatedByATurn) {
+  EXPECT_EQ(refused_of(10ms, 3.0), 0);
+}
+
+TEST(ImuWatch, KnowsTheEndOfTheRangeOfASensorThatIsReadMoreOftenThanItMeasures) {
+  RandomGeometry random(6);
+  ImuWatch watch;
+  ImuSample sample;
+  for (int i = 0; i < 100; ++i) {
+    if (i % 10 == 0) sample = resting(random, 0);
+    sample.stamp = Timestamp{i * 1ms};
+    sample.gyro_radps.y() = -4.36;
+    static_cast<void>(watch.accept(sample));
+  }
+
+  EXPECT_TRUE(watch.is_saturated());
+}
+
 }  // namespace
 }  // namespace crepes::imu_watch_test

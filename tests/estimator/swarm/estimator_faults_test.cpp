@@ -130,6 +130,17 @@ TEST(EstimatorFaults, ATiltOfTheFutureIsForgottenInTheNextPause) {
   }
 }
 
+TEST(EstimatorFaults, ASampleOfTheFutureKeepsNoDeadNeighborAlive) {
+  EstimatorPair pair(1);
+  pair.run_for(kWarmUp);
+  ASSERT_NE(pair.latest(), nullptr);
+  pair.run_for(EstimatorPair::kTick,
+               {.peer_report = [](Report& report) { report.imu.back().stamp += 900ms; }});
+  pair.run_for(750ms, {.peer_is_on = false});
+
+  EXPECT_EQ(pair.latest(), nullptr);
+}
+
 /// The same numbers again and again, with stamps that go on.
 auto frozen() {
   return [held = std::optional<ImuSample>()](const ImuSample& sample) mutable {

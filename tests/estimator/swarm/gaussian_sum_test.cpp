@@ -19,6 +19,8 @@ Pose turned(double yaw_rad) {
   return perturbed(kTruth, turn);
 }
 
+const ImuHistory kAtRest = imu_at_rest(500);
+
 GaussianSum sum_of(const std::vector<Pose>& poses) {
   std::vector<NeighborTrack> parts;
   for (const Pose& pose : poses) parts.push_back(track_at(at_ms(0), {pose, covariance()}));
@@ -44,7 +46,7 @@ TEST(GaussianSum, SplitsAWideAttitudeAndKeepsItsMeanAndCovariance) {
   const GaussianSum sum(whole);
 
   EXPECT_GT(sum.size(), 5U);
-  const GaussianPose mean = sum.mean(sum.heaviest().pose());
+  const GaussianPose mean = sum.mean(sum.heaviest(), kAtRest, kAtRest);
   EXPECT_LT(pose_difference(kTruth, mean.pose).norm(), 1e-6);
   EXPECT_NEAR(std::sqrt(mean.covariance(3, 3)), 0.2, 0.005);
   EXPECT_NEAR(mean.covariance(0, 0), wide(0, 0), 1e-9);
@@ -57,9 +59,26 @@ TEST(GaussianSum, IsNeverMoreCertainThanItsHeaviestPart) {
   std::vector<NeighborTrack> parts{track_at(at_ms(0)), track_at(at_ms(0)),
                                    track_at(at_ms(0), {kTruth, certain})};
   const GaussianSum sum(std::move(parts));
-  const GaussianPose mean = sum.mean({kTruth, certain});
+  const GaussianPose mean = sum.mean(track_at(at_ms(0), {kTruth, certain}), kAtRest, kAtRest);
   const Matrix6d more = mean.covariance - certain;
   EXPECT_GE(Eigen::SelfAdjointEigenSolver<Matrix6d>(more).eigenvalues().minCoeff(), -1e-12);
+}
+
+// The parts differ along the line of sight, which lies elsewhere in the body half a second later.
+TEST(GaussianSum, WhatItsPartsDifferByTurnsWithTheRobot) {
+  const ImuHistory imu_B = imu_that_turns(0, 500);
+  const Pose farther{kTruth.p + Eigen::Vector3d::UnitX(), kTruth.q};
+  const GaussianSum sum = sum_of({kTruth, farther});
+  NeighborTrack heaviest = sum.heaviest();
+  heaviest.advance_to(at_ms(500), imu_B, kAtRest);
+
+  const GaussianPose mean = sum.mean(heaviest, imu_B, kAtRest);
+
+  const Eigen::Vector3d line = after_turn(Eigen::Vector3d::UnitX(), 500);
+  EXPECT_LT((mean.pose.p - (kDistance + 0.5) * line).norm(), 1e-6);
+  const Eigen::Matrix3d more = (mean.covariance - heaviest.pose().covariance).topLeftCorner<3, 3>();
+  EXPECT_NEAR(line.dot(more * line), 0.25, 1e-6);
+  EXPECT_NEAR(more.trace(), 0.25, 1e-6);
 }
 
 TEST(GaussianSum, PeerBearingsSelectTheHeading) {

@@ -233,19 +233,6 @@ TEST_F(TeamAndFilter, AFilterThatContradictsAnUnwitnessedTeamPoseIsPublished) {
   EXPECT_LT(std::sqrt(pose->T_B_N.covariance(0, 0)), 0.5);
 }
 
-/// Turns by 2 rad/s about its vertical from `begin_ms` on.
-ImuHistory imu_that_turns(int begin_ms, int end_ms) {
-  ImuHistory imu = imu_at_rest(begin_ms);
-  for (int ms = begin_ms + 10; ms <= end_ms; ms += 10)
-    imu.push({at_ms(ms), {0.0, 0.0, 2.0}, {0.0, 0.0, kGravityMps2}});
-  return imu;
-}
-
-/// A vector in the body's axes, in those after a turn of `ms`.
-Eigen::Vector3d after_turn(const Eigen::Vector3d& v_B, int ms) {
-  return Eigen::AngleAxisd(-2.0 * 1e-3 * ms, Eigen::Vector3d::UnitZ()) * v_B;
-}
-
 // What a team's pose differed by is a vector in the world.
 TEST_F(TeamAndFilter, WhatMakesATeamsPoseDoubtfulTurnsWithTheRobot) {
   const Eigen::Vector3d difference(0.8, 0.0, 0.0);

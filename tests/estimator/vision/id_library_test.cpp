@@ -77,6 +77,24 @@ TEST(IdLibrary, RefusesTwoMembersWithOneSignal) {
   EXPECT_NE(refusal(duties).find("told apart"), std::string::npos);
 }
 
+TEST(IdLibrary, RefusesADutyAndAPatternWithOneSignal) {
+  const auto refuses = [](const std::string& pattern, double duty, double period_ms) {
+    SwarmConfig swarm = swarm_of({pattern, ""});
+    swarm.slot_ms = 5.0;
+    swarm.period_ms = period_ms;
+    swarm.members[1].pattern.reset();
+    swarm.members[1].duty = duty;
+    return refusal(swarm).find("told apart") != std::string::npos;
+  };
+
+  EXPECT_TRUE(refuses("11110000", 0.5, 40.0));
+  EXPECT_TRUE(refuses("10000111", 0.51, 40.0));
+  EXPECT_TRUE(refuses("0001100011", 0.4, 25.0));
+  EXPECT_FALSE(refuses("11110000", 0.5, 50.0));
+  EXPECT_FALSE(refuses("11110000", 0.6, 40.0));
+  EXPECT_FALSE(refuses("11010001", 0.5, 40.0));
+}
+
 TEST(IdLibrary, RefusesCodesThatAreNoneAndSaysWhose) {
   EXPECT_NE(refusal(swarm_of({"01111111", "0111"})).find("members[1]: pattern: must have 8 to 32"),
             std::string::npos);

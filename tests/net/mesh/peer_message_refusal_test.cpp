@@ -158,6 +158,7 @@ TEST(PeerMessage, RefusesWhatNoEncoderWrites) {
   EXPECT_EQ(with([](auto& s) { s.bearings.push_back({.sigma = 128}); }),
             PeerMessageError::kOutOfRange);
   EXPECT_EQ(with([](auto& s) { s.bearings[0].age = 200'000; }), PeerMessageError::kBadStamp);
+  EXPECT_EQ(with([](auto& s) { s.bearings[0].age = -20'000; }), PeerMessageError::kBadStamp);
   EXPECT_EQ(with([](auto& s) { s.ranges[0].range_mm = 0; }), PeerMessageError::kOutOfRange);
   EXPECT_EQ(with([](auto& s) { s.ranges[0].received = 256; }), PeerMessageError::kOutOfRange);
   EXPECT_EQ(with([](auto& s) { s.neighbor = 65535; }), PeerMessageError::kBadId);

@@ -121,6 +121,27 @@ TEST(RangeCalibration, RefusesAPairThatHardlyMeasured) {
   EXPECT_NE(found.refusals[0].find("5 ranges"), std::string::npos);
 }
 
+// The rest is as in the open: late paths that do no harm, but for the latest one.
+TEST(RangeCalibration, SuggestsNoLimitOfLatePathsByOneOutlier) {
+  Taped data = taped(1, 2);
+  simulated::Dice dice(1);
+  for (TapedRanges& part : data.ranges) {
+    for (UwbRange& range : part.ranges) {
+      range.range_m = part.distance_m + dice.normal(kNoise_m);
+      range.first_path_dbm = range.received_dbm - dice.uniform(0.0, 6.0);
+    }
+  }
+  UwbRange& late = data.ranges[0].ranges[100];
+  late.range_m += 2.0;
+  late.first_path_dbm = late.received_dbm - 7.5;
+
+  EXPECT_FALSE(calibrate_ranges(data.ranges, {}).late_path_db);
+}
+
+TEST(RangeCalibration, SuggestsALimitWhereLatePathsAreOutliers) {
+  EXPECT_TRUE(calibrate_ranges(taped(1, 4).ranges, {}).late_path_db);
+}
+
 TEST(RobustMean, IsNotMovedByATenthOfOutliers) {
   simulated::Dice dice(3);
   std::vector<double> values;

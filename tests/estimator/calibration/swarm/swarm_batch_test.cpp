@@ -149,13 +149,16 @@ TEST(SwarmBatch, SaysWhatTwoRobotsCannotTellApart) {
   EXPECT_LT(pair_delay_sigma(found, 0, 1), 0.5 * found.robots[0].sigma(swarm_constants::kDelay));
 }
 
+void drop_poses_before(double t_s, simulated::SwarmFlight& flight) {
+  for (std::vector<EstimatedPose>& poses : flight.start.poses)
+    std::erase_if(poses,
+                  [&](const auto& pose) { return pose.stamp < Timestamp{from_seconds(t_s)}; });
+}
+
 // A minute is used at most, and only from when everybody has been placed.
 TEST(SwarmBatch, CountsNoOutliersAtTimesThatItDoesNotUse) {
   auto flight = simulated::fly(3, {.robots = 2, .duration_s = 27.0}, kSwarmNoise);
-  const auto is_early = [](const EstimatedPose& pose) {
-    return pose.stamp < Timestamp{from_seconds(12.0)};
-  };
-  for (std::vector<EstimatedPose>& poses : flight.start.poses) std::erase_if(poses, is_early);
+  drop_poses_before(12.0, flight);
   const SwarmBatchResult found = calibrated(flight);
 
   ASSERT_TRUE(found.refusals.empty()) << found.refusals.front();
@@ -165,7 +168,7 @@ TEST(SwarmBatch, CountsNoOutliersAtTimesThatItDoesNotUse) {
 }
 
 TEST(SwarmBatch, RefusesARobotThatNobodySees) {
-  auto flight = simulated::fly(4, {.duration_s = 5.0}, kSwarmNoise);
+  auto flight = simulated::fly(4, {.duration_s = 12.0}, kSwarmNoise);
   for (RobotRecord& record : flight.records)
     std::erase_if(record.sightings, [](const BoardSighting& s) { return s.board == 2; });
 
@@ -183,6 +186,25 @@ TEST(SwarmBatch, RefusesAGapInInertialSamples) {
   imu.erase(imu.begin() + 500, imu.begin() + 520);
 
   EXPECT_TRUE(says(calibrated(flight).refusals, "r2 has a gap"));
+}
+
+TEST(SwarmBatch, AGapInInertialSamplesAtATimeThatItDoesNotUseDoesNoHarm) {
+  auto flight = simulated::fly(4, {.robots = 2, .duration_s = 17.0}, kSwarmNoise);
+  auto& imu = flight.records[1].imu;
+  imu.erase(imu.begin() + 300, imu.begin() + 320);
+  drop_poses_before(6.0, flight);
+
+  EXPECT_FALSE(says(calibrated(flight).refusals, "has a gap"));
+}
+
+TEST(SwarmBatch, CountsNoSightingsAtTimesThatItDoesNotUse) {
+  auto flight = simulated::fly(4, {.robots = 2, .duration_s = 27.0}, kSwarmNoise);
+  drop_poses_before(12.0, flight);
+  std::erase_if(flight.records[0].sightings, [](const BoardSighting& sighting) {
+    return sighting.stamp > Timestamp{from_seconds(12.0)};
+  });
+
+  EXPECT_TRUE(says(calibrated(flight).refusals, "r1 sees others 0 times"));
 }
 
 TEST(SwarmBatch, RefusesOneRobotAlone) {
