@@ -32,6 +32,7 @@ class CameraTracks {
     return cameras_[camera].is_calibrated;
   }
 
+  /// A sample of the robot's own, in order: between frames the tracks turn with it.
   void add_imu(const ImuSample& sample);
   /// `expected`: the boards of robots with a pose. `imu`: the robot's own.
   [[nodiscard]] SeenBoards step(const SpotFrame& frame, std::span<const ExpectedBoard> expected,
