@@ -168,7 +168,7 @@ void ConfigReader::finish() {
   for (std::size_t i = 0; i < node_.keys.size() && !ignores_unknown_keys_; ++i) {
     const std::string& key = node_.keys[i];
     if (std::ranges::count(known_, key) > 0) continue;
-    const auto retired = std::ranges::find(kRetiredKeys, path_of(key), &RetiredKey::path);
+    const auto* const retired = std::ranges::find(kRetiredKeys, path_of(key), &RetiredKey::path);
     if (retired != kRetiredKeys.end()) {
       const Place& place = node_.items[i].place;
       log_.warnings.push_back({place.file, place.line, path_of(key), std::string(retired->reason)});

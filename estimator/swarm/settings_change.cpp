@@ -41,7 +41,9 @@ bool is_mounted_otherwise(const SwarmConfig& before, const SwarmConfig& now) {
 std::set<RobotId> changed_neighbors(const EstimatorSettings& before, const EstimatorSettings& now) {
   const std::vector<MemberConfig> were = unnamed(before.swarm.members);
   const std::vector<MemberConfig> are = unnamed(now.swarm.members);
-  const auto is_changed = [&](const MemberConfig& was) { return !std::ranges::count(are, was); };
+  const auto is_changed = [&](const MemberConfig& was) {
+    return std::ranges::count(are, was) == 0;
+  };
   const auto own = std::ranges::find(were, before.self, &MemberConfig::id);
   const bool is_own_changed = own == were.end() || is_changed(*own);
   std::set<RobotId> changed;

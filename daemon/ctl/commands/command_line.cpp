@@ -51,7 +51,7 @@ CLI::Validator robot_name_or_id() {
     const bool is_wrong = parse_number(text, id).empty() && !(id >= 1.0 && id <= kLastId);
     return is_wrong ? text + " is no id of a robot, 1 to 65534" : "";
   };
-  return CLI::Validator(refuse, "");
+  return {refuse, ""};
 }
 
 void add_daemon_options(CLI::App* sub, DaemonAddress& daemon) {
