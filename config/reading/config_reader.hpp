@@ -21,7 +21,7 @@ struct ReadLog {
 
   const ConfigNode& root;
   std::vector<ConfigFault> faults;
-  std::vector<ConfigFault> warnings;
+  std::vector<ConfigFault> warnings;          ///< keys without effect
   std::set<std::string, std::less<>> unread;  ///< paths that have no value from the tree
 
   /// `path` names the faulty value, `place` its position.
