@@ -61,8 +61,14 @@ void IdDecoder::observe_lit(BlinkEvidence& evidence, Timestamp stamp,
     forget_old(evidence, stamp + 2 * window_);  // what it showed was read otherwise
   evidence.last_lit = stamp;
   const std::size_t unsure = evidence.is_obstructed ? 1 : 0;
-  for (std::size_t i = unsure; i + unsure < evidence.pending_dark.size(); ++i)
-    add(evidence, {evidence.pending_dark[i], false});
+  for (std::size_t i = 0; i < evidence.pending_dark.size(); ++i) {
+    const BlinkObservation dark{evidence.pending_dark[i], false};
+    if (i >= unsure && i + unsure < evidence.pending_dark.size()) {
+      add(evidence, dark);
+    } else if (!evidence.shaded.is_full()) {
+      evidence.shaded.push(dark);  // for comparisons with other boards
+    }
+  }
   evidence.pending_dark.clear();
   add(evidence, {stamp, true});
   if (evidence.score.empty()) return;
@@ -123,6 +129,8 @@ void IdDecoder::forget_old(BlinkEvidence& evidence, Timestamp now) const {
     if (!evidence.score.empty()) sources_.score(evidence, window[0], -1);
     window.pop();
   }
+  auto& shaded = evidence.shaded;
+  while (shaded.size() > 0 && shaded[0].stamp < now - window_) shaded.pop();
 }
 
 void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory& known) const {
@@ -140,24 +148,32 @@ void IdDecoder::decide(BlinkEvidence& evidence, Timestamp now, const PhaseMemory
   evidence.is_foreign =
       is_hardly_ours && is_explained_better(evidence.window, code, phase, kForeign);
   if (is_hardly_ours) return;
+  if (shaded_log_odds(evidence, sources_, {best, phase}, kNever) > kHardlyOurs) {
+    evidence.forget();  // no blade is in front of it: it is read as one in the clear
+    evidence.last_lit = now;
+    return;
+  }
   evidence.assigned = {best, phase};
   if (evidence.expected != best) evidence.assigned_since = now;
   clear_doubt(evidence, now);
 }
 
 /// Takes the ID back from what only seems to be the assigned board: another one of the swarm that
-/// looks like it, hidden at times, or one of another swarm.
+/// looks like it, hidden at times, or one of another swarm. The latter only where no frames were
+/// left out, since what is left of a board's code may fit another pattern better.
 void IdDecoder::review(BlinkEvidence& evidence, Timestamp now) const {
   const auto [assigned, phase] = *evidence.assigned;
   const CodeModel& code = sources_.codes()[assigned];
   if (now < evidence.compared_at + code.period / kComparisonsPerPeriod) return;
   evidence.compared_at = now;
-  const Timestamp since = std::max(evidence.undoubted_at, now - kPeriodsCompared * code.period);
-  if (has_changed_or_is_obstructed(evidence) &&
-      is_lost_to(rival_log_odds(evidence, sources_, since))) {
+  const Timestamp since = now - kPeriodsCompared * code.period;
+  const Timestamp doubted_since = std::max(evidence.undoubted_at, since);
+  if ((has_changed_or_is_obstructed(evidence) &&
+       is_lost_to(rival_log_odds(evidence, sources_, doubted_since))) ||
+      is_lost_to(shaded_log_odds(evidence, sources_, *evidence.assigned, since))) {
     evidence.forget();
     evidence.last_lit = now;
-  } else if (!evidence.is_obstructed &&
+  } else if (evidence.shaded.size() == 0 &&
              is_explained_better(evidence.window, code, phase, kForeign)) {
     read_again(evidence);
   }
@@ -183,6 +199,7 @@ void IdDecoder::resume(BlinkEvidence& evidence, Timestamp now, double stranger) 
   if (!is_worth_keeping(evidence) || !evidence.last_lit) return evidence.forget();
   make_prior(evidence, sources_, now - *evidence.last_lit, stranger);
   evidence.window.clear();
+  evidence.shaded.clear();
   evidence.pending_dark.clear();
   evidence.last_lit.reset();
   evidence.assigned.reset();

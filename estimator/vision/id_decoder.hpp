@@ -35,7 +35,8 @@ class IdDecoder {
   /// Nothing was seen where the track is predicted. The frame counts as dark only if the track is
   /// lit again within longest_dark(). Rows of dark frames longer than any code's are ignored,
   /// because the light was hidden. If the track goes dark more often than any code, a blade passes
-  /// in front of it, and the first and last frame of each row are ignored as well.
+  /// in front of it, and the first and last frame of each row are ignored as well, unless all of
+  /// these together show that it is another board.
   void observe_dark(BlinkEvidence& evidence, Timestamp stamp) const;
   /// The light of `evidence` was hidden, and one is seen at `now` where it is expected. What it
   /// showed becomes the prior: it is the same light in its phase, or, with probability `stranger`,

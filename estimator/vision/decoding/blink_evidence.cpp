@@ -4,6 +4,7 @@ namespace crepes {
 
 void BlinkEvidence::forget() {
   window.clear();
+  shaded.clear();
   pending_dark.clear();
   score.clear();
   last_lit.reset();

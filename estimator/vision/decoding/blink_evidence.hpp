@@ -21,6 +21,7 @@ struct CodeMatch {
 /// IdDecoder and its parts change it.
 struct BlinkEvidence {
   BlinkWindow window;
+  BlinkWindow shaded;  ///< dark frames of the same time that a blade may have caused
   std::vector<Timestamp> pending_dark;  ///< dark frames since the last lit one; they count as
                                         ///< blinking once the track is lit again
   std::vector<std::int16_t> score;      ///< log likelihood of every code in every phase

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kLeastShown = 0.1;
 constexpr double kMostShown = 0.98;
+constexpr double kSure = 0.4;  // so far from one half a state is not in doubt
 
 /// The log likelihood of the assigned code with the share of lit frames shown that explains the
 /// observations best.
@@ -29,6 +30,24 @@ double log_partly_hidden(const BlinkEvidence& recent, const CodeModel& code, std
     log_likelihood += std::log(recent.window[i].lit ? p : 1.0 - p);
   }
   return log_likelihood;
+}
+
+/// The log odds of `rival` against `ours` if something hides the light in frames of either alike.
+/// Half an exposure at an edge looks lit or dark in each period, so such frames say nothing.
+double log_odds_of(const CodeModel& rival, std::size_t rival_phase, const CodeModel& ours,
+                   std::size_t our_phase, const BlinkWindow& window) {
+  int frames[2][2][2] = {};  // [the rival is lit][ours is lit][it was seen]
+  for (std::size_t i = 0; i < window.size(); ++i) {
+    const double p = rival.lit_probability(rival_phase, window[i].stamp);
+    const double q = ours.lit_probability(our_phase, window[i].stamp);
+    if (std::min(std::abs(p - 0.5), std::abs(q - 0.5)) < kSure) continue;
+    ++frames[p > 0.5 ? 1 : 0][q > 0.5 ? 1 : 0][window[i].lit ? 1 : 0];
+  }
+  const auto& [hidden, seen] = frames[1][1];
+  const double shown = std::clamp((seen + 0.5) / (seen + hidden + 1.0), kLeastShown, kMostShown);
+  const double lit = std::log(shown / ours.flip_rate);
+  const double dark = std::log((1.0 - shown) / (1.0 - ours.flip_rate));
+  return lit * (frames[1][0][1] - frames[0][1][1]) + dark * (frames[1][0][0] - frames[0][1][0]);
 }
 
 }  // namespace
@@ -50,6 +69,29 @@ double rival_log_odds(const BlinkEvidence& evidence, const SourceModels& sources
     best = std::max(best, log_mean(scores, highest_score(scores)) + sources.boards()[c].log_share);
   }
   return best - log_partly_hidden(recent, sources.boards()[assigned], phase);
+}
+
+double shaded_log_odds(const BlinkEvidence& evidence, const SourceModels& sources, CodeMatch match,
+                       Timestamp since) {
+  double best = std::numeric_limits<double>::lowest();
+  if (evidence.shaded.size() == 0) return best;
+  BlinkEvidence recent;
+  sources.fill_scores(recent, 0);
+  for (const BlinkWindow* const window : {&evidence.shaded, &evidence.window}) {
+    for (std::size_t i = 0; i < window->size() && !recent.window.is_full(); ++i) {
+      if ((*window)[i].stamp <= since) continue;
+      recent.window.push((*window)[i]);
+      sources.score(recent, (*window)[i], 1);
+    }
+  }
+  const CodeModel& ours = sources.boards()[match.code];
+  for (std::size_t c = 0; c < sources.boards().size(); ++c) {
+    if (c == match.code) continue;
+    const CodeModel& rival = sources.boards()[c];
+    const std::size_t phase = best_phase(SourceModels::scores_of(recent, rival));
+    best = std::max(best, log_odds_of(rival, phase, ours, match.phase, recent.window));
+  }
+  return best;
 }
 
 }  // namespace crepes

@@ -393,5 +393,30 @@ TEST(IdDecoder, ReadsABoardAgainOnceABladeStopsInFrontOfIt) {
   EXPECT_GT(after.identified_frames, 0.95 * after.lit_frames);
 }
 
+// Every second frame meets an edge and is lit if either slot is, or only if both are. With the
+// frames that are missed the board goes dark more often than any.
+TEST(IdDecoder, TakesNoBoardForAnotherOneBehindAPropellerWhereFramesMeetTheEdgesOfSlots) {
+  const IdLibrary library = *IdLibrary::from(four());
+  const IdDecoder decoder(library, VisionConfig{}, 200.0);
+  for (const bool is_either : {false, true}) {
+    int named = 0;
+    int lit = 0;
+    for (unsigned seed = 0; seed < 24; ++seed) {
+      const auto& [id, code] = library.entries()[seed % 4];
+      std::mt19937 random(seed);
+      const Light seen = [&](Duration t) {
+        const bool before = code.is_lit(t + 79'900us);
+        const bool after = code.is_lit(t + 80ms);
+        return (is_either ? before || after : before && after) && random() % 100U >= 8U;
+      };
+      const Outcome outcome = watch(decoder, seen, 20s, {});
+      EXPECT_EQ(outcome.ids, std::set<int>{id.value}) << is_either << ", seed " << seed;
+      named += outcome.identified_frames;
+      lit += outcome.lit_frames;
+    }
+    EXPECT_GT(named, 0.9 * lit) << is_either;
+  }
+}
+
 }  // namespace
 }  // namespace crepes::id_decoder_test
