@@ -51,7 +51,8 @@ std::size_t ImuHistory::first_after(Timestamp t) const {
   return low;
 }
 
-bool ImuHistory::push(const ImuSample& sample, const Eigen::Vector3d& blow_mps) {
+bool ImuHistory::push(const ImuSample& sample, const Eigen::Vector3d& blow_mps,
+                      const Eigen::Vector3d& turn_rad) {
   if (!is_plausible(sample)) return false;
   std::size_t place = first_after(sample.stamp);
   if (place > 0 && (*this)[place - 1].stamp == sample.stamp) return false;
@@ -63,7 +64,7 @@ bool ImuHistory::push(const ImuSample& sample, const Eigen::Vector3d& blow_mps) 
   }
   ++size_;
   for (std::size_t i = size_ - 1; i > place; --i) slot(i) = slot(i - 1);
-  slot(place) = {sample, blow_mps};
+  slot(place) = {sample, blow_mps, turn_rad};
   if (place + 1 == size_) observe_motion();
   return true;
 }
@@ -132,10 +133,12 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
     add(sample, dt, sum);
     // In a gap the next sample is held, so that the error shrinks towards it.
     if (!covered) extrapolate(to_seconds(sample.stamp - end), dt);
-    const bool is_unsteady = !kept(i).blow_mps.isZero() || kept(i).bias_variance_m2ps4 > 0.0;
+    const bool is_unsteady = !kept(i).blow_mps.isZero() || !kept(i).turn_rad.isZero() ||
+                             kept(i).bias_variance_m2ps4 > 0.0;
     if (i > 0 && is_unsteady) {
       const double share = dt / to_seconds(sample.stamp - (*this)[i - 1].stamp);
       sum.blow_variance_m2ps2 += share * kept(i).blow_mps.cwiseAbs2();
+      sum.turn_variance_rad2 += share * kept(i).turn_rad.cwiseAbs2();
       sum.bias_variance_m2ps4 += share * kept(i).bias_variance_m2ps4;
     }
     t = end;
@@ -156,6 +159,7 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
           .gyro_innovation_density = sum.gyro_innovation_density,
           .accel_innovation_density = sum.accel_innovation_density,
           .blow_variance_m2ps2 = sum.blow_variance_m2ps2,
+          .turn_variance_rad2 = sum.turn_variance_rad2,
           .bias_variance_m2ps4 = sum.bias_variance_m2ps4};
 }
 

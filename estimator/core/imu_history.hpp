@@ -30,6 +30,9 @@ struct ImuMean {
   /// Variance of the velocity after the interval by forces that were refused, but may be real; body
   /// axes. Those of parts add up to that of the whole.
   Eigen::Vector3d blow_variance_m2ps2 = Eigen::Vector3d::Zero();
+  /// Variance of the attitude after the interval by rates that are kept, but may be damaged; body
+  /// axes. Those of parts add up to that of the whole.
+  Eigen::Vector3d turn_variance_rad2 = Eigen::Vector3d::Zero();
   /// Variance by which each axis of the accelerometer's bias may have changed, because the airframe
   /// began to vibrate or ceased to. Those of parts add up to that of the whole.
   double bias_variance_m2ps4 = 0.0;
@@ -50,8 +53,10 @@ class ImuHistory {
   static constexpr Duration kMaxHold = std::chrono::milliseconds{500};
 
   /// False, and nothing changes, if the sample is implausible, a duplicate, or older than all kept.
-  /// `blow_mps` is the velocity, in body axes, by forces that were refused since the sample before.
-  bool push(const ImuSample& sample, const Eigen::Vector3d& blow_mps = Eigen::Vector3d::Zero());
+  /// `blow_mps` is the velocity, in body axes, by forces that were refused since the sample before,
+  /// `turn_rad` the turn since then that is none if the rate is damaged.
+  bool push(const ImuSample& sample, const Eigen::Vector3d& blow_mps = Eigen::Vector3d::Zero(),
+            const Eigen::Vector3d& turn_rad = Eigen::Vector3d::Zero());
 
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -74,6 +79,7 @@ class ImuHistory {
   struct Kept {
     ImuSample sample;
     Eigen::Vector3d blow_mps = Eigen::Vector3d::Zero();
+    Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();
     double bias_variance_m2ps4 = 0.0;
   };
 

@@ -22,7 +22,8 @@ constexpr PerSensor kLargestChange{.gyro = 2.0, .accel = 5.0};
 // Samples after which a change is a vibration that begins, or else, longer than a blow, a jump.
 constexpr std::size_t kVibrates = 6;
 constexpr std::size_t kJumps = 10;
-constexpr double kMostSteps = 10.0;  // over which an innovation grows as a random walk
+constexpr std::size_t kTooMany = kJumps + 1;  // refused, for their rates to be kept
+constexpr double kMostSteps = 10.0;           // over which an innovation grows as a random walk
 constexpr Duration kTypicalPeriod = std::chrono::milliseconds{10};
 // Across a longer gap there is no prediction.
 constexpr Duration kLongestGap = std::chrono::milliseconds{100};
@@ -200,6 +201,29 @@ Eigen::Vector3d ImuGuard::blow_mps(const ImuSample& believed) const {
   return believed.stamp == blow_ ? blow_mps_ : Eigen::Vector3d::Zero();
 }
 
+std::span<const ImuGuard::KeptRate> ImuGuard::rates_before(const ImuSample& believed) const {
+  return {rates_.data(), believed.stamp == rates_until_ ? rate_count_ : 0};
+}
+
+void ImuGuard::keep_rates(const ImuSample& after) {
+  rate_count_ = 0;
+  rates_until_ = after.stamp;
+  const std::size_t count = std::exchange(doubtful_count_, 0);
+  if (count == kTooMany) return;
+  const ImuSample& before = reference_->last;
+  const double duration_s = to_seconds(after.stamp - before.stamp);
+  ImuSample last = before;
+  for (const ImuSample& sample : std::span(doubtful_).first(count)) {
+    if (distance(sample, last).gyro > largest_change().gyro) continue;
+    const double share = to_seconds(sample.stamp - before.stamp) / duration_s;
+    const Eigen::Vector3d expected =
+        before.gyro_radps + share * (after.gyro_radps - before.gyro_radps);
+    const double dt = to_seconds(sample.stamp - std::exchange(last, sample).stamp);
+    rates_.at(rate_count_++) = {.sample = {sample.stamp, sample.gyro_radps, before.accel_mps2},
+                                .turn_rad = dt * (sample.gyro_radps - expected)};
+  }
+}
+
 void ImuGuard::believe(const ImuSample& sample) {
   if (!refused_mps_.isZero()) {
     blow_ = sample.stamp;
@@ -207,6 +231,7 @@ void ImuGuard::believe(const ImuSample& sample) {
     refused_mps_.setZero();
   }
   if (reference_) {
+    if (doubtful_count_ > 0) keep_rates(sample);
     turn_force(sample, reference_->last.stamp);
     correct_force(sample);
     reference_ = Reference{sample, reference_->last};
@@ -241,14 +266,13 @@ void ImuGuard::follow_force(const ImuSample& sample, const ImuSample& last) {
 
 void ImuGuard::believe_held(std::size_t from) {
   count(ImuFault::kSpike, from);
-  for (std::size_t i = 0; i < from; ++i) refuse_spike(held_.at(i), before_held(i));
+  for (std::size_t i = 0; i < from; ++i) refuse_spike(held_.at(i));
   for (std::size_t i = from; i < held_count_; ++i) believe(held_.at(i));
   clear_held();
 }
 
-void ImuGuard::refuse_spike(const ImuSample& spike, const ImuSample& before) {
-  refused_mps_ +=
-      to_seconds(spike.stamp - before.stamp) * (spike.accel_mps2 - reference_->last.accel_mps2);
+void ImuGuard::refuse_spike(const ImuSample& spike) {
+  doubt(spike);
   if (spike_count_ == kMostSpikes) {
     std::shift_left(spikes_.begin(), spikes_.end(), 1);
     --spike_count_;
@@ -256,8 +280,28 @@ void ImuGuard::refuse_spike(const ImuSample& spike, const ImuSample& before) {
   spikes_.at(spike_count_++) = spike;
 }
 
+/// Samples that are refused for longer than a blow lasts are no blow.
+void ImuGuard::doubt(const ImuSample& sample) {
+  if (doubtful_count_ >= kJumps) {
+    refused_mps_.setZero();
+    doubtful_count_ = kTooMany;
+    return;
+  }
+  const ImuSample& before =
+      doubtful_count_ > 0 ? doubtful_.at(doubtful_count_ - 1) : reference_->last;
+  refused_mps_ +=
+      to_seconds(sample.stamp - before.stamp) * (sample.accel_mps2 - reference_->last.accel_mps2);
+  doubtful_.at(doubtful_count_++) = sample;
+}
+
+void ImuGuard::forget_doubtful() {
+  doubtful_count_ = 0;
+  refused_mps_.setZero();
+}
+
 void ImuGuard::drop_held(ImuFault fault) {
   count(has_jumped_ ? ImuFault::kJump : fault, held_count_);
+  forget_doubtful();
   clear_held();
 }
 
@@ -269,6 +313,7 @@ void ImuGuard::clear_held() {
 void ImuGuard::hold(const ImuSample& sample) {
   follow_force(sample, before_held(held_count_));
   if (held_count_ == kMostHeld) {
+    doubt(held_.front());
     std::shift_left(held_.begin(), held_.end(), 1);
     --held_count_;
     count(ImuFault::kJump);
@@ -369,6 +414,8 @@ bool ImuGuard::held_are_plausible() const {
 void ImuGuard::restart_from_held() {
   for (std::size_t i = 2; i < held_count_; ++i)
     add_innovation(innovation(held_.at(i), reference_of_held(i - 1)));
+  if (gyro_has_jumped_) forget_doubtful();
+  if (doubtful_count_ > 0) keep_rates(held_.front());
   reference_.reset();
   force_.setZero();
   believe_held(0);

@@ -46,6 +46,8 @@ struct PerSensor {
 /// spike. If they agree with the sample, the motion has changed, and all are believed, one sample
 /// late. A false alarm costs no more than that. A spike of the accelerometer looks like a blow, as
 /// when a robot lands or hits a wall. It is refused, but `blow_mps` tells what it would have been.
+/// A blow turns the robot, too. So the rate of a refused sample is kept if a robot reaches it:
+/// damaged by as little, it turns the estimate by 0.02 rad, and `KeptRate` tells by how much.
 ///
 /// A change that no robot makes within a sample (unit, swapped axes) is not believed when it stays.
 /// Samples are believed again when they return, or when a fifth of a second of them is plausible.
@@ -59,6 +61,12 @@ class ImuGuard {
     std::optional<ImuSample> before;
   };
 
+  /// The rate of a refused sample, with the force of the believed one before it.
+  struct KeptRate {
+    ImuSample sample;
+    Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();  ///< by it, if it is damaged; body axes
+  };
+
   /// The samples that are believed from now on, in order of their stamps; valid until the next
   /// call. A sample older than the newest is passed on, see `agrees`.
   [[nodiscard]] std::span<const ImuSample> accept(const ImuSample& sample);
@@ -68,6 +76,9 @@ class ImuGuard {
 
   /// The velocity that refused forces would have caused before this believed sample, body axes.
   [[nodiscard]] Eigen::Vector3d blow_mps(const ImuSample& believed) const;
+  /// The rates that are kept between this believed sample and the one before, in order of their
+  /// stamps; valid until the next call of `accept`.
+  [[nodiscard]] std::span<const KeptRate> rates_before(const ImuSample& believed) const;
   /// The latest samples that were refused as spikes, in order of their stamps.
   [[nodiscard]] std::span<const ImuSample> spikes() const { return {spikes_.data(), spike_count_}; }
 
@@ -99,7 +110,10 @@ class ImuGuard {
   void judge(const ImuSample& sample);
   void add_innovation(const PerSensor& innovation);
   void believe(const ImuSample& sample);
-  void refuse_spike(const ImuSample& spike, const ImuSample& before);
+  void refuse_spike(const ImuSample& spike);
+  void doubt(const ImuSample& sample);
+  void forget_doubtful();
+  void keep_rates(const ImuSample& after);
   void believe_held(std::size_t from);
   void drop_held(ImuFault fault);
   void clear_held();
@@ -124,9 +138,14 @@ class ImuGuard {
   Timestamp since_ = kNever;  ///< the first of the samples whose forces agree
   Eigen::Vector3d refused_mps_ = Eigen::Vector3d::Zero();  ///< since the last believed sample
   Eigen::Vector3d blow_mps_ = Eigen::Vector3d::Zero();
-  Timestamp blow_ = kNever;   ///< the believed sample after it
-  bool has_refused_ = false;  ///< since the last sample that was believed
-  bool has_jumped_ = false;   ///< the held samples must be plausible to be believed
+  Timestamp blow_ = kNever;                      ///< the believed sample after it
+  std::array<ImuSample, kMostHeld> doubtful_{};  ///< refused since the last believed sample
+  std::size_t doubtful_count_ = 0;
+  std::array<KeptRate, kMostHeld> rates_{};
+  std::size_t rate_count_ = 0;
+  Timestamp rates_until_ = kNever;  ///< the believed sample after them
+  bool has_refused_ = false;        ///< since the last sample that was believed
+  bool has_jumped_ = false;         ///< the held samples must be plausible to be believed
   bool gyro_has_jumped_ = false;
   bool accel_has_jumped_ = false;
 

@@ -162,6 +162,7 @@ Eigen::Matrix<double, 12, 1> rate_variance(const ImuMean& body, const ImuMean& n
     variance.segment<3>(row + 3).setConstant(density2(
         noise.accel_density, imu->accel_noise_density, ProcessNoise::kAccelExtrapolationDensity,
         imu->accel_innovation_density, imu->extrapolation_time2_s2));
+    variance.segment<3>(row) += imu->turn_variance_rad2 / dt;
     variance.segment<3>(row + 3) += imu->blow_variance_m2ps2 / dt;
     row += 6;
   }

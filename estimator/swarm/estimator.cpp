@@ -193,6 +193,10 @@ void Estimator::State::reconfigure(const EstimatorSettings& now) {
 
 Outputs Estimator::State::handle(const ImuSample& sample) {
   for (const ImuSample& believed : self.guard.accept(sample)) {
+    for (const ImuGuard::KeptRate& rate : self.guard.rates_before(believed)) {
+      tilt_filter.add(rate.sample);
+      cameras.add_imu(rate.sample);
+    }
     if (!tilt_filter.add(believed) || !self.add_believed(believed)) {
       ++refused_samples;
       continue;

@@ -51,8 +51,11 @@ void Neighbor::add_report(const ReceivedReport& received, const RobotState& self
   const Report& report = received.report;
   intake_.add_report_stamp(report.stamp);
   for (const ImuSample& sample : report.imu) {
-    for (const ImuSample& believed : body_.guard.accept(sample))
-      if (body_.add_believed(believed)) publisher_.invalidate_from(believed.stamp);
+    for (const ImuSample& believed : body_.guard.accept(sample)) {
+      if (!body_.add_believed(believed)) continue;
+      const auto rates = body_.guard.rates_before(believed);
+      publisher_.invalidate_from(rates.empty() ? believed.stamp : rates.front().sample.stamp);
+    }
   }
   if (!body_.tilt || report.tilt.stamp > body_.tilt->stamp) body_.tilt = report.tilt;
   for (const UwbRange& range : report.ranges) {

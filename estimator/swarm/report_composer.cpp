@@ -7,8 +7,8 @@ namespace {
 
 constexpr Duration kRepeated = std::chrono::milliseconds{520};
 
-/// In order of their stamps. Spikes are among them: peers refuse them too, and so know of a blow
-/// that may be real.
+/// In order of their stamps. Spikes are among them, as they were measured: peers refuse them too,
+/// and so know of a blow that may be real.
 std::vector<ImuSample> samples_since(Timestamp since, const RobotState& self) {
   std::vector<ImuSample> samples;
   std::size_t first = self.imu.size();
@@ -17,7 +17,12 @@ std::vector<ImuSample> samples_since(Timestamp since, const RobotState& self) {
   for (std::size_t i = first; i < self.imu.size(); ++i) samples.push_back(self.imu[i]);
   for (const ImuSample& spike : self.guard.spikes()) {
     if (spike.stamp < since) continue;
-    samples.insert(std::ranges::upper_bound(samples, spike.stamp, {}, &ImuSample::stamp), spike);
+    const auto place = std::ranges::lower_bound(samples, spike.stamp, {}, &ImuSample::stamp);
+    if (place != samples.end() && place->stamp == spike.stamp) {
+      *place = spike;  // of which the rate is kept
+    } else {
+      samples.insert(place, spike);
+    }
   }
   return samples;
 }

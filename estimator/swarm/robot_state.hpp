@@ -1,7 +1,9 @@
 /// The IMU and tilt of one robot.
 #pragma once
 
+#include <cmath>
 #include <optional>
+#include <utility>
 
 #include "estimator/core/imu_history.hpp"
 #include "estimator/core/measurements.hpp"
@@ -19,14 +21,26 @@ struct RobotState {
   ImuGuard guard{};
   Timestamp refused_until = Timestamp::min();  ///< the team found its gyroscope false
 
-  /// Adds a sample that the guard believes. False for a duplicate, and for a late sample that
-  /// contradicts those about it.
+  /// Adds a sample that the guard believes, and the rates that it keeps before it. False for a
+  /// duplicate, and for a late sample that contradicts those about it.
   bool add_believed(const ImuSample& sample) {
     constexpr Duration kAbout = std::chrono::milliseconds{5};
     const bool is_late = !imu.empty() && sample.stamp < imu.newest().stamp;
     if (is_late && !guard.agrees(sample, imu.mean(sample.stamp - kAbout, sample.stamp)))
       return false;
-    return imu.push(sample, guard.blow_mps(sample));
+    const Eigen::Vector3d blow_mps = guard.blow_mps(sample);
+    const auto rates = guard.rates_before(sample);
+    if (rates.empty() || imu.empty()) return imu.push(sample, blow_mps);
+    // The blow came somewhere among them.
+    const Timestamp before = imu.newest().stamp;
+    Timestamp last = before;
+    const auto part = [&](Timestamp stamp) {
+      const Duration passed = stamp - std::exchange(last, stamp);
+      return std::sqrt(to_seconds(passed) / to_seconds(sample.stamp - before)) * blow_mps;
+    };
+    for (const ImuGuard::KeptRate& rate : rates)
+      imu.push(rate.sample, part(rate.sample.stamp), rate.turn_rad);
+    return imu.push(sample, part(sample.stamp));
   }
 
   /// True if the IMU does not show the motion at `t`: it is silent, a sensor is saturated, or the

@@ -156,12 +156,17 @@ TEST(ImuHistory, PartsOfABlowAddUpToIt) {
   for (int i = 1; i <= 20; ++i) {
     if (i == 10) continue;  // refused
     imu.push(sample_at(i * 10ms),
-             i == 11 ? Eigen::Vector3d{0.3, -0.4, 0.0} : Eigen::Vector3d::Zero());
+             i == 11 ? Eigen::Vector3d{0.3, -0.4, 0.0} : Eigen::Vector3d::Zero(),
+             i == 11 ? Eigen::Vector3d{0.0, 0.01, 0.02} : Eigen::Vector3d::Zero());
   }
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (Timestamp t{2ms}; t < Timestamp{190ms}; t += 7ms)
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  for (Timestamp t{2ms}; t < Timestamp{190ms}; t += 7ms) {
     sum += imu.mean(t, t + 7ms).blow_variance_m2ps2;
+    turn += imu.mean(t, t + 7ms).turn_variance_rad2;
+  }
   EXPECT_LT((sum - Eigen::Vector3d{0.09, 0.16, 0.0}).norm(), 1e-12);
+  EXPECT_LT((turn - Eigen::Vector3d{0.0, 1e-4, 4e-4}).norm(), 1e-15);
   EXPECT_TRUE(imu.mean(Timestamp{20ms}, Timestamp{90ms}).blow_variance_m2ps2.isZero());
   EXPECT_TRUE(imu.mean(Timestamp{110ms}, Timestamp{150ms}).blow_variance_m2ps2.isZero());
 

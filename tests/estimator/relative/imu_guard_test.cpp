@@ -181,6 +181,58 @@ TEST(ImuGuard, TellsWhatARefusedForceWouldHaveDone) {
   }
 }
 
+// A wheel hits a stone: the robot shakes within a sample or two, and its rate with it.
+TEST(ImuGuard, KeepsTheRatesOfABlow) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    auto samples = samples_of(kMotions[1], seed, 3 * kSecond);
+    for (std::size_t i = 150; i < samples.size(); ++i) {
+      const double t = 0.01 * static_cast<double>(i - 149);
+      const double swing = std::exp(-10.0 * t) * std::sin(2.0 * std::numbers::pi * 10.0 * t);
+      samples[i].gyro_radps += swing * Eigen::Vector3d{1.5, -1.0, 0.0};
+      samples[i].accel_mps2.z() += 25.0 * swing;
+    }
+    ImuGuard guard;
+    std::vector<ImuSample> history;
+    std::size_t kept = 0;
+    for (const ImuSample& sample : samples) {
+      for (const ImuSample& believed : guard.accept(sample)) {
+        for (const ImuGuard::KeptRate& rate : guard.rates_before(believed)) {
+          history.push_back(rate.sample);
+          EXPECT_LT(rate.turn_rad.norm(), 0.03) << seed;
+          ++kept;
+        }
+        history.push_back(believed);
+      }
+    }
+    EXPECT_GE(kept, 3U) << seed;
+    ASSERT_EQ(history.size(), samples.size()) << seed;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      EXPECT_EQ(history[i].stamp, samples[i].stamp) << seed;
+      EXPECT_EQ(history[i].gyro_radps, samples[i].gyro_radps) << seed;
+    }
+  }
+}
+
+TEST(ImuGuard, KeepsADamagedRateThatARobotReachesAndTellsWhatItDoes) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    auto samples = samples_of(kMotions[0], seed, 3 * kSecond);
+    samples[150].gyro_radps.y() += 1.0;
+    samples[200].gyro_radps.y() += 4.0;
+    ImuGuard guard;
+    std::vector<ImuGuard::KeptRate> kept;
+    for (const ImuSample& sample : samples) {
+      for (const ImuSample& believed : guard.accept(sample)) {
+        const auto rates = guard.rates_before(believed);
+        kept.insert(kept.end(), rates.begin(), rates.end());
+      }
+    }
+    ASSERT_EQ(kept.size(), 1U) << seed;
+    EXPECT_EQ(kept[0].sample.stamp, samples[150].stamp) << seed;
+    EXPECT_EQ(kept[0].sample.accel_mps2, samples[149].accel_mps2) << seed;
+    EXPECT_NEAR(kept[0].turn_rad.y(), 0.01, 1e-3) << seed;
+  }
+}
+
 TEST(ImuGuard, ALandingCostsNoMoreThanItsSamples) {
   // Forces of a multirotor that sets down within 60 ms. Some of them may be believed.
   constexpr std::array kForces{0.6, 3.5, 11.1, 17.4, 14.5, 6.2, 1.3, 0.4};

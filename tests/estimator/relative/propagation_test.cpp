@@ -278,6 +278,22 @@ TEST(Propagation, TheBiasOfAnAccelerometerThatBeginsToVibrateBecomesUncertain) {
   EXPECT_GT(P.diagonal()(E::kAccelN), 0.001);
 }
 
+TEST(Propagation, WhatADamagedRateMayHaveTurnedIsUncertain) {
+  using E = ErrorState;
+  const auto theta_with = [](const Eigen::Vector3d& turn_rad) {
+    ImuHistory imu;
+    for (int i = 0; i <= 20; ++i)
+      imu.push({Timestamp{i * 10ms}, Eigen::Vector3d::Zero(), {0, 0, 9.81}},
+               Eigen::Vector3d::Zero(), i == 10 ? turn_rad : Eigen::Vector3d::Zero());
+    NominalState state;
+    E::Covariance P;
+    propagate(imu, imu, Timestamp{}, Timestamp{200ms}, ProcessNoise{}, state, P);
+    return Eigen::Vector3d(P.diagonal().segment<3>(E::kTheta));
+  };
+  const Eigen::Vector3d more = theta_with({0.01, 0.02, 0.0}) - theta_with(Eigen::Vector3d::Zero());
+  EXPECT_LT((more - 2.0 * Eigen::Vector3d{1e-4, 4e-4, 0.0}).norm(), 1e-9);  // of both bodies
+}
+
 TEST(Propagation, TrustsAGapFarLessThanSamples) {
   ImuHistory steady;
   for (int i = 0; i <= 200; ++i)

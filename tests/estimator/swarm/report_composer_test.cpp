@@ -116,7 +116,8 @@ TEST(ReportComposer, ReportsSpikesAmongTheSamples) {
     if (i == 40 || i == 100) sample.accel_mps2.x() = -40.0;
     for (const ImuSample& believed : state.guard.accept(sample)) state.add_believed(believed);
   }
-  ASSERT_EQ(state.imu.size(), 118U);
+  ASSERT_EQ(state.imu.size(), 120U);
+  EXPECT_EQ(state.imu[99].accel_mps2, state.imu[98].accel_mps2);  // its rate is kept alone
 
   const auto report = composer.compose(Timestamp{1200ms}, state, {});
 
