@@ -249,7 +249,8 @@ Fusion NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& 
   const auto innovation = linearize_range(state_, p_B_U, p_N_Q, z.range_m, z.sigma_m);
   if (!innovation) return {};
   const double distance_m = z.range_m - state_.range_bias_m - innovation->residual(0);
-  const RangeUpdate update = update_by_range(*innovation, distance_m, gate_nis, P_);
+  const RangeUpdate update =
+      update_by_range(*innovation, distance_m, gate_nis, P_, z.shared_m * z.shared_m);
   if (update.fusion.verdict != Verdict::kFused) return update.fusion;
   apply(update.correction);
   std::rotate(ranges_used_.begin(), ranges_used_.begin() + 1, ranges_used_.end());

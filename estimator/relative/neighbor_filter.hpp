@@ -35,10 +35,11 @@ struct DirectionReading {
   double sigma_rad = 0.0;
 };
 
-/// A range and its noise.
+/// A range and its errors, one sigma each.
 struct RangeReading {
   double range_m = 0.0;
-  double sigma_m = 0.0;
+  double sigma_m = 0.0;   ///< its noise
+  double shared_m = 0.0;  ///< what the ranges about it have in common, beside the pair's bias
 };
 
 /// The distance of a camera, in the body of its robot, to an LED ring, by the ring's size.

@@ -29,10 +29,11 @@ bool is_lost(const NeighborTrack& track) {
   return !track.is_certain() && track.stamp() - track.last_sighting() > kDivergenceTime;
 }
 
-constexpr auto kIsWorse = [](const auto& a, const auto& b) {
-  return std::tuple(a.confirmed, !a.one_way, a.score()) <
-         std::tuple(b.confirmed, !b.one_way, b.score());
-};
+// One that takes another robot for its neighbor seldom does so for longer.
+constexpr Duration kMistake = std::chrono::milliseconds{800};
+
+// Scores forget. This part of a steady one is gathered within a hypothesis' age.
+double gathered(Duration age) { return 1.0 - std::exp(-to_seconds(age) / kScoreMemory); }
 
 }  // namespace
 
@@ -85,7 +86,8 @@ bool HypothesisSet::initialize(Timestamp stamp, const MutualInitialization& firs
     scores[i] = log_likelihood_ratio(fusion, readings[i].kind);
   }
   if (hypotheses_.size() >= kMaxHypotheses) {
-    const auto worst = std::min_element(hypotheses_.begin() + 1, hypotheses_.end(), kIsWorse);
+    const auto worst =
+        std::ranges::min_element(hypotheses_.begin() + 1, hypotheses_.end(), {}, rank());
     if (worst->confirmed || worst->score() >= scores[0] + scores[1]) return false;
     hypotheses_.erase(worst);
   }
@@ -167,10 +169,10 @@ void HypothesisSet::prune() {
   if (empty()) return;
   for (Hypothesis& hypothesis : hypotheses_) hypothesis.sum.prune();
 
-  const auto best = std::max_element(hypotheses_.begin(), hypotheses_.end(), kIsWorse);
-  const auto must_give_way = [&best](const Hypothesis& current) {
+  const auto best = std::ranges::max_element(hypotheses_, {}, rank());
+  const auto must_give_way = [&](const Hypothesis& current) {
     const bool is_mutual_for_one_way = current.one_way && !best->one_way;
-    const bool is_better = best->score() > current.score() + kMargin || is_mutual_for_one_way;
+    const bool is_better = lead(*best) > kMargin || is_mutual_for_one_way;
     return !current.confirmed || (best->confirmed && is_better);
   };
   if (must_give_way(hypotheses_.front())) std::swap(hypotheses_.front(), *best);
@@ -182,8 +184,7 @@ void HypothesisSet::prune() {
   };
   const auto has_lost = [&](const Hypothesis& rival) {
     return (!leader.one_way && leader.sum.is_compatible_with(rival.sum)) ||
-           (is_past_probation(rival) &&
-            (!rival.confirmed || rival.score() < leader.score() - kMargin));
+           (is_past_probation(rival) && (!rival.confirmed || lead(rival) < -kMargin));
   };
   hypotheses_.erase(std::remove_if(hypotheses_.begin() + 1, hypotheses_.end(), has_lost),
                     hypotheses_.end());
@@ -196,9 +197,18 @@ bool HypothesisSet::must_start_anew() const {
 
 bool HypothesisSet::is_unambiguous() const {
   if (empty() || !hypotheses_.front().confirmed) return false;
-  const double margin = hypotheses_.front().score() - kMargin;
   return std::none_of(hypotheses_.begin() + 1, hypotheses_.end(),
-                      [margin](const Hypothesis& h) { return h.confirmed && h.score() > margin; });
+                      [this](const Hypothesis& h) { return h.confirmed && lead(h) > -kMargin; });
+}
+
+double HypothesisSet::lead(const Hypothesis& rival) const {
+  const auto score = [this](const Hypothesis& of, const Hypothesis& beside) {
+    const bool is_favored =
+        of.born < beside.born && of.sum.heaviest().contradicted_for() >= kMistake;
+    return of.score() * (is_favored ? gathered(stamp() - beside.born) : 1.0);
+  };
+  const Hypothesis& leader = hypotheses_.front();
+  return score(rival, leader) - score(leader, rival);
 }
 
 }  // namespace crepes

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -90,6 +91,14 @@ class HypothesisSet {
   };
   /// Whether the leader became so uncertain out of sight that a mutual sighting says more.
   [[nodiscard]] bool must_start_anew() const;
+  /// How much more a rival explains than the leader. The older of the two has gathered its score
+  /// for longer. If all readings of a kind have contradicted it for a while, only the common time
+  /// counts.
+  [[nodiscard]] double lead(const Hypothesis& rival) const;
+  /// The best is the greatest.
+  [[nodiscard]] auto rank() const {
+    return [this](const Hypothesis& h) { return std::tuple(h.confirmed, !h.one_way, lead(h)); };
+  }
   [[nodiscard]] bool is_explained(Timestamp stamp, const MutualInitialization& first) const;
   [[nodiscard]] Hypothesis make(GaussianSum sum);
   [[nodiscard]] CorrectionBudget& budget(MeasurementKind kind) {

@@ -26,6 +26,10 @@ constexpr double kDistanceSigma = 1.0;  // m; after a reset, at least
 // Where ranges are rare, a few decide. What makes one false, as a reflection, lasts less long.
 constexpr int kMinRareRanges = 3;
 constexpr double kMostOff = 4.8;  // m; beyond that, a range is more likely false after a reset, too
+// So long after a sighting, a robot may be behind something, and its ranges come late. At first by
+// little, and by more from range to range, which looks like motion.
+constexpr Duration kHidden = std::chrono::milliseconds{150};
+constexpr double kHiddenPath = 0.1;  // m, one sigma; beyond that, they contradict the filter
 constexpr Duration kRareRangesTime = std::chrono::milliseconds{3500};
 constexpr Duration kDoubtfulTime = std::chrono::seconds{1};  // without a range that fits
 
@@ -129,11 +133,18 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
   const Fusion fusion = tight == nullptr
                             ? fuse_paper(std::get<PaperFilter>(filter_), measurement, gates)
                         : is_bearing ? fuse_bearing(*tight, measurement, mounting, gates)
-                                     : fuse_tight(*tight, measurement, mounting, gates);
+                                     : fuse_tight(*tight, doubted(measurement), mounting, gates);
   if (fusion.verdict == Verdict::kFused)
     last_[static_cast<std::size_t>(measurement.kind)] = measurement.stamp;
   gated_[run_of(measurement.kind)].add(measurement.stamp, fusion);
   return fusion;
+}
+
+Measurement NeighborTrack::doubted(Measurement measurement) const {
+  auto* const range = std::get_if<RangeReading>(&measurement.reading);
+  if (range != nullptr && measurement.stamp > last_sighting() + kHidden)
+    range->shared_m = std::max(range->shared_m, kHiddenPath);
+  return measurement;
 }
 
 void NeighborTrack::GatedRun::add(Timestamp stamp, const Fusion& fusion) {
@@ -264,13 +275,13 @@ bool NeighborTrack::is_contradicted() const {
          are_ranges_contrary;
 }
 
-bool NeighborTrack::is_diverged() const {
-  const auto is_gated_out = [this](MeasurementKind kind) {
+Duration NeighborTrack::contradicted_for() const {
+  const auto length = [this](MeasurementKind kind) {
     const GatedRun& gated = gated_[run_of(kind)];
-    return gated.count >= kMinGated && gated.length() >= kDivergenceTime;
+    return gated.count >= kMinGated ? gated.length() : Duration{0};
   };
-  return is_gated_out(MeasurementKind::kBearing) || is_gated_out(MeasurementKind::kPeerBearing) ||
-         is_gated_out(MeasurementKind::kRawPose);
+  return std::max({length(MeasurementKind::kBearing), length(MeasurementKind::kPeerBearing),
+                   length(MeasurementKind::kRawPose)});
 }
 
 }  // namespace crepes

@@ -59,9 +59,11 @@ class NeighborTrack {
   }
   /// When a bearing or raw pose was last used.
   [[nodiscard]] Timestamp last_sighting() const;
-  /// True if one kind of sighting was gated without exception for kDivergenceTime, for example
-  /// because the filter follows a mirror image. Bearings of the other direction may still fit.
-  [[nodiscard]] bool is_diverged() const;
+  /// For how long one kind of sighting has been gated without exception, for example because the
+  /// filter follows a mirror image. Bearings of the other direction may still fit.
+  [[nodiscard]] Duration contradicted_for() const;
+  /// True if that is kDivergenceTime or more.
+  [[nodiscard]] bool is_diverged() const { return contradicted_for() >= kDivergenceTime; }
   /// True if the latest readings contradict the pose: some ranges in a row or all of a second were
   /// gated, or some bearings, after a gap or for kDivergenceTime, while none of either side was
   /// used.
@@ -72,6 +74,8 @@ class NeighborTrack {
   /// other cameras are skipped until that camera has been silent for a while.
   Fusion fuse_bearing(NeighborFilter& filter, const Measurement& bearing,
                       const PairMounting& mounting, const Gates& gates);
+  /// With the errors that ranges may have while the robots do not see each other.
+  [[nodiscard]] Measurement doubted(Measurement measurement) const;
   /// Bearings of both directions fit, but all ranges of the last half second were gated, or of the
   /// last seconds where ranges are rare.
   [[nodiscard]] bool is_range_diverged() const;

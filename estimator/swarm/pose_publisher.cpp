@@ -94,6 +94,7 @@ void PosePublisher::update(Timestamp now, const RobotState& self, const RobotSta
   pose.age_s = to_seconds(stamp - std::max({track.last_sighting(), graph, range}));
   pose.sources.graph = is_recent(graph);
   pose_ = pose;
+  is_half_contradicted_ = track.is_diverged();
   speed_sigma_ = track.speed_sigma();
   is_by_imus_ = stamp - range > kUnranged && stamp - intake.newest_range() > kRareRanges;
 }
@@ -180,7 +181,7 @@ bool PosePublisher::take_restart() {
 }
 
 std::optional<NeighborPose> PosePublisher::published() const {
-  if (!team_pose_) return graph_corrected_pose();
+  if (!team_pose_) return is_half_contradicted_ ? std::nullopt : graph_corrected_pose();
   const bool needs_confirmation = team_->pose.needs_confirmation;
   if (!pose_ || pose_->mode == PoseMode::kPredicted) {
     if (needs_confirmation) return graph_corrected_pose();

@@ -107,6 +107,7 @@ class PosePublisher {
   std::optional<NeighborPose> pose_;
   double speed_sigma_ = 0.0;                    ///< of `pose_` [m/s]
   bool is_by_imus_ = false;                     ///< the distance in `pose_`
+  bool is_half_contradicted_ = false;           ///< `pose_`, by one of the two robots
   BoundedFifo<StampedPose, 128> recent_poses_;  ///< of this hypothesis: half a second at 200 Hz
   std::optional<Correction> correction_;
   std::optional<TeamEstimate> team_;

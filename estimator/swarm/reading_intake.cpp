@@ -44,12 +44,13 @@ void ReadingIntake::add_peer_bearing(const Bearing& bearing, double sigma_rad) {
 }
 
 bool ReadingIntake::add_range(const UwbRange& range, MeasurementKind kind) {
-  if (!screen_.accepts(range, settings_)) {
+  const auto reading = screen_.accept(range, settings_);
+  if (!reading) {
     outcomes_.add(range.stamp, kind, {.verdict = Verdict::kGated}, {range.range_m});
     return false;
   }
   last_.ranged = std::max(last_.ranged, range.stamp);
-  enqueue({range.stamp, kind, RangeReading{range.range_m, settings_.range_sigma_m}});
+  enqueue({range.stamp, kind, *reading});
   return true;
 }
 

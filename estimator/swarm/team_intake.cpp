@@ -95,9 +95,8 @@ void TeamIntake::add_range(RobotId observer, const UwbRange& range,
                            const FilterSettings& settings) {
   record_delay(range.stamp);
   if (ranges_.size() >= kMaxWaiting) return;
-  if (!screens_[ordered(observer, range.neighbor)].accepts(range, settings)) return;
-  ranges_.push_back(
-      {observer, range.neighbor, range.stamp, {range.range_m, settings.range_sigma_m}});
+  const auto reading = screens_[ordered(observer, range.neighbor)].accept(range, settings);
+  if (reading) ranges_.push_back({observer, range.neighbor, range.stamp, *reading});
 }
 
 std::optional<TeamInterval> TeamIntake::drain(RobotId self, Timestamp now, const SwarmConfig& swarm,

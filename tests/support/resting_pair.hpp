@@ -67,16 +67,17 @@ inline Measurement peer_range(Timestamp t, double range_m = kDistance) {
   return {t, MeasurementKind::kPeerRange, RangeReading{range_m, 0.05}};
 }
 
-/// A mutual sighting of a robot at `azimuth_rad` that sees the observer behind itself: the robot,
-/// or its image in a mirror.
-inline MutualInitialization sighting(double azimuth_rad = 0.0) {
+/// A mutual sighting of a robot at `azimuth_rad` that sees the observer behind itself, or at
+/// `peer_azimuth_rad`: the robot, or its image in a mirror.
+inline MutualInitialization sighting(double azimuth_rad = 0.0,
+                                     double peer_azimuth_rad = std::numbers::pi) {
   const Sighting B{.u = horizontal(azimuth_rad),
                    .up = Eigen::Vector3d::UnitZ(),
                    .mounting = {},
                    .bearing_sigma_rad = 0.05,
                    .tilt_sigma_rad = 0.02};
   Sighting N = B;
-  N.u = -Eigen::Vector3d::UnitX();
+  N.u = horizontal(peer_azimuth_rad);
   const auto raw = compute_raw_pose({.B = B, .N = N, .range_m = kDistance, .range_sigma_m = 0.07});
   return {std::get<RawPose>(raw),
           {B.u, Eigen::Vector3d::Zero(), 0.001},

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <map>
+#include <numbers>
 
 #include "tests/support/resting_pair.hpp"
 
@@ -190,6 +191,34 @@ TEST(Hypotheses, TheRivalWithMoreSupportBecomesTheLeader) {
   EXPECT_EQ(hypotheses.size(), 1U) << "the image has lost";
   EXPECT_TRUE(hypotheses.is_unambiguous());
   EXPECT_LT(pose_difference(kTruth, hypotheses.leader().heaviest().pose().pose).norm(), 0.1);
+}
+
+// Its own score is that of half a second, the rival's that of its life. Our bearings fit both, and
+// the peer has few.
+TEST(Hypotheses, AnOldLeaderThatThePeerContradictsHasNoAdvantageByItsAge) {
+  constexpr double kTurned = std::numbers::pi + 0.2;  // of the peer, since
+  constexpr int kTurn_ms = 1500;
+  HypothesisSet hypotheses(settings(), kMounting);
+  ASSERT_TRUE(hypotheses.initialize(at_ms(0), sighting()));
+  const ImuHistory imu = imu_at_rest(3000);
+  const auto look = [&](int from_ms, int to_ms, double peer_azimuth_rad) {
+    for (int ms = from_ms; ms < to_ms; ms += 5) {
+      const Measurement own = bearing(at_ms(ms));
+      hypotheses.fuse({&own, 1}, imu, imu);
+      const Measurement by_peer = peer_bearing(at_ms(ms), peer_azimuth_rad);
+      if (ms % 40 == 0) hypotheses.fuse({&by_peer, 1}, imu, imu);
+      hypotheses.prune();
+    }
+  };
+  look(5, kTurn_ms, std::numbers::pi);
+  look(kTurn_ms, kTurn_ms + 500, kTurned);
+  ASSERT_EQ(hypotheses.generation(), 1U);
+  ASSERT_TRUE(hypotheses.initialize(hypotheses.stamp(), sighting(0.0, kTurned)));
+
+  look(kTurn_ms + 500, kTurn_ms + 900, kTurned);
+
+  EXPECT_EQ(hypotheses.generation(), 2U);
+  EXPECT_TRUE(hypotheses.is_unambiguous());
 }
 
 TEST(Hypotheses, AreAmbiguousWhileBothPlacesAreSeen) {

@@ -216,6 +216,17 @@ TEST(Neighbor, LocatedInAMirrorIsFoundWithinASecondOfBeingSeenItself) {
   EXPECT_LT(view.error().tail<3>().norm(), 0.06);
 }
 
+// One of the two is wrong, and for a third of a second nothing shows which.
+TEST(Neighbor, IsNotPublishedWhileAllThatOneOfTheTwoSeesContradictsIt) {
+  View view;
+  view.run_until(Timestamp{3s});
+  ASSERT_TRUE(view.neighbor().output().pose());
+
+  view.run_until(Timestamp{3s} + 340ms, {.heading_rad = 0.5});
+
+  EXPECT_FALSE(view.neighbor().output().pose());
+}
+
 TEST(Neighbor, IsLocatedInTimeAlthoughItDoesNotSeeUs) {
   View view;
 

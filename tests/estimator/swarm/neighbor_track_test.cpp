@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/support/resting_pair.hpp"
 
 namespace crepes::neighbor_track_test {
@@ -140,6 +142,19 @@ TEST_F(RangedTrack, IsNotResetByRareRangesThatAreFarOff) {
 
   EXPECT_TRUE(track_.is_contradicted());
   EXPECT_LT(std::sqrt(track_.pose().covariance(0, 0)), 1.0);
+}
+
+// It passes behind something. Ranges that grow longer look like motion until they are refused.
+TEST_F(RangedTrack, IsHonestWhereRangesGrowLongerOutOfSight) {
+  constexpr double kLate = 0.5;     // m, at last
+  constexpr double kOnset = 700.0;  // ms
+  for (int ms = kRangedMs; ms < kRangedMs + 4000; ms += 10) {
+    imu_.push({at_ms(ms), Eigen::Vector3d::Zero(), {0.0, 0.0, kGravityMps2}});
+    fuse_at(ms, range({}, kDistance + kLate * (1.0 - std::exp((kRangedMs - ms) / kOnset))));
+    const GaussianPose pose = track_.pose();
+    const double off_m = pose.pose.p.x() - kDistance;
+    ASSERT_LT(std::abs(off_m), 5.0 * std::sqrt(pose.covariance(0, 0))) << ms;
+  }
 }
 
 TEST_F(RangedTrack, IsContradictedByAllRangesOfASecondUntilOneFits) {
