@@ -12,6 +12,7 @@
 #include "tests/faults/fault_table.hpp"
 #include "tests/faults/kept.hpp"
 #include "tests/faults/trial.hpp"
+#include "tests/study/simulated_swarm.hpp"
 
 namespace crepes::faults {
 namespace {
@@ -23,6 +24,7 @@ struct Options {
   std::uint64_t parts = 1;
   bool takes_long = false;
   bool flies_kept = false;
+  std::string scenario;
   std::string log;
   std::string trial;
   std::string errors;
@@ -104,8 +106,9 @@ std::uint64_t run(const Options& options) {
   const std::uint64_t end = options.first + options.count;
   std::vector<Trial> trials;
   for (std::uint64_t seed = options.first; seed < end; ++seed) {
-    trials.push_back(trial_of(seed, times));
-    if (seed + 1 < end && world_of(seed + 1) == world_of(seed)) continue;
+    const World flown = world_of(seed, options.scenario);
+    trials.push_back(trial_of(seed, times, options.scenario));
+    if (seed + 1 < end && world_of(seed + 1, options.scenario) == flown) continue;
     const std::uint64_t world = (seed - 1) / kSeedsPerWorld;
     if (world % options.parts == options.part) {
       try_all(trials, [&](const Verdict& verdict) {
@@ -130,6 +133,11 @@ int main(int argc, char** argv) {
   app.add_option("--part", options.part, "of the worlds, from 0")->capture_default_str();
   app.add_option("--parts", options.parts, "in how many parts")->capture_default_str();
   app.add_flag("--long", options.takes_long, "faults of up to half a minute");
+  std::vector<std::string> scenarios;
+  for (const auto& scenario : crepes::study::kScenarios) scenarios.emplace_back(scenario.name);
+  app.add_option("--scenario", options.scenario,
+                 "of the studies; without it, four, occluded and cluttered in turn")
+      ->check(CLI::IsMember(scenarios));
   app.add_option("--log", options.log, "a line for every trial goes to this file");
   app.add_option("--trial", options.trial, "only flies this schedule, as kept.txt has it");
   app.add_option("--errors", options.errors,

@@ -246,29 +246,41 @@ class Branches {
   const Traces& reference_;
 };
 
+const study::Scenario& scenario_of(const World& world) {
+  const auto* const scenario =
+      std::ranges::find(study::kScenarios, world.scenario, &study::Scenario::name);
+  CREPES_EXPECT(scenario != study::kScenarios.end(), "a world is of a known scenario");
+  return *scenario;
+}
+
 study::Swarm simulate(const World& world, double duration_s) {
-  const study::Scenario& scenario =
-      *std::ranges::find(study::kScenarios, world.scenario, &study::Scenario::name);
-  return study::simulate_swarm(scenario, world.seed, duration_s);
+  return study::simulate_swarm(scenario_of(world), world.seed, duration_s);
 }
 
 }  // namespace
 
-World world_of(std::uint64_t seed) {
+World world_of(std::uint64_t seed, const std::string& scenario) {
   const std::uint64_t index = (seed - 1) / kSeedsPerWorld;
-  return {.scenario = std::string(kScenarioNames.at(index % kScenarioNames.size())),
+  const std::string turn(kScenarioNames.at(index % kScenarioNames.size()));
+  return {.scenario = scenario.empty() ? turn : scenario,
           .seed = static_cast<int>(index + 1),
           .sealed = index / kScenarioNames.size() % 2 == 0};
 }
 
-int robots_of(const World& world) { return world.scenario == "occluded" ? 5 : 4; }
+int robots_of(const World& world) {
+  constexpr int kAtRest = 4;
+  const study::Scenario& scenario = scenario_of(world);
+  SimConfig sim;
+  sim.scenario = scenario.world;
+  return scenario.rests ? kAtRest : static_cast<int>(SimWorld(sim).robots().size());
+}
 
 std::string to_string(const World& world) {
   return fmt::format("{} {} {}", world.scenario, world.seed, world.sealed ? "sealed" : "open");
 }
 
-Trial trial_of(std::uint64_t seed, const FaultTimes& times) {
-  World world = world_of(seed);
+Trial trial_of(std::uint64_t seed, const FaultTimes& times, const std::string& scenario) {
+  World world = world_of(seed, scenario);
   std::vector<Fault> faults = draw_faults(seed, robots_of(world), times);
   return {std::move(world), std::move(faults)};
 }
@@ -287,6 +299,9 @@ std::optional<Trial> parse_trial(const std::string& line) {
   Trial trial;
   std::string sealed;
   std::istringstream(text.substr(0, colon)) >> trial.world.scenario >> trial.world.seed >> sealed;
+  if (std::ranges::find(study::kScenarios, trial.world.scenario, &study::Scenario::name) ==
+      study::kScenarios.end())
+    return std::nullopt;
   trial.world.sealed = sealed == "sealed";
   std::istringstream faults(text.substr(colon + 1));
   for (std::string one; std::getline(faults, one, ';');) {

@@ -31,7 +31,8 @@ struct World {
   [[nodiscard]] bool operator==(const World&) const = default;
 };
 inline constexpr std::uint64_t kSeedsPerWorld = 20;
-[[nodiscard]] World world_of(std::uint64_t seed);
+/// `scenario`: of the studies; empty for `four`, `occluded` and `cluttered` in turn.
+[[nodiscard]] World world_of(std::uint64_t seed, const std::string& scenario = {});
 [[nodiscard]] std::string to_string(const World& world);
 [[nodiscard]] int robots_of(const World& world);
 
@@ -40,7 +41,8 @@ struct Trial {
   World world;
   std::vector<Fault> faults;
 };
-[[nodiscard]] Trial trial_of(std::uint64_t seed, const FaultTimes& times);
+[[nodiscard]] Trial trial_of(std::uint64_t seed, const FaultTimes& times,
+                             const std::string& scenario = {});
 /// "four 7 sealed: loss r2 5.10 7.25 0.60 123; freeze r1 ...". What follows a # is a comment.
 [[nodiscard]] std::string to_string(const Trial& trial);
 [[nodiscard]] std::optional<Trial> parse_trial(const std::string& line);
