@@ -1,4 +1,6 @@
 /// The daemon: options, configuration, Runtime, wait.
+#include <fmt/core.h>
+
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <iostream>
@@ -74,11 +76,13 @@ int run(const std::string& file) {
   const Signals signals;
   const LogSession log(config->log.level);
   const MonotonicClock machine;
+  const std::string start =
+      fmt::format("crepesd {}, robot {}: running with {}", kVersion, config->robot.id.value, file);
   Runtime runtime(std::move(*config), machine);
   Watchdog watchdog(runtime.heartbeats());
   for (const ConfigFault& doubt : checked.warnings)
     log_message(LogLevel::kWarning, to_string(doubt));
-  log_message(LogLevel::kInfo, "running with " + file);
+  log_message(LogLevel::kInfo, start);
   Watchdog::notify_ready();
   Timestamp next_check = machine.now() + kCheckPeriod;
   for (;;) {
@@ -90,6 +94,7 @@ int run(const std::string& file) {
       log_message(LogLevel::kError, loop + ": this loop makes no progress");
     next_check = machine.now() + kCheckPeriod;
   }
+  log_message(LogLevel::kInfo, "stopped by a signal");
   Watchdog::notify_stopping();
   return kDone;
 }

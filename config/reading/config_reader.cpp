@@ -6,7 +6,6 @@
 #include <array>
 #include <cstdint>
 #include <iterator>
-#include <limits>
 
 #include "config/reading/spelling.hpp"
 #include "config/schema/nearest_rotation.hpp"
@@ -94,8 +93,8 @@ std::string read_value(const ConfigNode& node, std::string& value) {
 std::string read_value(const ConfigNode& node, RobotId& value) {
   int number = 0;
   if (std::string reason = read_value(node, number); !reason.empty()) return reason;
-  constexpr Bounds kHeld{0, std::numeric_limits<std::uint16_t>::max()};
-  if (std::string reason = check_bounds(number, kHeld); !reason.empty()) return reason;
+  constexpr Bounds kIds{1, 65534};  // as every id in the schema
+  if (std::string reason = check_bounds(number, kIds); !reason.empty()) return reason;
   value = RobotId{static_cast<std::uint16_t>(number)};
   return "";
 }

@@ -17,6 +17,7 @@ constexpr int kUsageWrong = 2;
 int run(int argc, char** argv) {
   CLI::App app("crepesctl: watch, record, replay and score relative localization of robot swarms",
                "crepesctl");
+  app.formatter(wrapped_help());
   app.set_version_flag("--version", std::string(kVersion));
   app.require_subcommand(1);
   app.footer(

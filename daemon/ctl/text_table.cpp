@@ -56,7 +56,11 @@ std::string fixed(double value, int decimals) {
   if (!std::isfinite(value)) return "-";
   std::array<char, 64> buffer{};
   const int length = std::snprintf(buffer.data(), buffer.size(), "%.*f", decimals, value);
-  return length > 0 && static_cast<std::size_t>(length) < buffer.size() ? buffer.data() : "-";
+  if (length <= 0 || static_cast<std::size_t>(length) >= buffer.size()) return "-";
+  const std::string_view text(buffer.data());
+  const bool is_minus_zero =
+      text.starts_with('-') && text.find_first_of("123456789") == std::string_view::npos;
+  return std::string(text.substr(is_minus_zero ? 1 : 0));
 }
 
 }  // namespace crepes

@@ -13,7 +13,7 @@ enum class LastColumn : bool { kNumbers, kWords };
 [[nodiscard]] std::string text_table(const std::vector<std::vector<std::string>>& rows,
                                      LastColumn last = LastColumn::kNumbers);
 
-/// `value` with `decimals` decimals; "-" if it is not finite.
+/// `value` with `decimals` decimals; zero has no sign; "-" if it is not finite.
 [[nodiscard]] std::string fixed(double value, int decimals);
 
 }  // namespace crepes

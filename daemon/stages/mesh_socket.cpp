@@ -109,8 +109,11 @@ void KeyMismatchMonitor::update(const PeerLink& link) {
                             : wrong == received    ? kOtherSigner
                             : other == received    ? kOtherVersion
                                                    : "";
-  const std::string before = std::exchange(fault_, fault);
-  if (!fault_.empty() && before.empty()) log_message(LogLevel::kWarning, "mesh: " + fault_);
+  fault_ = fault;
+  if (received == 0 || fault_ == logged_) return;  // silence shows nothing of keys
+  log_message(fault_.empty() ? LogLevel::kInfo : LogLevel::kWarning,
+              "mesh: " + (fault_.empty() ? std::string("works again") : fault_));
+  logged_ = fault_;
 }
 
 void DoubledIdMonitor::update(const PeerLink& link, const Endpoint& from, Timestamp arrival) {

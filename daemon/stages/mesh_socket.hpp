@@ -70,7 +70,7 @@ class MeshSocket {
   std::string logged_keys_;
 };
 
-/// Detects that datagrams arrive but none of them is believed.
+/// Detects that datagrams arrive but none of them is believed. Logs when that begins and ends.
 class KeyMismatchMonitor {
  public:
   /// Checks the datagrams since the last update; once a second is enough.
@@ -84,6 +84,7 @@ class KeyMismatchMonitor {
   std::uint64_t unsigned_ = 0;
   std::uint64_t other_version_ = 0;
   std::string fault_;
+  std::string logged_;  ///< the last fault in the log; empty if it has ended there
 };
 
 /// Detects that two robots use one id.

@@ -125,6 +125,18 @@ TEST_F(Clients, InEachLanguageGetThePosesThatAreTrue) {
   }
 }
 
+TEST(ClientExamples, RefuseAPortThatIsNone) {
+  std::vector<std::string> programs{std::string(CREPES_CPP_CLIENT)};
+  if (const std::string node = path_of("node"); !node.empty())
+    programs.push_back(node + " " + kClients + "/node/poses.mjs");
+  for (const std::string& program : programs) {
+    const Ending ending = run("/bin/sh", {"-c", program + " 127.0.0.1 99999"});
+
+    EXPECT_EQ(ending.how, "exit code 2") << program;
+    EXPECT_EQ(ending.errors, "99999 is no port, 1 to 65535\n") << program;
+  }
+}
+
 TEST_F(Clients, EndTheirSubscriptionWhereNobodyReadsOn) {
   expect_true_poses(first_);
   for (const std::string& program :

@@ -303,6 +303,16 @@ class ThePackage(unittest.TestCase):
             self.assertEqual(done.stdout, "12500000001 2 direct 1.0 -2.0 0.5\n")
             self.assertTrue((installed / "crepes_client" / "py.typed").exists())
 
+    def test_names_the_argument_that_is_wrong(self):
+        for arguments, complaint in ((["--port", "99999"], "--port: 99999 is no port, 1 to 65535"),
+                                     (["--count", "-1"], "--count: -1 is not above 0")):
+            done = subprocess.run([sys.executable, "-m", "crepes_client", *arguments], env={"PYTHONPATH": str(PYTHON)},
+                                  capture_output=True, text=True)
+
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(complaint, done.stderr)
+            self.assertNotIn("Traceback", done.stderr)
+
     @unittest.skipUnless(shutil.which("mypy", path="/usr/bin"), "mypy is not installed")
     def test_has_types_that_hold(self):
         with tempfile.TemporaryDirectory() as cache:

@@ -1,4 +1,6 @@
 """The example for PX4 (examples/px4_offboard.py), with perfect poses, an ideal vehicle and a stub of pymavlink."""
+import contextlib
+import io
 import itertools
 import math
 import pathlib
@@ -80,7 +82,9 @@ class SetpointsTest(unittest.TestCase):
     def test_without_a_good_pose_for_half_a_second_it_hovers(self):
         observer, neighbor = Drone((0.0, 0.0, 0.0), 0.0), Drone((9.0, 0.0, 0.0), 0.0)
         uncertain = tuple(0.3 if entry > 0.0 else 0.0 for entry in GOOD)  # 0.55 m
-        for useless in (uncertain, None):
+        slanted = tuple((0.24 if row == column else 0.23) if column < 3 else 1e-4 * (row == column)
+                        for row in range(6) for column in range(row, 6))  # 0.49 m along each axis, 0.84 m between them
+        for useless in (uncertain, slanted, None):
             setpoints = offboard.Setpoints(PLACE)
             self.assertEqual(setpoints.at(0.0, offboard.Vehicle()), offboard.Setpoints.HOVER)
             setpoints.add(pose_of(observer, neighbor), 1.0)
@@ -112,8 +116,9 @@ class Over(Exception):
 
 
 class FlyTest(unittest.TestCase):
-    def fly(self, link, seconds, silent_after=math.inf):
+    def fly(self, link, seconds, silent_after=math.inf, kinds=("ATTITUDE", "LOCAL_POSITION_NED")):
         """Runs the loop on a clock of its own; poses come at 20 Hz, the autopilot's messages with them."""
+        says = {"ATTITUDE": {"yaw": math.pi / 2}, "LOCAL_POSITION_NED": {"vx": 0.0, "vy": 0.0, "vz": 0.0}}
         now = [100.0]
 
         def receive(timeout_s):
@@ -121,17 +126,19 @@ class FlyTest(unittest.TestCase):
             if now[0] > 100.0 + seconds:
                 raise Over
             if now[0] < 100.0 + silent_after:
-                link.waiting += [mavlink("ATTITUDE", yaw=math.pi / 2), mavlink("LOCAL_POSITION_NED", vx=0.0, vy=0.0, vz=0.0)]
+                link.waiting += [mavlink(kind, **says[kind]) for kind in kinds]
             return pose_of(Drone((0.0, 0.0, 0.0), math.pi / 2), Drone((0.0, 9.0, 0.0), math.pi / 2))
 
         autopilot = offboard.Autopilot(link)
         real, offboard.time.monotonic = offboard.time.monotonic, lambda: now[0]
         try:
-            offboard.fly(autopilot, types.SimpleNamespace(receive=receive), offboard.Setpoints((-3.0, 0.0, 0.0)), lambda: now[0])
+            with contextlib.redirect_stdout(io.StringIO()) as printed:
+                offboard.fly(autopilot, types.SimpleNamespace(receive=receive), offboard.Setpoints((-3.0, 0.0, 0.0)), lambda: now[0])
         except Over:
             pass
         finally:
             offboard.time.monotonic = real
+        return printed.getvalue()
 
     def test_setpoints_are_velocities_in_local_ned_and_come_often_enough(self):
         link = StubLink()
@@ -156,6 +163,15 @@ class FlyTest(unittest.TestCase):
         link = StubLink()
         self.fly(link, 5.0, silent_after=0.5)
         self.assertLess(len(link.sent), before + 12)  # for half a second more
+
+    def test_an_autopilot_whose_yaw_is_unknown_gets_no_setpoints_and_the_pilot_is_told(self):
+        for kind, other in (("ATTITUDE", "LOCAL_POSITION_NED"), ("LOCAL_POSITION_NED", "ATTITUDE")):
+            link = StubLink()
+
+            printed = self.fly(link, 2.0, kinds=(other,))
+
+            self.assertEqual(link.sent, [])
+            self.assertIn(f"no setpoints: no {kind} from the autopilot\n", printed)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -11,6 +12,8 @@
 
 #include "daemon/runtime.hpp"
 #include "daemon/stages/worker.hpp"
+#include "drivers/base/scratch_directory.hpp"
+#include "drivers/base/text_file.hpp"
 #include "tests/clients/tool_run.hpp"
 #include "tests/daemon/ctl/tiny_swarm.hpp"
 #include "tests/support/places.hpp"
@@ -57,6 +60,25 @@ TEST(ToolsInJson, WriteSectionsThatAConfigurationTakes) {
   EXPECT_EQ(checked.config.swarm.members.size(), 5U);
   EXPECT_EQ(checked.config.cameras.size(), sections["cameras"].size());
   EXPECT_EQ(checked.config.imu.noise.update_rate, sections["imu"]["update_rate"]);
+}
+
+TEST(ToolsInJson, ReplaceNoJsonOfAnotherTool) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const std::string file = scratch.path() / "calibration.json";
+  const std::string camchain = kSource + "/tests/config/calibration/camchain-imucam.yaml";
+  std::ofstream(file) << R"({"value0":{"resolution":[[640,480]]}})";
+
+  const Ending refused = crepesctl({"import-calibration", camchain, "--json", "--out", file});
+  const std::string kept = read_text_file(file).value_or("");
+  const Ending first =
+      crepesctl({"import-calibration", camchain, "--json", "--out", file, "--force"});
+  const Ending again = crepesctl({"import-calibration", camchain, "--json", "--out", file});
+
+  EXPECT_EQ(refused.how, "exit code 1");
+  EXPECT_NE(refused.errors.find("--force"), std::string::npos) << refused.errors;
+  EXPECT_TRUE(kept.starts_with(R"({"value0")")) << kept;
+  EXPECT_EQ(first.how, "exit code 0") << first.errors;
+  EXPECT_EQ(again.how, "exit code 0") << again.errors;
 }
 
 TEST(ToolsInJson, TellWhatAReplayGaveAndWhatItRefused) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -309,6 +310,34 @@ TEST(ToolsAlone, EndWithTwoWhenTheyAreUsedWrongly) {
                                                 {"status", "--address", "home"}})
     EXPECT_EQ(crepesctl(words).how, "exit code 2") << (words.empty() ? "" : words.front());
   EXPECT_NE(crepesctl({"--help"}).output.find("Exit codes: 0"), std::string::npos);
+}
+
+TEST(ToolsAlone, WrapTheirHelp) {
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"--help"},
+                                                {"keygen", "--help"},
+                                                {"demo", "--help"},
+                                                {"calibrate", "range", "--help"}}) {
+    std::istringstream help(crepesctl(words).output);
+    for (std::string line; std::getline(help, line);) EXPECT_LE(line.size(), 100U) << line;
+  }
+}
+
+TEST(ToolsAlone, ReplaceNoFileThatTheyDidNotMake) {
+  const TinySwarm files;
+  const std::string swarm = files.dir().string();
+  const std::string measurements = files.read("r1/imu0/data.csv");
+  const std::string mcap = (files.dir() / "swarm.mcap").string();
+
+  const Ending refused =
+      crepesctl({"convert", swarm, "--to", "mcap", "--out", swarm + "/r1/imu0/data.csv"});
+  const Ending first = crepesctl({"convert", swarm, "--to", "mcap", "--out", mcap});
+  const Ending again = crepesctl({"convert", swarm, "--to", "mcap", "--out", mcap});
+
+  EXPECT_EQ(refused.how, "exit code 1");
+  EXPECT_NE(refused.errors.find("--force"), std::string::npos) << refused.errors;
+  EXPECT_EQ(files.read("r1/imu0/data.csv"), measurements);
+  EXPECT_EQ(first.how, "exit code 0") << first.errors;
+  EXPECT_EQ(again.how, "exit code 0") << again.errors;
 }
 
 TEST(ToolsAlone, RefuseNumbersThatAreNone) {

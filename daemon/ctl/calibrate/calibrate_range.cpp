@@ -19,6 +19,7 @@
 #include "daemon/ctl/text_table.hpp"
 #include "drivers/dataset/robot_folder.hpp"
 #include "estimator/calibration/range/range_calibration.hpp"
+#include "estimator/core/constants.hpp"
 
 namespace crepes {
 namespace {
@@ -157,6 +158,43 @@ Result<std::vector<TapeSegment>> tape_of(const CalibrateRangeOptions& options,
   }
   tape.push_back(std::move(whole));
   return tape;
+}
+
+/// The root mean square of a robot's rates between two times [rad/s]; 0 without samples.
+double rate_rms_of(const RobotRecording& robot, double from_s, double to_s) {
+  double squares = 0.0;
+  double count = 0.0;
+  for (const ImuSample& sample : robot.imu) {
+    const double t_s = robot.robot.clock.true_s(sample.stamp);
+    if (t_s < from_s || t_s > to_s) continue;
+    squares += sample.gyro_radps.squaredNorm();
+    count += 1.0;
+  }
+  return count > 0.0 ? std::sqrt(squares / count) : 0.0;
+}
+
+/// Robots that turned where they had to rest; empty if none did.
+std::string moved_robots(const SwarmDataset& swarm, const std::vector<TapeSegment>& tape,
+                         double first_s) {
+  constexpr double kAtRest = 0.1;  // rad/s; a gyroscope's bias is less
+  std::string moved;
+  for (std::size_t k = 0; k < tape.size(); ++k) {
+    const TapeSegment& segment = tape[k];
+    for (const RobotRecording& robot : swarm.robots) {
+      const RobotId id = robot.robot.id;
+      const bool is_taped = std::ranges::any_of(segment.pairs, [id](const TapedPair& pair) {
+        return pair.pair.a == id || pair.pair.b == id;
+      });
+      if (!is_taped || id == segment.turning) continue;
+      const double rms = rate_rms_of(robot, first_s + segment.from_s, first_s + segment.to_s);
+      if (rms <= kAtRest) continue;
+      moved += fmt::format("{}{} in segment {} ({} deg/s RMS)", moved.empty() ? "" : ", ",
+                           robot.robot.name, k + 1, fixed(kDegPerRad * rms, 0));
+    }
+  }
+  if (moved.empty()) return "";
+  return "turned: " + moved +
+         "; robots must rest at their taped distances: give --tape the seconds in which they do";
 }
 
 LatePathLimits late_path_limits(const SwarmDataset& swarm) {
@@ -372,8 +410,11 @@ Result<CalibrationReport> calibrate_range(const CalibrateRangeOptions& options) 
   const auto tape = tape_of(options, *swarm);
   if (!tape) return tl::unexpected(tape.error());
   if (options.on_progress) options.on_progress(0.7);
+  const SwarmRanges ranges = ranges_of(*swarm);
   RangeCalibration found =
-      calibrate_ranges(taped_ranges(*swarm, ranges_of(*swarm), *tape), late_path_limits(*swarm));
+      calibrate_ranges(taped_ranges(*swarm, ranges, *tape), late_path_limits(*swarm));
+  if (std::string moved = moved_robots(*swarm, *tape, ranges.first_s); !moved.empty())
+    found.warnings.push_back(std::move(moved));
   const bool knows_all = knows_every_pair(found, *swarm);
   if (!knows_all) {
     found.warnings.emplace_back(

@@ -12,13 +12,15 @@ void add_check(CommandLine& line) {
       "Watch a running robot for a few seconds and say what is right, what is wrong and what to "
       "do: sensors, rates, clocks, exposure, board, mesh, calibration");
   add_daemon_options(sub, options.daemon);
-  sub->add_option("--config", options.config,
-                  "the daemon's configuration: also compare the rates with what it says");
+  CLI::Option* config =
+      sub->add_option("--config", options.config,
+                      "the daemon's configuration: also compare the rates with what it says");
   sub->add_option("--for", options.duration_s, "seconds to watch")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 60.0));
   sub->add_option("--led", options.led_port,
-                  "serial port of this robot's LED board: compare its pattern with --config's");
+                  "serial port of this robot's LED board: compare its pattern with --config's")
+      ->needs(config);
   CLI::Option* walk = sub->add_option("--walk", options.walk,
                                       "a neighbor, by name or id: say step by step where to carry "
                                       "it, and whether its pose follows")

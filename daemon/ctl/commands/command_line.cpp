@@ -8,10 +8,13 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <sstream>
 #include <system_error>
+#include <utility>
 
 #include "config/reading/spelling.hpp"
 #include "daemon/ctl/live/live_screen.hpp"
+#include "daemon/ctl/live/screen_text.hpp"
 #include "daemon/ctl/replaceable.hpp"
 #include "drivers/base/number_text.hpp"
 
@@ -20,7 +23,31 @@ namespace {
 
 constexpr int kBarColumns = 79;
 
+/// What CLI11 makes has a line for each meaning, however long. Meanings begin in column 30.
+class WrappedHelp final : public CLI::Formatter {
+ public:
+  std::string make_help(const CLI::App* app, std::string name,
+                        CLI::AppFormatMode mode) const override {
+    std::istringstream lines(CLI::Formatter::make_help(app, std::move(name), mode));
+    std::string text;
+    for (std::string line; std::getline(lines, line);) text += wrapped_line(line) + '\n';
+    return text;
+  }
+
+ private:
+  static std::string wrapped_line(const std::string& line) {
+    constexpr std::size_t kColumns = 100;
+    constexpr std::size_t kMeaning = 30;
+    if (columns_of(line) <= kColumns) return line;
+    const bool has_meaning = line.compare(kMeaning - 2, 2, "  ") == 0;
+    const std::size_t begin = has_meaning ? kMeaning : line.find_first_not_of(' ');
+    return line.substr(0, begin) + wrapped(line.substr(begin), kColumns, begin, begin);
+  }
+};
+
 }  // namespace
+
+std::shared_ptr<CLI::FormatterBase> wrapped_help() { return std::make_shared<WrappedHelp>(); }
 
 void check_numbers(CLI::App& app) {
   const CLI::Validator finite(

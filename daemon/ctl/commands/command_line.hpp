@@ -6,6 +6,7 @@
 #include <array>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -65,6 +66,9 @@ void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<
          help)
       ->check(CLI::IsMember(names));
 }
+
+/// Formats `--help` in lines of at most 100 columns. Subcommands that are added later inherit it.
+[[nodiscard]] std::shared_ptr<CLI::FormatterBase> wrapped_help();
 
 /// For all options of `app` and its subcommands, refuses NaN and infinity, which checks of a range
 /// let pass, and whole numbers below zero or above 2^64 - 1, which would be taken for others.

@@ -55,6 +55,7 @@ void add_convert(CommandLine& line) {
   sub->add_option("--truth", options.swarm,
                   "the data set of a replay, with the robots' clocks and, if it has one, truth/");
   sub->add_option("--out", options.out, "the file; default: swarm.mcap in SWARM_OR_REPLAY");
+  sub->add_flag("--force", options.force, "replace a file that is no MCAP file");
   add_json_flag(sub, json);
   line.run(sub, [&options, &json] { return run_convert(options, json); });
 }

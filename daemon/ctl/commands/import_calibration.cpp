@@ -18,7 +18,10 @@ void add_import_calibration(CommandLine& line) {
   add_json_flag(sub, json, "these sections, which are also valid in a configuration");
   line.run(sub, [&files, &out, &json] {
     return import_calibration(files, json).and_then([&](const std::string& text) {
-      return write_output(text, out, json ? "{\"" : "crepesctl import-calibration");
+      // JSON has no comment: an earlier result begins with the same section.
+      const std::string mark =
+          json ? text.substr(0, text.find(':')) : "crepesctl import-calibration";
+      return write_output(text, out, mark);
     });
   });
 }

@@ -27,9 +27,11 @@ Result<void> run_init(const InitOptions& options, bool asks) {
 }
 
 void add_camera_options(CLI::App* sub, InitOptions& options) {
-  sub->add_option("--camera", options.camera_driver, "its driver, instead of the one that is found")
-      ->check(CLI::IsMember({"none", "aravis", "v4l2", "libcamera", "mindvision"}));
-  sub->add_option("--device", options.camera_device, "its device, with --camera");
+  CLI::Option* camera =
+      sub->add_option("--camera", options.camera_driver,
+                      "its driver, instead of the one that is found")
+          ->check(CLI::IsMember({"none", "aravis", "v4l2", "libcamera", "mindvision"}));
+  sub->add_option("--device", options.camera_device, "its device, with --camera")->needs(camera);
   sub->add_option("--resolution", options.resolution, "width and height [px]; default: 1280 1024")
       ->expected(2)
       ->check(CLI::Range(16, 2048));

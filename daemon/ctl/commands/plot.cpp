@@ -16,6 +16,7 @@ void add_plot(CommandLine& line) {
   sub->add_option("DIR", options.results, "output directory of replay")->required();
   sub->add_option("--truth", options.swarm, "the data set, with its truth/");
   sub->add_option("--out", options.out, "the page; default: plot.html in DIR");
+  sub->add_flag("--force", options.force, "replace a file that is no page");
   add_json_flag(sub, json);
   line.run(sub, [&options, &json] {
     return plot(options).and_then([&](const std::filesystem::path& page) {

@@ -11,6 +11,7 @@
 #include "daemon/ctl/convert/mcap_writer.hpp"
 #include "daemon/ctl/convert/replay_streams.hpp"
 #include "daemon/ctl/convert/swarm_streams.hpp"
+#include "daemon/ctl/replaceable.hpp"
 #include "daemon/ctl/replay/replay_output.hpp"
 #include "daemon/version.hpp"
 
@@ -150,6 +151,9 @@ Result<ConvertSummary> convert_replay(const ConvertOptions& options) {
 }  // namespace
 
 Result<ConvertSummary> convert_to_mcap(const ConvertOptions& options) {
+  if (!options.force)
+    if (auto free = check_replaceable(options.out, "\x89MCAP"); !free)
+      return tl::unexpected(free.error());
   std::error_code status;
   const bool is_swarm = fs::exists(options.source / "swarm.yaml", status);
   if (is_swarm && !options.swarm.empty())

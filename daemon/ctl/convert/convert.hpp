@@ -14,6 +14,7 @@ struct ConvertOptions {
   std::filesystem::path source;  ///< a recorded swarm, or the output directory of replay
   std::filesystem::path swarm;   ///< of a replay: its data set, with clocks and truth; may be empty
   std::filesystem::path out;     ///< the file
+  bool force = false;            ///< replace a file that is no MCAP file
   std::function<void(double)> on_progress;  ///< progress, 0..1, called regularly
 };
 

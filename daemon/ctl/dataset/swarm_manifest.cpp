@@ -138,6 +138,10 @@ Result<SwarmManifest> load_manifest(const std::filesystem::path& dir) {
     return fail(ErrorCode::kNotFound, file.string() + ": no such file; " + dir.string() +
                                           " is the output of a replay, not a data set");
   }
+  if (!text && std::filesystem::exists(dir / "crepesd.yaml", status)) {
+    return fail(ErrorCode::kNotFound, file.string() + ": no such file; " + dir.string() +
+                                          " is one robot's folder, the data set is above it");
+  }
   if (!text) return tl::unexpected(text.error());
   try {
     const YAML::Node root = YAML::Load(*text);

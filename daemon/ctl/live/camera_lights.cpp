@@ -81,7 +81,7 @@ Result<CameraLights> CameraLights::load(const fs::path& config, const std::strin
   if (chosen == lights.end())
     return fail(ErrorCode::kUsage, fmt::format("no camera \"{}\"; there is {}", camera, names));
   const auto index = static_cast<std::size_t>(chosen - lights.begin());
-  return CameraLights(config, std::move(lights), index);
+  return CameraLights(config, loaded->robot.id, std::move(lights), index);
 }
 
 Result<void> CameraLights::change(const CameraLight& light, std::optional<int> threshold) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drivers/camera/camera_light.hpp"
+#include "estimator/core/measurements.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
@@ -24,6 +25,8 @@ class CameraLights {
   [[nodiscard]] static Result<CameraLights> load(const std::filesystem::path& config,
                                                  const std::string& camera);
 
+  /// The robot that the configuration is of.
+  [[nodiscard]] RobotId robot() const { return robot_; }
   [[nodiscard]] const std::vector<NamedLight>& all() const { return lights_; }
   /// Of the camera to change.
   [[nodiscard]] const CameraLight& light() const { return lights_[chosen_].light; }
@@ -34,10 +37,12 @@ class CameraLights {
   [[nodiscard]] Result<void> change(const CameraLight& light, std::optional<int> threshold = {});
 
  private:
-  CameraLights(std::filesystem::path config, std::vector<NamedLight> lights, std::size_t chosen)
-      : config_(std::move(config)), lights_(std::move(lights)), chosen_(chosen) {}
+  CameraLights(std::filesystem::path config, RobotId robot, std::vector<NamedLight> lights,
+               std::size_t chosen)
+      : config_(std::move(config)), robot_(robot), lights_(std::move(lights)), chosen_(chosen) {}
 
   std::filesystem::path config_;
+  RobotId robot_;
   std::vector<NamedLight> lights_;
   std::size_t chosen_;
 };

@@ -14,6 +14,7 @@
 #include "daemon/ctl/live/full_status.hpp"
 #include "daemon/ctl/live/neighbor_view.hpp"
 #include "daemon/ctl/live/own_board.hpp"
+#include "daemon/ctl/live/screen_text.hpp"
 #include "daemon/ctl/live/walk_around.hpp"
 #include "drivers/base/monotonic_clock.hpp"
 
@@ -63,13 +64,19 @@ Result<RobotObservation> observe(const CheckOptions& options) {
 }
 
 std::string text_of(const std::vector<CheckFinding>& findings, const RobotObservation& seen) {
+  constexpr std::size_t kColumns = 100;
+  constexpr std::size_t kText = 9;     // where a finding's text begins
+  constexpr std::size_t kAdvice = 12;  // and an advice's
   std::string text;
   std::string about;
   for (const CheckFinding& finding : findings) {
     if (finding.about != about) text += finding.about + "\n";
     about = finding.about;
-    text += fmt::format("  {:<5}  {}\n", name_of(finding.verdict), finding.text);
-    if (!finding.advice.empty()) text += fmt::format("         -> {}\n", finding.advice);
+    const std::string said = wrapped(finding.text, kColumns, kText, kText);
+    text += fmt::format("  {:<5}  {}\n", name_of(finding.verdict), said);
+    if (finding.advice.empty()) continue;
+    text += fmt::format("{:>{}}{}\n", "-> ", kAdvice,
+                        wrapped(finding.advice, kColumns, kAdvice, kAdvice));
   }
   const std::string places = places_text(seen.poses);
   if (places.empty()) return text;

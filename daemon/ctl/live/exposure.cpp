@@ -83,6 +83,17 @@ Result<void> await_reload(const DaemonAddress& daemon, const Json& before) {
   return fail(ErrorCode::kIo, "the daemon did not reload; was --config its file?");
 }
 
+/// The files of another robot would be changed, and the daemon's light would not.
+Result<void> check_same_robot(const ExposureOptions& options, RobotId configured) {
+  return request_full_status(options.daemon).and_then([&](const FullStatus& full) -> Result<void> {
+    if (full.message.self == configured.value) return {};
+    return fail(ErrorCode::kConfig,
+                fmt::format("{} is robot {}'s, this daemon is robot {}: name its own file with "
+                            "--config, or ask the other robot (--address, --port)",
+                            options.config.string(), configured.value, full.message.self));
+  });
+}
+
 Result<void> apply(const ExposureOptions& options, CameraLights& lights, const CameraLight& light) {
   const Result<Json> before = config_status(options.daemon);
   if (!before) return tl::unexpected(before.error());
@@ -211,6 +222,7 @@ Result<void> exposure(const ExposureOptions& options) {
   constexpr Duration kLevels = 2200ms;  // until STATUS has a whole second of the new light
   Result<CameraLights> lights = CameraLights::load(options.config, options.camera);
   if (!lights) return tl::unexpected(lights.error());
+  if (auto same = check_same_robot(options, lights->robot()); !same) return same;
   const bool changes = options.exposure_us || options.gain;
   if (changes) {
     const CameraLight wanted{.exposure_us = options.exposure_us, .gain = options.gain};

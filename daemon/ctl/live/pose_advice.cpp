@@ -12,7 +12,8 @@ constexpr std::array<std::string_view, 14> kAdvice{
     "Check the mesh, net.interface, a firewall on UDP 47474, the key, and whether its crepesd "
     "runs and its IMU works: without gravity it sends nothing.",
     "Out of reach, or its battery or daemon has stopped.",
-    "Wait two seconds. If it stays, packets arrive in one direction only.",
+    "Wait two seconds. If it stays, ours do not arrive there, or our IMU gives no tilt: then we "
+    "send none.",
     "See the IMU among the sensors.",
     "Its IMU is silent or faulty: check there.",
     "Hold still for a second. Wrong axes in imu.T_body_imu also cause it.",

@@ -52,11 +52,10 @@ std::string note(const std::string& about, const std::string& text) {
 std::string config_text(const ConfigState& config) {
   std::string text;
   if (!config.fault.empty())
-    text += fmt::format("configuration: the last reload was refused: {}\n", config.fault);
+    text += note("configuration", "the last reload was refused: " + config.fault);
   if (!config.restart.empty()) {
-    text +=
-        fmt::format("configuration: changed, not in use before `systemctl restart crepesd`: {}\n",
-                    config.restart);
+    text += note("configuration",
+                 "changed, not in use before `systemctl restart crepesd`: " + config.restart);
   }
   return text;
 }
@@ -196,18 +195,17 @@ std::string thinned_of(const client::Status& status) {
   const std::uint64_t samples = total("left_out_samples");
   const std::uint64_t newest = total("left_out_of_datagrams");
   if (copies + samples + newest == 0) return "";
-  return fmt::format(
-      "thinned out: {} repeats of bearings and ranges, {} of inertial samples, {} times a "
-      "neighbor's newest\n",
-      copies, samples, newest);
+  return note("thinned out",
+              fmt::format("{} repeats of bearings and ranges, {} of inertial samples, {} times a "
+                          "neighbor's newest",
+                          copies, samples, newest));
 }
 
 /// Everything refused, lost or dropped; on a healthy robot this is short.
 std::string totals_of(const client::Status& status) {
   std::string text;
-  if (!status.network.empty()) text += fmt::format("network: {}\n", text_of(status.network));
-  if (!status.queues.empty())
-    text += fmt::format("dropped from queues: {}\n", text_of(status.queues));
+  if (!status.network.empty()) text += note("network", text_of(status.network));
+  if (!status.queues.empty()) text += note("dropped from queues", text_of(status.queues));
   return text;
 }
 

@@ -10,6 +10,7 @@
 #include "daemon/ctl/dataset/replay_pairs.hpp"
 #include "daemon/ctl/dataset/swarm_manifest.hpp"
 #include "daemon/ctl/dataset/truth.hpp"
+#include "daemon/ctl/replaceable.hpp"
 #include "daemon/ctl/replay/replay_output.hpp"
 #include "daemon/ctl/score/plot_pair.hpp"
 #include "daemon/ctl/score/plot_parts.hpp"
@@ -163,6 +164,10 @@ std::string page_of(const PlotOptions& options, const std::vector<PairData>& pai
 }  // namespace
 
 Result<fs::path> plot(const PlotOptions& options) {
+  fs::path out = options.out.empty() ? options.results / "plot.html" : options.out;
+  if (!options.force)
+    if (auto free = check_replaceable(out, "<!DOCTYPE html>"); !free)
+      return tl::unexpected(free.error());
   const std::vector<PairName> names = pairs_in(options.results);
   if (names.empty()) return tl::unexpected(no_pairs_in(options.results));
   std::optional<PlottedRecording> recording;
@@ -179,7 +184,6 @@ Result<fs::path> plot(const PlotOptions& options) {
       return tl::unexpected(done.error());
     pairs.push_back(std::move(*pair));
   }
-  fs::path out = options.out.empty() ? options.results / "plot.html" : options.out;
   const auto teams = load_teams(options, pairs);
   if (!teams) return tl::unexpected(teams.error());
   auto page = PartFile::create(out, page_of(options, pairs, *teams));

@@ -12,6 +12,7 @@ struct PlotOptions {
   std::filesystem::path results;  ///< the output folder of replay
   std::filesystem::path swarm;    ///< the data set, for errors against its truth; may be empty
   std::filesystem::path out;      ///< the page; empty: plot.html in `results`
+  bool force = false;             ///< replace a file that is no page
 };
 
 /// Writes one HTML page that needs no other file. For every ordered pair it shows errors with

@@ -62,15 +62,18 @@ std::vector<CameraDevice> find_cameras(const DevicesOptions& options) {
 }
 
 std::string text_of(const CameraDevice& camera) {
-  return fmt::format("{}\n    cameras: driver: {}, device: \"{}\"\n", camera.found.description,
-                     camera.driver, camera.found.device);
+  return fmt::format("{}\n    cameras: [{{name: cam0, driver: {}, device: \"{}\"}}]\n",
+                     camera.found.description, camera.driver, camera.found.device);
 }
 
 std::string text_of(const SerialDevice& device) {
   if (!device.fault.empty()) return fmt::format("{}\n    {}\n", device.port, device.fault);
-  if (!device.speaks) return device.port + "\n    says nothing that is known\n";
+  if (!device.speaks) {
+    return fmt::format("{}\n    says nothing that is known at {}, {} or {} baud\n", device.port,
+                       kRates[0], kRates[1], kRates[2]);
+  }
   const std::string section = is_of_uwb(*device.speaks) ? "uwb" : "imu";
-  return fmt::format("{0}\n    speaks {1}\n    {2}: port: \"{0}\", baud: {3}\n", device.port,
+  return fmt::format("{0}\n    speaks {1}\n    {2}: {{port: \"{0}\", baud: {3}}}\n", device.port,
                      name_of(*device.speaks), section, device.baud);
 }
 
@@ -78,7 +81,7 @@ std::string text_of(const FoundIioImu& imu) {
   const auto& [gyro, accelerometer] = imu.devices;
   const std::string names =
       gyro.id == accelerometer.id ? gyro.title() : gyro.title() + ", " + accelerometer.title();
-  return fmt::format("{}\n    imu: protocol: iio, port: \"{}\"\n", names, imu.port);
+  return fmt::format("{}\n    imu: {{protocol: iio, port: \"{}\"}}\n", names, imu.port);
 }
 
 Json json_of(const FoundIioImu& imu) {

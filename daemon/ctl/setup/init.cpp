@@ -157,7 +157,26 @@ class Interview {
                                                questions_.has_answers() ? "1" : "", id_fault)
                                          : given;
     plan.id = RobotId{static_cast<std::uint16_t>(number_in(id))};
-    if (plan.members.empty()) plan.members = new_members(plan.id);
+    if (plan.members.empty()) {
+      plan.members = new_members(plan.id);
+    } else {
+      check_arms(plan, file);
+    }
+  }
+
+  /// The file of the members stays as it is, so it must have what the options say.
+  void check_arms(const RobotPlan& plan, const fs::path& file) const {
+    const auto own = std::ranges::find(plan.members, plan.id, &MemberConfig::id);
+    const auto check = [&](const std::optional<std::vector<double>>& given,
+                           const Eigen::Vector3d& kept, const char* option, const char* key) {
+      if (!given || vector_of(*given) == kept) return;
+      throw Unanswered{{ErrorCode::kUsage,
+                        fmt::format("{}: {} is there and stays as it is: write {} of robot {} into "
+                                    "it",
+                                    option, file.string(), key, plan.id.value)}};
+    };
+    check(options_.p_body_led, own->p_body_led, "--led", "p_body_led");
+    check(options_.p_body_uwb, own->p_body_uwb, "--uwb", "p_body_uwb");
   }
 
   /// Robots 1 to n, with the shortest patterns that a camera can distinguish.

@@ -184,6 +184,7 @@ class Inspection {
     const auto& [pictures, frames, imu] = recording;
     first_ = pictures.empty() ? frames.front().stamp : pictures.front().stamp;
     total_ = pictures.size() + frames.size();
+    summary_.is_of_spots = pictures.empty();
     for (const RecordedPicture& picture : pictures)
       if (auto seen = look_at(picture); !seen) return tl::unexpected(seen.error());
     for (const SpotFrame& frame : frames) add(inspector_.inspect(frame));
@@ -252,6 +253,7 @@ Result<SpotsSummary> inspect_spots(const SpotsOptions& options) {
   if (!summary) return summary;
   if (auto published = album->publish(); !published) return tl::unexpected(published.error());
   summary->is_automatic = config->vision.threshold == 0;
+  summary->slot_ms = config->swarm.slot_ms;
   if (options.on_text)
     options.on_text(options.json ? summary_json(*summary) : summary_text(*summary));
   return summary;

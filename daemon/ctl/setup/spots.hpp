@@ -70,6 +70,8 @@ struct RobotSummary {
 /// What was found in all pictures.
 struct SpotsSummary {
   std::uint64_t pictures = 0;
+  bool is_of_spots = false;  ///< of spots.csv, which says nothing of threshold and exposure
+  double slot_ms = 10.0;     ///< of the members' patterns
   std::uint64_t refused = 0;
   double duration_s = 0.0;
   bool is_automatic = true;  ///< the threshold
@@ -91,6 +93,9 @@ struct SpotsSummary {
 
 /// What to change if the exposure is unusable; empty otherwise.
 [[nodiscard]] std::string exposure_advice(const SpotsSummary& summary);
+
+/// Why nobody may have been recognized; empty otherwise.
+[[nodiscard]] std::string identity_advice(const SpotsSummary& summary);
 
 /// One line for the drawing.
 [[nodiscard]] std::string picture_caption(const PictureFindings& findings);

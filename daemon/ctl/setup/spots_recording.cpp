@@ -25,6 +25,10 @@ Result<SpotsRecording> load_spots_recording(const SpotsOptions& options, std::si
   SpotsRecording recording;
   DatasetFaults faults;
   std::error_code status;
+  if (fs::exists(options.source / "swarm.yaml", status)) {
+    return fail(ErrorCode::kUsage,
+                options.source.string() + ": holds a swarm; name the folder of one robot");
+  }
   const fs::path own = options.source / fmt::format("cam{}", camera);
   const bool is_robot = fs::is_directory(own, status);
   if (is_robot && !fs::exists(own / "data.csv", status) && fs::exists(own / "spots.csv", status)) {

@@ -45,6 +45,20 @@ std::string to_text(const Rejected& rejected) {
                      rejected.hot, rejected.huge, rejected.faint, rejected.surplus, rejected.cut);
 }
 
+std::string threshold_line(const SpotsSummary& summary) {
+  return fmt::format("threshold  {} ({}), background {}, at most {} % saturated\n",
+                     range_text(summary.threshold),
+                     summary.is_automatic ? "automatic" : "vision.threshold",
+                     range_text(summary.background), fixed(100.0 * summary.most_saturated, 1));
+}
+
+/// What to change, on a line each.
+std::vector<std::string> all_advice_of(const SpotsSummary& summary) {
+  std::vector<std::string> all{exposure_advice(summary), identity_advice(summary)};
+  std::erase(all, "");
+  return all;
+}
+
 double mean_spots(const SpotsSummary& summary) {
   return static_cast<double>(summary.all_spots) / static_cast<double>(summary.pictures);
 }
@@ -52,6 +66,7 @@ double mean_spots(const SpotsSummary& summary) {
 }  // namespace
 
 std::string exposure_advice(const SpotsSummary& summary) {
+  if (summary.is_of_spots) return "";
   const std::string because = fmt::format(
       "background {}, threshold {}, at most {} % saturated", range_text(summary.background),
       range_text(summary.threshold), fixed(100.0 * summary.most_saturated, 1));
@@ -72,6 +87,21 @@ std::string exposure_advice(const SpotsSummary& summary) {
   return "";
 }
 
+std::string identity_advice(const SpotsSummary& summary) {
+  constexpr double kFramesOfASlot = 2.0;
+  constexpr double kWithin = 0.9;
+  if (!summary.robots.empty() || summary.pictures < 2) return "";
+  const double rate_hz = static_cast<double>(summary.pictures - 1) / summary.duration_s;
+  const double least_hz = kFramesOfASlot / (1e-3 * summary.slot_ms);
+  if (rate_hz < kWithin * least_hz) {
+    return fmt::format("{} pictures a second are too few to read slots of {} ms: {} or more",
+                       fixed(rate_hz, 1), summary.slot_ms, fixed(least_hz, 0));
+  }
+  return summary.all_spots == 0
+             ? ""
+             : "no light blinks as a member: compare the boards' patterns with swarm.members";
+}
+
 std::string picture_caption(const PictureFindings& findings) {
   const Detection& found = findings.detection;
   return fmt::format("{} spots, threshold {}, exposure {}", found.spots.size(), found.threshold,
@@ -90,16 +120,18 @@ std::string picture_text(const PictureFindings& findings) {
 
 std::string picture_json(const PictureFindings& findings) {
   const Detection& found = findings.detection;
-  Json json{{"class", "PICTURE"},
-            {"file", findings.file.string()},
-            {"t_ns", std::to_string(findings.stamp.time_since_epoch().count())},
-            {"background", found.background},
-            {"threshold", found.threshold},
-            {"exposure", to_text(found.exposure)},
-            {"saturated_share", found.saturated_share},
-            {"rejected", to_json(found.rejected)},
-            {"spots", Json::array()},
-            {"robots", Json::array()}};
+  Json json{{"class", "PICTURE"}};
+  if (!findings.file.empty()) json["file"] = findings.file.string();
+  json["t_ns"] = std::to_string(findings.stamp.time_since_epoch().count());
+  if (!findings.file.empty()) {  // else it is of spots.csv
+    json["background"] = found.background;
+    json["threshold"] = found.threshold;
+    json["exposure"] = to_text(found.exposure);
+    json["saturated_share"] = found.saturated_share;
+    json["rejected"] = to_json(found.rejected);
+  }
+  json["spots"] = Json::array();
+  json["robots"] = Json::array();
   if (!found.failure.empty()) json["failure"] = std::string(found.failure);
   for (const Spot& spot : found.spots) {
     json["spots"].push_back({{"u", spot.u_px},
@@ -120,15 +152,14 @@ std::string summary_text(const SpotsSummary& summary) {
   std::string text = fmt::format("{} {}", all, all == 1 ? "picture" : "pictures");
   if (all > 1) text += fmt::format(", {} s", fixed(summary.duration_s, 3));
   if (summary.refused > 0) text += fmt::format("; {} refused", summary.refused);
-  text += fmt::format("\nthreshold  {} ({}), background {}, at most {} % saturated\n",
-                      range_text(summary.threshold),
-                      summary.is_automatic ? "automatic" : "vision.threshold",
-                      range_text(summary.background), fixed(100.0 * summary.most_saturated, 1));
+  text += summary.is_of_spots ? "; of spots.csv\n" : "\n" + threshold_line(summary);
   text += fmt::format("spots      {} a picture, mean {}\n", range_text(summary.spots),
                       fixed(mean_spots(summary), 2));
-  text += fmt::format("left out   {}\n", to_text(summary.rejected));
-  text += fmt::format("exposure   good {}, dark {}, bright {}\n", share_text(summary.good, all),
-                      share_text(summary.dark, all), share_text(summary.bright, all));
+  if (!summary.is_of_spots) {
+    text += fmt::format("left out   {}\n", to_text(summary.rejected));
+    text += fmt::format("exposure   good {}, dark {}, bright {}\n", share_text(summary.good, all),
+                        share_text(summary.dark, all), share_text(summary.bright, all));
+  }
   if (summary.failures > 0)
     text += fmt::format("failures   the detector failed on {} pictures\n", summary.failures);
   for (const auto& [id, robot] : summary.robots) {
@@ -136,34 +167,40 @@ std::string summary_text(const SpotsSummary& summary) {
                         robot.name, share_text(robot.pictures, all), fixed(robot.first_s, 3));
   }
   if (summary.robots.empty() && all > 1) text += "robots     none was recognized\n";
-  const std::string advice = exposure_advice(summary);
-  return advice.empty() ? text : fmt::format("{}ADVICE     {}\n", text, advice);
+  for (const std::string& advice : all_advice_of(summary))
+    text += fmt::format("ADVICE     {}\n", advice);
+  return text;
 }
 
 std::string summary_json(const SpotsSummary& summary) {
   const auto range = [](const auto& extent) { return Json::array({extent.min, extent.max}); };
-  Json json{
-      {"class", "SUMMARY"},
-      {"pictures", summary.pictures},
-      {"refused", summary.refused},
-      {"duration_s", summary.duration_s},
-      {"background", range(summary.background)},
-      {"threshold", range(summary.threshold)},
-      {"automatic", summary.is_automatic},
-      {"spots", range(summary.spots)},
-      {"spots_mean", mean_spots(summary)},
-      {"saturated_share", summary.most_saturated},
-      {"rejected", to_json(summary.rejected)},
-      {"exposure", {{"good", summary.good}, {"dark", summary.dark}, {"bright", summary.bright}}},
-      {"failures", summary.failures},
-      {"robots", Json::array()}};
+  Json json{{"class", "SUMMARY"},
+            {"pictures", summary.pictures},
+            {"refused", summary.refused},
+            {"duration_s", summary.duration_s}};
+  if (!summary.is_of_spots) {
+    json["background"] = range(summary.background);
+    json["threshold"] = range(summary.threshold);
+    json["automatic"] = summary.is_automatic;
+  }
+  json["spots"] = range(summary.spots);
+  json["spots_mean"] = mean_spots(summary);
+  if (!summary.is_of_spots) {
+    json["saturated_share"] = summary.most_saturated;
+    json["rejected"] = to_json(summary.rejected);
+    json["exposure"] = {{"good", summary.good}, {"dark", summary.dark}, {"bright", summary.bright}};
+    json["failures"] = summary.failures;
+  }
+  json["robots"] = Json::array();
   for (const auto& [id, robot] : summary.robots) {
     json["robots"].push_back({{"id", id.value},
                               {"name", robot.name},
                               {"pictures", robot.pictures},
                               {"first_s", robot.first_s}});
   }
-  const std::string advice = exposure_advice(summary);
+  std::string advice;
+  for (const std::string& one : all_advice_of(summary))
+    advice += (advice.empty() ? "" : "; ") + one;
   if (!advice.empty()) json["advice"] = advice;
   return json_line(json);
 }

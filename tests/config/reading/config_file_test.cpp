@@ -90,8 +90,10 @@ TEST(ConfigFile, RefusesNumbersThatAreNotFinite) {
 
 TEST(ConfigFile, SaysTheBoundsOfAValueOutsideThem) {
   EXPECT_EQ(faults_of(replaced("0.05", "7")), "f:11: uwb.noise_m: 7 is outside [0.001, 2]");
-  EXPECT_EQ(faults_of(replaced("{id: 1}", "{id: 70000}")),
-            "f:1: robot.id: 70000 is outside [0, 65535]");
+  for (const std::string id : {"70000", "65535", "0", "-1"}) {
+    EXPECT_EQ(faults_of(replaced("{id: 1}", "{id: " + id + "}")),
+              "f:1: robot.id: " + id + " is outside [1, 65534]");
+  }
 }
 
 TEST(ConfigFile, ListsTheChoicesOfAnUnknownOne) {

@@ -44,5 +44,12 @@ TEST(TextTable, AWordThatIsTooLongStaysWhole) {
             "a  b\nc  " + word + "\n   d\n");
 }
 
+TEST(Fixed, GivesZeroNoSign) {
+  EXPECT_EQ(fixed(-0.0, 1), "0.0");
+  EXPECT_EQ(fixed(-0.04, 1), "0.0");
+  EXPECT_EQ(fixed(-0.06, 1), "-0.1");
+  EXPECT_EQ(fixed(-10.0, 0), "-10");
+}
+
 }  // namespace
 }  // namespace crepes::text_table_test

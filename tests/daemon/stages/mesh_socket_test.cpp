@@ -136,5 +136,35 @@ TEST(KeyMismatchMonitor, NamesAnotherVersion) {
   EXPECT_NE(monitor.fault().find("version"), std::string::npos);
 }
 
+TEST(KeyMismatchMonitor, LogsWhenAFaultBeginsAndWhenDatagramsAreBelievedAgain) {
+  testing::internal::CaptureStderr();
+  {
+    const LogSession log(LogLevel::kInfo);
+    PeerLink other(RobotId{2}, {RobotId{1}});
+    PeerLink link(RobotId{1}, {RobotId{2}});
+    Report report;
+    report.sender = RobotId{2};
+    KeyMismatchMonitor monitor;
+    const auto hear = [&](int of_another_version) {
+      std::vector<std::uint8_t> datagram = other.compose(report, Timestamp{}, {}, {});
+      datagram.at(3) = static_cast<std::uint8_t>(datagram.at(3) + of_another_version);
+      (void)link.receive(datagram, Timestamp{}, {}, Endpoint::ipv4({10, 0, 0, 2}, 47474));
+      monitor.update(link);
+    };
+
+    hear(1);
+    monitor.update(link);  // silence ends no fault
+    hear(1);
+    hear(0);
+    EXPECT_EQ(monitor.fault(), "");
+  }
+  const std::string log = testing::internal::GetCapturedStderr();
+
+  const std::size_t begin = log.find("mesh: no datagram that comes is of this version");
+  ASSERT_NE(begin, std::string::npos) << log;
+  EXPECT_EQ(log.find("mesh: no datagram", begin + 1), std::string::npos) << log;
+  EXPECT_NE(log.find("mesh: works again", begin), std::string::npos) << log;
+}
+
 }  // namespace
 }  // namespace crepes::mesh_socket_test

@@ -34,7 +34,12 @@ int main(int argc, char** argv) {
   using namespace std::chrono_literals;
   crepes::client::Address address;
   if (argc > 1) address.address = argv[1];
-  address.port = static_cast<std::uint16_t>(number(argc, argv, 2, address.port));
+  const long port = number(argc, argv, 2, address.port);
+  if (port < 1 || port > 65535) {
+    std::cerr << argv[2] << " is no port, 1 to 65535\n";
+    return 2;
+  }
+  address.port = static_cast<std::uint16_t>(port);
   long left = number(argc, argv, 3, -1);
 
   // The end of the connection ends the subscription, which otherwise lasts for its lease.
@@ -47,7 +52,11 @@ int main(int argc, char** argv) {
     const auto answer = daemon->receive(200ms);
     if (!answer) {
       // A robot would fly on and wait: the library asks again by itself.
-      if (daemon->silent_for() > 3s) fault = "no answer " + daemon->send_fault();
+      if (daemon->silent_for() > 3s) {
+        const std::string why = daemon->send_fault();
+        fault = "no answer from " + address.address + " port " + std::to_string(address.port) +
+                (why.empty() ? "" : ": " + why);
+      }
     } else if (const auto* refusal = std::get_if<crepes::client::Error>(&answer->message)) {
       fault = refusal->message;
     } else if (const auto* pose = std::get_if<crepes::client::Pose>(&answer->message)) {

@@ -5,6 +5,10 @@ import dgram from "node:dgram";
 import net from "node:net";
 
 const [address = "127.0.0.1", port = "47475", count = "0"] = process.argv.slice(2);
+if (!(Number(port) >= 1 && Number(port) <= 65535)) {
+  console.error(`${port} is no port, 1 to 65535`);
+  process.exit(2);
+}
 const line = dgram.createSocket(net.isIPv6(address) ? "udp6" : "udp4");
 let cookie = { pad: " ".repeat(64) }; // a daemon elsewhere answers no shorter request
 let left = Number(count);

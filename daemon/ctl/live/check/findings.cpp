@@ -75,6 +75,7 @@ MeasurementFlow flow_of(const RobotObservation& seen, const client::Status::Neig
   for (const auto& [verdict, value] : after->second) {
     const std::uint64_t more = growth(is_new ? none : before->second, after->second, verdict);
     flow.all += more;
+    if (verdict == "fused") flow.fused += more;
     if (verdict == "gated") flow.gated += more;
   }
   return flow;

@@ -75,6 +75,7 @@ using StatusTotals = client::Status::Totals;
 /// How many measurements of a kind came, and how many of them were refused as unlikely.
 struct MeasurementFlow {
   std::uint64_t all = 0;
+  std::uint64_t fused = 0;
   std::uint64_t gated = 0;
 };
 

@@ -69,7 +69,7 @@ void check_clocks(const RobotObservation& seen, CheckSection section) {
         std::ranges::find(seen.after.clocks, neighbor.peer, &client::Status::Clock::peer);
     if (clock == seen.after.clocks.end()) {
       section.fault(name + ": clock offset unknown",
-                    "wait two seconds; if it stays so, packets arrive in one direction only");
+                    std::string(advice_for(NoPoseReason::kNoClockOffset)));
       continue;
     }
     if (!clock->sigma_s || !clock->skew_ppm) {

@@ -54,8 +54,9 @@ void check_agreement(const RobotObservation& seen, const client::Status::Neighbo
            "something between the antennas?"}};
   for (const Kind& kind : kKinds) {
     const MeasurementFlow flow = flow_of(seen, neighbor, kind.key);
-    if (flow.all < kEnough) continue;
-    const double share = static_cast<double>(flow.gated) / static_cast<double>(flow.all);
+    const std::uint64_t judged = flow.fused + flow.gated;  // all others met no estimate
+    if (judged < kEnough) continue;
+    const double share = static_cast<double>(flow.gated) / static_cast<double>(judged);
     const std::string text = fmt::format(
         "{}: {} % contradict the estimate",
         fmt::format(fmt::runtime(kind.words), name_of_neighbor(neighbor)), fixed(100.0 * share, 1));

@@ -27,17 +27,18 @@ namespace fs = std::filesystem;
 /// Robots at rest in a triangle of 3, 4 and 5 m, whose modules have antenna delays.
 class CalibrateRange : public test::Calibrate {
  protected:
-  void write_swarm(int robots) const {
+  /// The first robot may turn all the time.
+  void write_swarm(int robots, double turn_radps = 0.0) const {
     std::ostringstream swarm;
     swarm << "scenario: rest\nseed: 1\nduration_s: 21\n"
              "network: {latency_ms: 3.0, jitter_ms: 2.0, loss: 0.0, seed: 7}\nrobots:\n";
     for (int id = 1; id <= robots; ++id) {
       swarm << "- {id: " << id << ", name: r" << id << ", dir: r" << id
             << ", clock: {offset_s: 0.0, skew_ppm: 0.0}}\n";
-      const ImuSample rest{.stamp = Timestamp{},
-                           .gyro_radps = Eigen::Vector3d::Zero(),
-                           .accel_mps2 = {0.0, 0.0, 9.81}};
-      write_robot(id, {rest});
+      const ImuSample sample{.stamp = Timestamp{},
+                             .gyro_radps = {0.0, 0.0, id == 1 ? turn_radps : 0.0},
+                             .accel_mps2 = {0.0, 0.0, 9.81}};
+      write_robot(id, {sample});
       RobotFolder folder(robot_dir(id));
       ASSERT_TRUE(folder.append("uwb0", ranges_of(id, robots)));
       std::string no_spots;
@@ -102,6 +103,18 @@ TEST_F(CalibrateRange, WritesTheAntennaDelayOfEveryModule) {
     EXPECT_NEAR(config.swarm.members[i].range_delay_m, kDelays.at(i + 1), 0.01) << i;
   EXPECT_LT(config.uwb.noise.bias_sigma_m, 0.1);
   EXPECT_EQ(config.swarm.members[1].name, "r2");
+}
+
+TEST_F(CalibrateRange, NamesARobotThatDidNotRestAtItsTapedDistance) {
+  write_swarm(2, 0.5);
+  const auto moved = run();
+  write_swarm(2, 0.05);
+  const auto resting = run();
+
+  ASSERT_TRUE(moved && resting);
+  EXPECT_NE(moved->text.find("warning: turned: r1 in segment 1 (29 deg/s RMS)"), std::string::npos)
+      << moved->text;
+  EXPECT_EQ(resting->text.find("warning: turned"), std::string::npos) << resting->text;
 }
 
 TEST_F(CalibrateRange, GivesEachOfTwoRobotsHalfOfTheirBias) {

@@ -60,7 +60,7 @@ TEST(Status, NamesARefusedReloadAndWhatWaitsForARestart) {
 
   ASSERT_TRUE(text) << text.error().message;
   for (const char* part :
-       {"reload was refused: r1.yaml:20: uwb.noise: unknown key; r1.yaml:21: uwb.bias: unknown key",
+       {"reload was refused: r1.yaml:20: uwb.noise: unknown key; r1.yaml:21:\n  uwb.bias: unknown",
         "`systemctl restart crepesd`: cameras, imu"})
     EXPECT_NE(text->find(part), std::string::npos) << part << "\n" << *text;
 }

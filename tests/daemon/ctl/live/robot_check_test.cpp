@@ -226,6 +226,17 @@ TEST(RobotCheck, NoticesARobotThatWasNeverHeard) {
             "mesh fault: r2: never heard");
 }
 
+TEST(RobotCheck, SaysNothingOfMeasurementsThatNoEstimateWasThereFor) {
+  RobotObservation seen = healthy();
+  for (auto* status : {&seen.before, &seen.after}) {
+    for (auto& [kind, verdicts] : status->neighbors[0].measurements)
+      verdicts = {{"no_state", status == &seen.before ? 100U : 400U}};
+  }
+
+  for (const CheckFinding& finding : check_robot(seen))
+    EXPECT_EQ(finding.text.find("contradict the estimate"), std::string::npos) << finding.text;
+}
+
 TEST(RobotCheck, HoldsGravityAndTheMeasurementsAgainstEachOther) {
   RobotObservation seen = healthy();
   sensor(seen, "imu").counts["force_mmps2"] = 9500;

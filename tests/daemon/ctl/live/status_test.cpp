@@ -39,8 +39,14 @@ TEST(Status, WrapsFaultsOfSensorsBelowTheTable) {
   status.faults = {
       "its camera is turned by 3.10 +- 0.20 deg against its calibration; calibrate it "
       "again, and measure where it is mounted"};
+  for (const char* name : {"held_clock_unknown", "poses_sent", "received", "received_bytes",
+                           "refused_seal_missing", "requests", "sent", "sent_bytes"})
+    status.network[name] = 100'000;
 
-  const std::string text = status_text(status, {});
+  const std::string text = status_text(
+      status, {.fault = "/etc/crepes/crepesd.d/50-tuning.yaml:12: vision.bearing_sigma: "
+                        "unknown key; did you mean bearing_sigma_px?",
+               .restart = ""});
 
   EXPECT_NE(text.find("uwb: /dev/serial"), std::string::npos) << text;
   std::istringstream lines(text);

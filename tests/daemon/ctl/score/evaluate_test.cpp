@@ -353,12 +353,16 @@ TEST_F(Evaluate, SaysWhichDirectoryIsNotWhatItShouldBe) {
   std::swap(swapped.results, swapped.swarm);
   EvaluateOptions same = options();
   same.results = same.swarm;
+  EvaluateOptions robot = options();
+  robot.swarm /= "r1";
   EvaluateOptions nowhere = options();
   nowhere.results /= "nowhere";
 
   EXPECT_NE(message(swapped).find("out is the output of a replay, not a data set"),
             std::string::npos);
   EXPECT_NE(message(same).find("it is a data set"), std::string::npos);
+  EXPECT_NE(message(robot).find("r1 is one robot's folder, the data set is above it"),
+            std::string::npos);
   EXPECT_NE(message(nowhere).find("nowhere: no <observer>/<neighbor>.csv of a replay: there is no "
                                   "such directory"),
             std::string::npos);

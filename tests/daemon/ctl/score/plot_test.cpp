@@ -198,6 +198,22 @@ TEST_F(Plot, ShowsUncertaintyAloneWithoutTruthAndRecords) {
   EXPECT_EQ(html.find("Innovations"), std::string::npos);
 }
 
+TEST_F(Plot, ReplacesAnEarlierPageAndNoOtherFile) {
+  write_results(ReplayOutput::Detail::kPoses);
+  const std::filesystem::path report = results() / "report.json";
+  swarm_.write("out/report.json", "{}");
+
+  const auto refused = plot({.results = results(), .swarm = {}, .out = report});
+  const auto page = plot({.results = results(), .swarm = {}, .out = {}});
+  const auto again = plot({.results = results(), .swarm = {}, .out = {}});
+
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("no earlier result of this command"), std::string::npos);
+  EXPECT_EQ(swarm_.read("out/report.json"), "{}");
+  EXPECT_TRUE(page && again);
+  EXPECT_TRUE(plot({.results = results(), .swarm = {}, .out = report, .force = true}));
+}
+
 TEST_F(Plot, SaysWhatIsMissing) {
   const auto message = [&](const std::filesystem::path& swarm) {
     const auto file = plot({.results = results(), .swarm = swarm, .out = {}});

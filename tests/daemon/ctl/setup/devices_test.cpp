@@ -67,7 +67,8 @@ TEST_F(Devices, AreReportedInWordsToo) {
   const auto text = list_devices(options_);
 
   ASSERT_TRUE(text);
-  EXPECT_NE(text->find("cameras: driver: aravis, device: \"Aravis-Fake-GV01\""), std::string::npos)
+  EXPECT_NE(text->find("cameras: [{name: cam0, driver: aravis, device: \"Aravis-Fake-GV01\"}]"),
+            std::string::npos)
       << *text;
   EXPECT_NE(text->find("no serial port"), std::string::npos) << *text;
 }
@@ -90,7 +91,7 @@ TEST_F(Devices, OfTheKernelAreFoundToo) {
   const auto reported = nlohmann::json::parse(list_devices(options_).value());
 
   EXPECT_NE(text.find("iio:device0 (icm42688-gyro), iio:device1 (icm42688-accel)\n"
-                      "    imu: protocol: iio, port: \"icm42688\"\n"),
+                      "    imu: {protocol: iio, port: \"icm42688\"}\n"),
             std::string::npos)
       << text;
   EXPECT_EQ(reported["kernel_imus"][0].value("port", ""), "icm42688") << reported;

@@ -188,6 +188,29 @@ TEST_F(Init, KeepsTheMembersThatAnotherRobotBroughtAlong) {
   EXPECT_EQ(load().robot.id, RobotId{3});
 }
 
+TEST_F(Init, RefusesALeverArmThatTheMembersOfAnotherRobotDoNotHave) {
+  options_.id = 1;
+  options_.robots = 2;
+  options_.p_body_led = {0.05, 0.0, 0.01};
+  ASSERT_TRUE(run());
+  for (const char* name : {"crepesd.yaml", "crepesd.d/10-devices.yaml", "camchain-imucam.yaml"})
+    fs::remove(options_.dir / name);
+  options_.robots.reset();
+  options_.id = 2;
+  options_.p_body_uwb = {0.0, 0.0, 0.1};
+  const auto another = run();
+  options_.p_body_uwb.reset();
+
+  const auto same = run();
+
+  ASSERT_FALSE(another);
+  EXPECT_EQ(another.error().code, ErrorCode::kUsage);
+  EXPECT_EQ(another.error().message, "--uwb: " + (options_.dir / "swarm.yaml").string() +
+                                         " is there and stays as it is: write p_body_uwb of robot "
+                                         "2 into it");
+  EXPECT_TRUE(same) << same.error().message;
+}
+
 TEST_F(Init, AsksForWhatIsNotGivenUntilTheAnswerIsGood) {
   options_.interface.reset();
 

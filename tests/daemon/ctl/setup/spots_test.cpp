@@ -172,6 +172,37 @@ TEST_F(Pictures, ThatWereNotRecordedAreReplacedBySpots) {
   ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_EQ(summary->pictures, 100U);
   EXPECT_EQ(summary->robots.count(RobotId{2}), 1U);
+  // Nobody knows what was behind these spots.
+  EXPECT_EQ(text_.find("threshold"), std::string::npos) << text_;
+  EXPECT_EQ(text_.find("exposure"), std::string::npos) << text_;
+  EXPECT_NE(text_.find("of spots.csv"), std::string::npos) << text_;
+  EXPECT_FALSE(Json::parse(summary_json(*summary)).contains("background"));
+}
+
+TEST_F(Pictures, InWhichNobodyIsRecognizedComeWithTheReason) {
+  for (int i = 0; i < 20; ++i) {
+    save("slow/" + std::to_string(1'000'000'000LL + i * 50'000'000LL) + ".png", picture(i, true));
+    save("steady/" + std::to_string(1'000'000'000LL + i * 5'000'000LL) + ".png", picture(i, true));
+  }
+
+  const auto slow = look_at("slow");
+  const auto steady = look_at("steady");
+
+  ASSERT_TRUE(slow && steady);
+  EXPECT_EQ(identity_advice(*slow),
+            "20.0 pictures a second are too few to read slots of 10 ms: 200 or more");
+  EXPECT_NE(identity_advice(*steady).find("swarm.members"), std::string::npos);
+  EXPECT_NE(text_.find("ADVICE     no light blinks as a member"), std::string::npos) << text_;
+}
+
+TEST_F(Pictures, OfASwarmAreRefusedBecauseARobotIsWanted) {
+  const auto summary = look_at(".");
+
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kUsage);
+  EXPECT_NE(summary.error().message.find("holds a swarm; name the folder of one robot"),
+            std::string::npos)
+      << summary.error().message;
 }
 
 TEST_F(Pictures, AreReportedInJson) {

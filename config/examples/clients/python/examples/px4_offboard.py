@@ -22,6 +22,7 @@ SETPOINTS_HZ = 20.0  # PX4 leaves OFFBOARD below 2 a second
 MAX_SIGMA_M = 0.5  # a pose that is less certain than this, in any direction, steers nobody
 MAX_TURN_RATE = 0.8  # rad/s
 LOCAL_NED = 1  # MAV_FRAME_LOCAL_NED
+WANTED = ["LOCAL_POSITION_NED", "ATTITUDE"]  # velocity and yaw of the autopilot
 # POSITION_TARGET_TYPEMASK: ignore position (bits 0 to 2), acceleration (6 to 8) and yaw (10).
 VELOCITY_AND_YAW_RATE = 0b101_1100_0111
 
@@ -47,9 +48,14 @@ def ned_from_level(v, yaw):
 
 
 def is_good(pose: Pose) -> bool:
-    """Whether the covariance allows to steer by this pose."""
+    """Whether the covariance allows to steer by this pose: limit I - P is positive definite, by its leading minors."""
     covariance = pose.covariance_matrix()
-    return covariance is not None and max(covariance[axis][axis] for axis in range(3)) < MAX_SIGMA_M**2
+    if covariance is None:
+        return False
+    a, b, c = ([MAX_SIGMA_M**2 * (row == column) - covariance[row][column] for column in range(3)] for row in range(3))
+    minor = a[0] * b[1] - a[1] * b[0]
+    determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    return a[0] > 0.0 and minor > 0.0 and determinant > 0.0
 
 
 class Setpoints:
@@ -83,17 +89,21 @@ class Autopilot:
     def __init__(self, link):
         self.link = link
         self.vehicle = Vehicle()
-        self.heard = None  # when velocity and yaw came last
+        self.heard = dict.fromkeys(WANTED, -math.inf)  # when each came last
         self.begin = time.monotonic()
 
     def read(self):
         """All that waits."""
-        while (message := self.link.recv_match(type=["LOCAL_POSITION_NED", "ATTITUDE"], blocking=False)) is not None:
+        while (message := self.link.recv_match(type=WANTED, blocking=False)) is not None:
             if message.get_type() == "ATTITUDE":
                 self.vehicle.yaw = message.yaw
             else:
                 self.vehicle.velocity_ned = (message.vx, message.vy, message.vz)
-                self.heard = time.monotonic()
+            self.heard[message.get_type()] = time.monotonic()
+
+    def missing(self, now):
+        """What did not come for half a second. Without the yaw a setpoint would point anywhere."""
+        return [kind for kind in WANTED if now - self.heard[kind] > MAX_AGE_S]
 
     def send(self, velocity_ned, yaw_rate):
         since_begin_ms = int((time.monotonic() - self.begin) * 1e3)
@@ -104,7 +114,7 @@ class Autopilot:
 
 def fly(autopilot: Autopilot, daemon: Connection, setpoints: Setpoints, clock=time.monotonic):
     """Never ends. An autopilot that is silent gets no setpoints, so it leaves OFFBOARD by itself."""
-    due = clock()
+    due, missing = clock(), None
     while True:
         message = daemon.receive(max(0.0, due - clock()))
         now = clock()
@@ -114,7 +124,10 @@ def fly(autopilot: Autopilot, daemon: Connection, setpoints: Setpoints, clock=ti
             continue
         due = now + 1.0 / SETPOINTS_HZ
         autopilot.read()
-        if autopilot.heard is not None and now - autopilot.heard < MAX_AGE_S:
+        before, missing = missing, autopilot.missing(now)
+        if missing != before:
+            print(f"no setpoints: no {' and no '.join(missing)} from the autopilot" if missing else "sending setpoints", flush=True)
+        if not missing:
             autopilot.send(*setpoints.at(now, autopilot.vehicle))
 
 
