@@ -220,11 +220,11 @@ TEST(Neighbor, LocatedInAMirrorIsFoundWithinASecondOfBeingSeenItself) {
 TEST(Neighbor, IsNotPublishedWhileAllThatOneOfTheTwoSeesContradictsIt) {
   View view;
   view.run_until(Timestamp{3s});
-  ASSERT_TRUE(view.neighbor().output().pose());
+  ASSERT_TRUE(view.neighbor().output().published());
 
   view.run_until(Timestamp{3s} + 340ms, {.heading_rad = 0.5});
 
-  EXPECT_FALSE(view.neighbor().output().pose());
+  EXPECT_FALSE(view.neighbor().output().published());
 }
 
 TEST(Neighbor, IsLocatedInTimeAlthoughItDoesNotSeeUs) {
