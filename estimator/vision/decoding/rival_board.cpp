@@ -1,6 +1,7 @@
 #include "estimator/vision/decoding/rival_board.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -36,12 +37,13 @@ double log_partly_hidden(const BlinkEvidence& recent, const CodeModel& code, std
 /// Half an exposure at an edge looks lit or dark in each period, so such frames say nothing.
 double log_odds_of(const CodeModel& rival, std::size_t rival_phase, const CodeModel& ours,
                    std::size_t our_phase, const BlinkWindow& window) {
-  int frames[2][2][2] = {};  // [the rival is lit][ours is lit][it was seen]
+  // Whether the rival is lit, ours is lit, and a light was seen.
+  std::array<std::array<std::array<int, 2>, 2>, 2> frames{};
   for (std::size_t i = 0; i < window.size(); ++i) {
     const double p = rival.lit_probability(rival_phase, window[i].stamp);
     const double q = ours.lit_probability(our_phase, window[i].stamp);
     if (std::min(std::abs(p - 0.5), std::abs(q - 0.5)) < kSure) continue;
-    ++frames[p > 0.5 ? 1 : 0][q > 0.5 ? 1 : 0][window[i].lit ? 1 : 0];
+    ++frames.at(p > 0.5 ? 1 : 0).at(q > 0.5 ? 1 : 0).at(window[i].lit ? 1 : 0);
   }
   const auto& [hidden, seen] = frames[1][1];
   const double shown = std::clamp((seen + 0.5) / (seen + hidden + 1.0), kLeastShown, kMostShown);
