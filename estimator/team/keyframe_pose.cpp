@@ -7,7 +7,8 @@
 
 namespace crepes {
 
-TeamPose keyframe_pose(const TeamBelief& belief, RobotId id, const TeamMember& member) {
+TeamPose keyframe_pose(const TeamBelief& belief, const TeamArcs& arcs, RobotId id,
+                       const TeamMember& member) {
   constexpr int kStates = TeamPose::kMotion;
   const TeamRobot& robot = belief.robots.at(id);
   const Eigen::MatrixXd& P = belief.P;
@@ -58,6 +59,10 @@ TeamPose keyframe_pose(const TeamBelief& belief, RobotId id, const TeamMember& m
     pose.covariance.bottomRightCorner<kBiases, kBiases>().row(i) =
         of_biases(biases.at(static_cast<std::size_t>(i / 6)) + i % 6);
   }
+  const Bend bend = arcs.bend(belief, id);
+  pose.T_B_N.p += bend.mean.head<3>();
+  pose.v_B_N += bend.mean.tail<3>();
+  pose.covariance.topLeftCorner<6, 6>() += bend.covariance;
   return pose;
 }
 

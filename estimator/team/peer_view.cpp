@@ -24,17 +24,6 @@ TeamInterval as_of(RobotId peer, TeamInterval interval) {
   return interval;
 }
 
-/// What a turn e of this robot adds to a place p in its frame is not linear: the second-order term
-/// e x (e x p) / 2, of a Gaussian e. This is its mean square, by Isserlis' theorem.
-Eigen::Matrix3d bent_by_turn(const Eigen::Matrix3d& turn, const Eigen::Vector3d& p) {
-  const Eigen::Vector3d turned = turn * p;
-  const double trace = turn.trace();
-  const Eigen::Matrix3d crossed = (trace * turned + 2.0 * (turn * turned)) * p.transpose();
-  const double square = trace * trace + 2.0 * turn.squaredNorm();
-  return 0.25 * (p.dot(turned) * turn + 2.0 * turned * turned.transpose() - crossed -
-                 crossed.transpose() + square * p * p.transpose());
-}
-
 }  // namespace
 
 std::optional<PeerView::View> PeerView::step(const TeamInterval& interval, const TeamBelief& own) {
@@ -66,12 +55,12 @@ std::optional<PeerView::View> PeerView::step(const TeamInterval& interval, const
   const bool needs_confirmation =
       !self->second.is_trusted && !has_plausible_place(belief, interval.self);
   TeamBelief seen = seen_from(interval.self, belief);
-  const Eigen::Matrix3d turn = belief.pose(interval.self).covariance.bottomRightCorner<3, 3>();
+  const TeamArcs arcs(seen);
   solution.poses.clear();
   for (const auto& [id, robot] : seen.robots) {
     if (id == interval.self || !robot.is_trusted) continue;
-    TeamPose& pose = solution.poses.emplace_back(keyframe_pose(seen, id, *interval.member(id)));
-    pose.covariance.topLeftCorner<3, 3>() += bent_by_turn(turn, pose.T_B_N.p);
+    TeamPose& pose =
+        solution.poses.emplace_back(keyframe_pose(seen, arcs, id, *interval.member(id)));
     pose.last_sighting = std::max(self->second.last_sighting, self->second.last_fix);
     pose.needs_confirmation = needs_confirmation;
     pose.was_knocked = filter_.is_knocked(id) || filter_.is_knocked(interval.self);

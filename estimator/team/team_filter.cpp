@@ -257,40 +257,46 @@ bool TeamFilter::correct(const TeamInterval& interval, Stage stage, TeamReadings
   const std::vector<bool> corrected = corrected_states(stage);
   std::map<RobotId, TeamRobot> robots;
   std::map<RobotPair, TeamRangeBias> ranges;
-  Eigen::VectorXd dx = Eigen::VectorXd::Zero(belief_.P.rows());
+  const TeamArcs arcs(belief_, corrected);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(belief_.P.rows());
+  Eigen::VectorXd dx = none;
   for (int iteration = 1;; ++iteration) {
     const TeamTrajectories paths = belief_.trajectories(interval);
     const TeamInstant instant(belief_, paths, time_s);
-    const ReadingScene scene{interval, paths, instant, belief_};
+    const ReadingScene scene{interval, paths, instant, belief_, arcs};
     if (iteration == 1) {
       gate(scene, belief_, readings, residuals_);
       robots = belief_.robots;
       ranges = belief_.ranges;
     }
-    const Eigen::VectorXd dy = instant.image_of(dx);
+    const Eigen::VectorXd dy = instant.image_of(arcs.carried(dx, none, dx));
     const std::vector<TeamRow> rows = linearized(scene, readings, dy);
     belief_.robots = robots;
     belief_.ranges = ranges;
-    if (rows.empty()) return true;  // the last step may have made all ranges unlikely
+    if (rows.empty()) {  // the last step may have made all ranges unlikely
+      arcs.carry(dx, none, belief_.P);
+      return true;
+    }
     TeamUpdate update(rows, dy, instant.covariance(), instant.with_belief());
     if (!update.is_valid()) return false;
     if (stage == Stage::kTrusted && !readings.sights.empty()) {
       const TeamScale scale(belief_, corrected);
       update.withhold(scale.by_states, kSignificant * kSignificant * scale.count, belief_.P);
     }
-    Eigen::VectorXd next = update.correction();
+    Eigen::VectorXd next = arcs.carried(update.correction(), dx, none);
     for (Eigen::Index i = 0; i < next.size(); ++i)
       if (!corrected[static_cast<std::size_t>(i)]) next(i) = 0.0;
     const bool is_linear = largest_step(robots, next - dx) < kLinear;
+    const bool is_last = is_linear || iteration == kMaxIterations;
+    if (is_last) update.correct(corrected, belief_.P);
+    arcs.carry(dx, next, belief_.P);
     dx = next;
-    belief_.inject(dx);
-    if (is_linear || iteration == kMaxIterations) {
-      update.correct(corrected, belief_.P);
-      break;
-    }
+    belief_.inject(dx + arcs.off_tangent(dx));
+    if (is_last) break;
   }
   for (const auto& [id, robot] : belief_.robots) {
-    if (robot.motion_index >= 0) belief_.reset_attitude(robot.motion_index + 6, dx);
+    if (robot.motion_index >= 0 && !arcs.contains(robot.motion_index))
+      belief_.reset_attitude(robot.motion_index + 6, dx);
   }
   return true;
 }
@@ -379,26 +385,31 @@ void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const Team
 }
 
 void TeamFilter::place_member(RobotId id, const TeamPlace& place) {
-  TeamPlace::Covariance covariance = place.covariance;
+  TeamPlace::Covariance floor = TeamPlace::Covariance::Zero();
   const double doubt = trust_.doubt(id, belief_.stamp);
-  covariance.diagonal().head<3>().array() += std::pow(doubt * kStartPosition, 2);
-  covariance.diagonal().segment<3>(3).array() +=
-      (doubt * doubt - 1.0) * std::pow(NeighborEstimate::kSpeedSigma, 2);
-  covariance.diagonal().tail<3>().array() += std::pow(doubt * kStartAttitude, 2);
-  if (const auto turn = trust_.turn_covariance(id)) covariance.bottomRightCorner<3, 3>() += *turn;
-  belief_.place(id, {place.T_S_N.p, place.v_S_N, place.T_S_N.q}, covariance);
+  floor.diagonal().head<3>().setConstant(std::pow(doubt * kStartPosition, 2));
+  floor.diagonal().segment<3>(3).setConstant((doubt * doubt - 1.0) *
+                                             std::pow(NeighborEstimate::kSpeedSigma, 2));
+  floor.diagonal().tail<3>().setConstant(std::pow(doubt * kStartAttitude, 2));
+  if (const auto turn = trust_.turn_covariance(id)) floor.bottomRightCorner<3, 3>() += *turn;
+  belief_.place(id, {place.T_S_N.p, place.v_S_N, place.T_S_N.q}, place.covariance + floor);
+  const auto via = belief_.robots.find(place.via);
+  if (via != belief_.robots.end() && via->second.motion_index >= 0)
+    belief_.connect(id, place.via, place.by_via, place.of_step + floor);
   belief_.robots.at(id).last_sighting = place.last_sighting;
   belief_.robots.at(id).last_fix = place.last_fix;
 }
 
 void TeamFilter::report(const TeamInterval& interval, bool are_placed,
                         TeamSolution& solution) const {
+  const TeamArcs arcs(belief_);
   for (const auto& [id, robot] : belief_.robots) {
     // On probation, or placed just now, it is known worse than by its pair's filter, if there is
     // one.
     const bool is_new = !robot.is_trusted || !are_placed;
     if (robot.motion_index < 0 || (is_new && has_own_edge(interval, id))) continue;
-    TeamPose& pose = solution.poses.emplace_back(keyframe_pose(belief_, id, *interval.member(id)));
+    TeamPose& pose =
+        solution.poses.emplace_back(keyframe_pose(belief_, arcs, id, *interval.member(id)));
     // The estimate that it started from may be false.
     pose.needs_confirmation = !robot.is_trusted && !has_plausible_place(belief_, id);
     pose.was_knocked = is_knocked(id) || is_knocked(belief_.self);

@@ -114,6 +114,10 @@ class SimulatedTeam {
     for (const auto& [id, body] : bodies_) ids.push_back(id);
     return ids;
   }
+  /// Upwards, in this robot's axes.
+  [[nodiscard]] Eigen::Vector3d up() const {
+    return bodies_.at(kSelf).motion.q_F_B.conjugate() * Eigen::Vector3d::UnitZ();
+  }
   /// In the frame that falls with this robot, at the same time.
   [[nodiscard]] FreeMotion true_motion(RobotId robot) const {
     const FreeMotion& self = bodies_.at(kSelf).motion;

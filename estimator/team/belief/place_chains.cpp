@@ -14,7 +14,7 @@ TeamPlace beyond(const TeamPlace& via, const RelativePoseEdge& edge, bool is_for
   const Eigen::Vector3d v =
       is_forward ? edge.v_from_to
                  : Eigen::Vector3d(-(edge.T_from_to.pose.R().transpose() * edge.v_from_to));
-  return via.beyond(step, v, edge.estimated);
+  return via.beyond(is_forward ? edge.from : edge.to, step, v, edge.estimated);
 }
 
 }  // namespace

@@ -97,6 +97,18 @@ void TeamBelief::place(RobotId id, const FreeMotion& motion,
   P.block<kMotion, kMotion>(robot.motion_index, robot.motion_index) = covariance;
 }
 
+void TeamBelief::connect(RobotId id, RobotId via, const MotionMatrix& by_via,
+                         const MotionMatrix& own) {
+  const int to = robots.at(id).motion_index;
+  const int from = robots.at(via).motion_index;
+  forget(to, kMotion);
+  const Eigen::MatrixXd rows = by_via * P.middleRows<kMotion>(from);
+  const MotionMatrix of_via = rows.middleCols<kMotion>(from) * by_via.transpose();
+  P.middleRows<kMotion>(to) = rows;
+  P.middleCols<kMotion>(to) = rows.transpose();
+  P.block<kMotion, kMotion>(to, to) = own + 0.5 * (of_via + of_via.transpose());
+}
+
 void TeamBelief::doubt_imu(RobotId id, const Priors& priors) {
   const int index = robots.at(id).bias_index;
   forget(index, kBias);

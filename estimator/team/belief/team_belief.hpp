@@ -42,6 +42,9 @@ struct TeamBelief {
   /// Sets where a robot is, in the frame of this robot, with the covariance of [p, v, theta].
   void place(RobotId id, const FreeMotion& motion,
              const Eigen::Matrix<double, FreeMotionAt::kMotion, FreeMotionAt::kMotion>& covariance);
+  /// Makes the error of a placed robot's motion one that follows from another robot's, with this
+  /// derivative, and an independent one besides.
+  void connect(RobotId id, RobotId via, const MotionMatrix& by_via, const MotionMatrix& own);
   /// Makes a robot's IMU as uncertain as one that was never calibrated. Its errors stay the best
   /// guess.
   void doubt_imu(RobotId id, const Priors& priors);

@@ -18,7 +18,7 @@ TeamPlace TeamPlace::of(const TeamBelief& belief, RobotId id) {
   return place;
 }
 
-TeamPlace TeamPlace::beyond(const GaussianPose& step, const Eigen::Vector3d& v_step,
+TeamPlace TeamPlace::beyond(RobotId id, const GaussianPose& step, const Eigen::Vector3d& v_step,
                             Timestamp estimated) const {
   const Eigen::Matrix3d R = T_S_N.R();
   Covariance by_here = Covariance::Identity();
@@ -40,8 +40,11 @@ TeamPlace TeamPlace::beyond(const GaussianPose& step, const Eigen::Vector3d& v_s
   TeamPlace place{.T_S_N = T_S_N * step.pose,
                   .v_S_N = v_S_N + R * v_step,
                   .covariance = here.lazyProduct(by_here.transpose()),
-                  .last_sighting = std::min(last_sighting, estimated)};
-  place.covariance += there.lazyProduct(by_step.transpose());
+                  .last_sighting = std::min(last_sighting, estimated),
+                  .via = id,
+                  .by_via = by_here,
+                  .of_step = there.lazyProduct(by_step.transpose())};
+  place.covariance += place.of_step;
   return place;
 }
 

@@ -14,12 +14,17 @@ struct TeamPlace {
   Covariance covariance = Covariance::Zero();  ///< of [p, v, theta]
   Timestamp last_sighting = kNever;            ///< the earliest along the chain
   Timestamp last_fix = kNever;                 ///< by ranges alone
+  /// The robot before it in the chain, RobotId{} if there is none, and how its errors act here. The
+  /// rest of the covariance is the last step's own.
+  RobotId via{};
+  Covariance by_via = Covariance::Zero();
+  Covariance of_step = Covariance::Zero();
 
   /// Of a robot in the belief.
   [[nodiscard]] static TeamPlace of(const TeamBelief& belief, RobotId id);
-  /// Of a robot that is estimated at `step` from here.
-  [[nodiscard]] TeamPlace beyond(const GaussianPose& step, const Eigen::Vector3d& v_step,
-                                 Timestamp estimated) const;
+  /// Of a robot that is estimated at `step` from here, where `id` is.
+  [[nodiscard]] TeamPlace beyond(RobotId id, const GaussianPose& step,
+                                 const Eigen::Vector3d& v_step, Timestamp estimated) const;
   /// For comparison: the smaller, the better is the place known.
   [[nodiscard]] double doubt() const;
   /// The pose of a robot of whose IMU nothing is known.

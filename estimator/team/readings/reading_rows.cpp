@@ -53,14 +53,13 @@ std::optional<TeamRow> mean_of(const ReadingScene& scene, const Ranging& ranging
                                const Eigen::VectorXd& dy) {
   const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
   const TeamRangeBias& bias = scene.belief.ranges.at(ordered(ranging.observer, ranging.neighbor));
-  const Eigen::Matrix3d covariance =
-      scene.belief.position_covariance(ranging.observer, ranging.neighbor);
+  const RelativeSpread spread = scene.arcs.spread(scene.belief, ranging.observer, ranging.neighbor);
   std::optional<TeamRow> mean;
   double sum_m = 0.0;
   double count = 0.0;
   for (const TeamRange* z : ranging.ranges) {
     const RangeReading weighed{z->reading.range_m, ranging.sigma_m()};
-    const auto row = range_row(pair, bias, weighed, scene.time_s(z->stamp), covariance);
+    const auto row = range_row(pair, bias, weighed, scene.time_s(z->stamp), spread);
     if (!row) continue;
     mean = *row;
     sum_m += row->residual.x();

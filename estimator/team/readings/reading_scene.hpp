@@ -1,6 +1,7 @@
 /// The robots of a reading, at the time of its interval.
 #pragma once
 
+#include "estimator/team/belief/team_arcs.hpp"
 #include "estimator/team/belief/team_belief.hpp"
 #include "estimator/team/belief/team_interval.hpp"
 #include "estimator/team/readings/team_instant.hpp"
@@ -14,6 +15,7 @@ struct ReadingScene {
   const TeamTrajectories& paths;
   const TeamInstant& instant;
   const TeamBelief& belief;
+  TeamArcs arcs{};
 
   /// Both are in the belief, and have an IMU over the interval.
   [[nodiscard]] TeamPair pair(RobotId observer, RobotId neighbor) const {

@@ -134,7 +134,7 @@ std::optional<Eigen::Vector2d> SightModel::residual(const TeamPair& pair, const 
 
 std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias,
                                  const RangeReading& reading, double t_s,
-                                 const Eigen::Matrix3d& covariance) {
+                                 const RelativeSpread& spread) {
   const double t_j_s = pair.neighbor_time_s(t_s);
   const FreeMotionAt& i = pair.observer_path.nearest(t_s);
   const FreeMotionAt& j = pair.neighbor_path.nearest(t_j_s);
@@ -165,9 +165,7 @@ std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias
     add_columns(pair.states.of(index), Eigen::Vector2d(1.0, 0.0), row);
   add_clocks(Eigen::Vector2d(u.dot(pair.neighbor_path.velocity_F(t_j_s, q_j)), 0.0), pair, row);
 
-  const Eigen::Matrix<double, 3, 2> across = tangent_basis(d / distance);
-  const Eigen::Matrix2d covariance_across = across.transpose() * covariance * across;
-  const RangeCurvature curvature = curvature_of(covariance_across, distance);
+  const RangeCurvature curvature = spread.curvature(d / distance, distance);
   row.residual.x() -= curvature.mean_m;
   row.variance += curvature.variance_m2;
   return row;

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "estimator/team/belief/robot_trajectory.hpp"
+#include "estimator/team/belief/team_arcs.hpp"
 #include "estimator/team/belief/team_interval.hpp"
 #include "estimator/team/belief/team_state.hpp"
 #include "estimator/team/readings/team_instant.hpp"
@@ -75,13 +76,13 @@ class SightModel {
 };
 
 /// r = |p_j + R_j q_j - p_i - R_i q_i| + a_i + a_j + b, and its time within the interval.
-/// `covariance` is that of the neighbor's position relative to the observer's. A range about a
+/// `spread` is that of the neighbor's position relative to the observer's. A range about a
 /// direction that is not known is not linear in the position: the mean of its second-order term
 /// |dp|^2 / 2d across the direction corrects the residual, its variance counts as noise
 /// (second-order filter; Bar-Shalom, Li and Kirubarajan 2001, 10.3). Empty if the robots are too
 /// near to each other.
 [[nodiscard]] std::optional<TeamRow> range_row(const TeamPair& pair, const TeamRangeBias& bias,
                                                const RangeReading& reading, double t_s,
-                                               const Eigen::Matrix3d& covariance);
+                                               const RelativeSpread& spread);
 
 }  // namespace crepes

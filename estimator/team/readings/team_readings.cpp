@@ -18,6 +18,8 @@ namespace {
 // What hides a robot from all cameras may delay its ranges, too, for seconds: an error of 0.15 m
 // that lasts 2 s weighs as much as independent ones of this size in each interval.
 constexpr double kDarkSigma = 1.0;  // m
+// Likewise what ranges that may have passed through something have in common.
+constexpr double kLasting = 6.0;
 
 // NIS by which the likeliest of a robot and its mirror images is told from the next: odds of 90.
 constexpr double kClearNis = 9.0;
@@ -160,13 +162,12 @@ TeamResidual gate(const ReadingScene& scene, TeamCamera& camera, Sight& sight) {
 
 TeamResidual gate(const ReadingScene& scene, TeamRangeBias& bias, Ranging& ranging) {
   const TeamPair pair = scene.pair(ranging.observer, ranging.neighbor);
-  const Eigen::Matrix3d covariance =
-      scene.belief.position_covariance(ranging.observer, ranging.neighbor);
+  const RelativeSpread spread = scene.arcs.spread(scene.belief, ranging.observer, ranging.neighbor);
   MeanResidual mean;
   double noise = 0.0;
   double variance = 0.0;
   std::erase_if(ranging.ranges, [&](const TeamRange* z) {
-    const auto row = range_row(pair, bias, z->reading, scene.time_s(z->stamp), covariance);
+    const auto row = range_row(pair, bias, z->reading, scene.time_s(z->stamp), spread);
     if (!row) return true;
     const double residual = row->residual.x();
     variance = row->covariance(scene.instant.covariance())(0, 0);
@@ -214,9 +215,14 @@ double TeamReadings::time_s(const TeamInterval& interval) const {
 
 double Ranging::sigma_m() const {
   if (dark) return kDarkSigma;
+  const auto count = static_cast<double>(ranges.size());
   double variance = 0.0;
-  for (const TeamRange* z : ranges) variance += z->reading.sigma_m * z->reading.sigma_m;
-  return std::sqrt(variance) / static_cast<double>(ranges.size());
+  double shared_m = 0.0;
+  for (const TeamRange* z : ranges) {
+    variance += z->reading.sigma_m * z->reading.sigma_m;
+    shared_m += z->reading.shared_m / count;
+  }
+  return std::hypot(std::sqrt(variance) / count, kLasting * shared_m);
 }
 
 TeamReadings TeamReadings::of(const TeamInterval& interval, const TeamBelief& belief, Stage stage) {

@@ -12,7 +12,7 @@ namespace {
 constexpr Duration kLeast = std::chrono::seconds{2};
 constexpr Duration kMost = std::chrono::seconds{5};
 constexpr Duration kTrial = std::chrono::seconds{1};
-constexpr Duration kTurn = std::chrono::milliseconds{100};  // by which robots take turns
+constexpr Duration kRound = std::chrono::milliseconds{100};  // by which robots take turns
 
 /// Members that no camera sees, and whose cameras see nobody.
 std::set<RobotId> unseen_of(const TeamInterval& interval) {
@@ -114,7 +114,7 @@ std::map<RobotId, TeamPlace> UnseenRobots::places(const TeamInterval& interval,
   std::map<RobotId, TeamPlace> places;
   const TeamRobot& self = belief.robots.at(belief.self);
   for (const auto& [id, unseen] : unseen_) {
-    const Duration turn = unseen.since + id.value * kTurn;
+    const Duration turn = unseen.since + id.value * kRound;
     const bool is_due = turn / kTrial != (turn - (end_ - begin_)) / kTrial;
     if (unseen.lasted < kLeast || !is_due) continue;
     const auto place = place_by_ranges(

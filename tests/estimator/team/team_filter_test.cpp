@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -20,6 +21,7 @@ using test::kIntervalSeconds;
 using test::kProbation;
 using test::kSelf;
 using test::nees_of;
+using test::position_nees_of;
 using test::SimulatedTeam;
 using test::solution_after;
 
@@ -90,6 +92,31 @@ TEST(TeamFilter, AtRestItsScaleErrsLittleMoreThanItSays) {
   }
   EXPECT_LT(sum / kSeeds, 3.0);
   EXPECT_LT(most, 16.0);
+}
+
+// Behind an obstacle, ranges grow longer by as much as the gate accepts, and say so. One in ten
+// poses is beyond 5 sigma if each counts as an independent one.
+TEST(TeamFilter, RangesThatAreLongTogetherLeaveItHonest) {
+  static constexpr RobotId kBehind{3};
+  static constexpr double kLonger = 0.2;  // m
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedTeam team(seed);
+    double t_s = 0.0;
+    team.damage = [&](TeamInterval& interval) {
+      for (TeamRange& z : interval.ranges) {
+        if (z.observer != kBehind && z.neighbor != kBehind) continue;
+        z.reading.shared_m = kLonger * std::clamp(t_s - 2.0, 0.0, 1.0);
+        z.reading.range_m += z.reading.shared_m;
+      }
+      t_s += kIntervalSeconds;
+    };
+    TeamFilter filter;
+    (void)solution_after(team, filter, kProbation);
+    while (t_s < 6.0) {
+      for (const TeamPose& pose : filter.step(team.next()).poses)
+        EXPECT_LT(position_nees_of(pose, team.truth(pose.neighbor)), 35.0) << seed << ' ' << t_s;
+    }
+  }
 }
 
 TEST(TeamFilter, ReachesARobotThatOnlyOthersSee) {

@@ -167,7 +167,7 @@ TEST(TeamMeasurement, DerivativesOfARangeAreThoseOfItsResidual) {
     const Scene scene(random);
     const auto row_of = [&](const Scene& s) {
       return s.with_pair([&](const TeamPair& pair) {
-        return range_row(pair, s.bias, {5.0, 0.1}, kTime, Eigen::Matrix3d::Zero()).value();
+        return range_row(pair, s.bias, {5.0, 0.1}, kTime, RelativeSpread{}).value();
       });
     };
     expect_derivatives(scene, row_of(scene), [&](const Scene& s) -> Eigen::Vector2d {
@@ -181,10 +181,10 @@ TEST(TeamMeasurement, ARangeAboutAnUnknownDirectionCountsLess) {
   RandomGeometry random(4);
   const Scene scene(random);
   scene.with_pair([&](const TeamPair& pair) {
-    const TeamRow known =
-        range_row(pair, scene.bias, {5.0, 0.1}, kTime, Eigen::Matrix3d::Zero()).value();
-    const TeamRow unknown =
-        range_row(pair, scene.bias, {5.0, 0.1}, kTime, Eigen::Matrix3d::Identity()).value();
+    const TeamRow known = range_row(pair, scene.bias, {5.0, 0.1}, kTime, RelativeSpread{}).value();
+    const TeamRow unknown = range_row(pair, scene.bias, {5.0, 0.1}, kTime,
+                                      RelativeSpread{.covariance = Eigen::Matrix3d::Identity()})
+                                .value();
     EXPECT_GT(unknown.variance, 2.0 * known.variance);
     EXPECT_LT(unknown.residual.x(), known.residual.x());
   });

@@ -28,14 +28,14 @@ TEST(TeamPlace, AChainHasTheErrorsOfAllItsLinks) {
   here.covariance = random.covariance<9>(0.02);
   const GaussianPose step{random.pose(), random.covariance<6>(0.02)};
   const Eigen::Vector3d v_step = random.vector(0.5);
-  const TeamPlace there = here.beyond(step, v_step, {});
+  const TeamPlace there = here.beyond(RobotId{2}, step, v_step, {});
   double nees = 0.0;
   for (int i = 0; i < kDraws; ++i) {
     const TeamPlace true_here = moved(here, random.draw<9>(here.covariance));
     const GaussianPose true_step{perturbed(step.pose, random.draw<6>(step.covariance)),
                                  Matrix6d::Zero()};
     const TeamPlace truth = true_here.beyond(
-        true_step, v_step + random.vector(NeighborEstimate::kSpeedSigma), Timestamp{});
+        RobotId{2}, true_step, v_step + random.vector(NeighborEstimate::kSpeedSigma), Timestamp{});
     const Vector6d of_pose = pose_difference(there.T_S_N, truth.T_S_N);
     Errors e;
     e << of_pose.head<3>(), truth.v_S_N - there.v_S_N, of_pose.tail<3>();
@@ -51,7 +51,7 @@ TEST(TeamPlace, WasSeenWhenTheOldestLinkWas) {
   belief.robots.at(RobotId{2}).last_sighting = belief.stamp - 3s;
   const GaussianPose step{Pose{}, 1e-4 * Matrix6d::Identity()};
   const auto seen = [&](RobotId via, Timestamp estimated) {
-    return TeamPlace::of(belief, via).beyond(step, {}, estimated).last_sighting;
+    return TeamPlace::of(belief, via).beyond(via, step, {}, estimated).last_sighting;
   };
   EXPECT_EQ(seen(test::kSelf, belief.stamp - 200ms), belief.stamp - 200ms);
   EXPECT_EQ(seen(RobotId{2}, belief.stamp - 200ms), belief.stamp - 3s);
