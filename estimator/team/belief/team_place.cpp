@@ -28,15 +28,15 @@ TeamPlace TeamPlace::beyond(RobotId id, const GaussianPose& step, const Eigen::V
   Covariance by_step = Covariance::Identity();
   by_step.block<3, 3>(0, 0) = R;
   by_step.block<3, 3>(3, 3) = R;
-  Covariance of_step = Covariance::Zero();
-  of_step.block<3, 3>(0, 0) = step.covariance.topLeftCorner<3, 3>();
-  of_step.block<3, 3>(0, 6) = step.covariance.topRightCorner<3, 3>();
-  of_step.block<3, 3>(6, 0) = step.covariance.bottomLeftCorner<3, 3>();
-  of_step.block<3, 3>(6, 6) = step.covariance.bottomRightCorner<3, 3>();
-  of_step.diagonal().segment<3>(3).setConstant(NeighborEstimate::kSpeedSigma *
-                                               NeighborEstimate::kSpeedSigma);
+  Covariance alone = Covariance::Zero();
+  alone.block<3, 3>(0, 0) = step.covariance.topLeftCorner<3, 3>();
+  alone.block<3, 3>(0, 6) = step.covariance.topRightCorner<3, 3>();
+  alone.block<3, 3>(6, 0) = step.covariance.bottomLeftCorner<3, 3>();
+  alone.block<3, 3>(6, 6) = step.covariance.bottomRightCorner<3, 3>();
+  alone.diagonal().segment<3>(3).setConstant(NeighborEstimate::kSpeedSigma *
+                                             NeighborEstimate::kSpeedSigma);
   const Covariance here = by_here.lazyProduct(covariance);
-  const Covariance there = by_step.lazyProduct(of_step);
+  const Covariance there = by_step.lazyProduct(alone);
   TeamPlace place{.T_S_N = T_S_N * step.pose,
                   .v_S_N = v_S_N + R * v_step,
                   .covariance = here.lazyProduct(by_here.transpose()),
