@@ -18,6 +18,9 @@ constexpr double kUsualDeviations = 2.0;
 constexpr double kSurelyUsual = 1.0 / 3.0;  // of the gap of late ranges
 constexpr double kMostUsual = 0.9;
 constexpr double kAlmostLate_m = 1.0;  // one sigma of the error just below that gap
+// The doubt about ranges fades within this time. Less than this is chance, in line of sight.
+constexpr double kDoubtTime = 0.5;  // s
+constexpr double kLeastDoubt = 0.05;
 
 }  // namespace
 
@@ -48,7 +51,10 @@ std::optional<RangeReading> RangeScreen::accept(const UwbRange& range,
   const double usual_db = usual_.most_db(settings.late_path_db);
   if (usual_.count < kLeastGaps || gap_db <= usual_db) usual_.add(gap_db);
   const double unusual = std::max(0.0, (gap_db - usual_db) / (settings.late_path_db - usual_db));
-  return RangeReading{range.range_m, settings.range_sigma_m, kAlmostLate_m * unusual};
+  if (usual_.count >= kLeastGaps)
+    doubt_ += (1.0 - std::exp(-passed_s / kDoubtTime)) * (unusual - doubt_);
+  const double doubt = std::max(unusual, doubt_ > kLeastDoubt ? doubt_ : 0.0);
+  return RangeReading{range.range_m, settings.range_sigma_m, kAlmostLate_m * doubt};
 }
 
 }  // namespace crepes

@@ -14,7 +14,8 @@ namespace crepes {
 /// hide the antennas and not the LED rings, so sightings do not say otherwise.
 ///
 /// A robot that passes behind an obstacle has ranges that become longer as their first path becomes
-/// weaker, for a second perhaps. Before they are refused, they have an error in common.
+/// weaker, for a second perhaps. Before they are refused, they have an error in common, and so they
+/// have for a moment after their first path is usual again.
 class RangeScreen {
  public:
   /// Empty if the range is refused. Ranges come in the order of their stamps, more or less.
@@ -37,6 +38,7 @@ class RangeScreen {
 
   UsualGap usual_;
   double late_share_ = 0.0;  ///< of the latest ranges, those with a weak first path
+  double doubt_ = 0.0;       ///< mean of the latest, 1 for one that is almost late
   std::optional<Timestamp> latest_{};
 };
 

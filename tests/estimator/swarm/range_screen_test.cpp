@@ -51,6 +51,26 @@ TEST(RangeScreen, DoubtsRangesTheMoreTheWeakerTheirFirstPathBecomes) {
   EXPECT_TRUE(std::isnan(screen.shared_m(8.5)));
 }
 
+// An obstacle delays the ranges about those that show it. One weak first path is chance.
+TEST(RangeScreen, DoubtsRangesForAMomentAfterSeveralWeakFirstPaths) {
+  Screen screen;
+  ASSERT_EQ(screen.most_m(1.0, 2.0), 0.0);
+  EXPECT_GT(screen.shared_m(6.0), 0.2);
+  EXPECT_EQ(screen.shared_m(1.0), 0.0);
+
+  for (int i = 0; i < 25; ++i) screen.shared_m(6.0);
+  double last_m = screen.shared_m(1.0);
+  EXPECT_GT(last_m, 0.2);
+  for (int i = 0; i < 10; ++i) {
+    const double shared_m = screen.shared_m(1.0);
+    EXPECT_LT(shared_m, last_m);
+    last_m = shared_m;
+  }
+  EXPECT_GT(last_m, 0.1);
+  for (int i = 0; i < 75; ++i) last_m = screen.shared_m(1.0);
+  EXPECT_EQ(last_m, 0.0);
+}
+
 TEST(RangeScreen, DoubtsNoRangesWhoseFirstPathIsAsWeakAsUsual) {
   Screen screen;
   for (int i = 0; i < 20; ++i) screen.shared_m(i % 2 == 0 ? 5.0 : 6.0);
