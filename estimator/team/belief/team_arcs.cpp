@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <optional>
-#include <utility>
 
 #include "estimator/core/so3.hpp"
 
@@ -20,7 +18,7 @@ using Eigen::VectorXd;
 constexpr int kVelocity = 3;  // of a motion [p, v, theta]
 constexpr int kTheta = 6;
 // The share of a position's variance that a pivot may leave.
-constexpr double kFewest = 0.5;
+constexpr double kMostLeft = 0.5;
 // A bend lasts as long as its attitude's error. One that lasts for ten seconds weighs as much as
 // independent ones of so many times its variance in each interval.
 constexpr double kLastingBend = 100.0;
@@ -82,15 +80,15 @@ TeamArcs::TeamArcs(const TeamBelief& belief)
     : TeamArcs(belief, std::vector<bool>(static_cast<std::size_t>(belief.P.rows()), true)) {}
 
 TeamArcs::TeamArcs(const TeamBelief& belief, const std::vector<bool>& corrected) {
-  std::vector<std::pair<RobotId, const TeamRobot*>> known;
-  std::vector<std::pair<RobotId, const TeamRobot*>> open;
+  std::vector<const TeamRobot*> known;
+  std::vector<const TeamRobot*> open;
   for (const auto& [id, robot] : belief.robots) {
     const bool is_corrected =
         robot.motion_index >= 0 && corrected[static_cast<std::size_t>(robot.motion_index)];
     if (is_corrected && is_open(belief, robot)) {
-      open.emplace_back(id, &robot);
+      open.push_back(&robot);
     } else if (is_corrected || robot.is_trusted) {
-      known.emplace_back(id, &robot);
+      known.push_back(&robot);
     }
   }
   while (!open.empty()) {
@@ -98,13 +96,13 @@ TeamArcs::TeamArcs(const TeamBelief& belief, const std::vector<bool>& corrected)
     std::size_t which = 0;
     double least = 0.0;
     for (std::size_t i = 0; i < open.size(); ++i) {
-      const TeamRobot& robot = *open[i].second;
+      const TeamRobot& robot = *open[i];
       const double own =
-          kFewest * belief.P.block<3, 3>(robot.motion_index, robot.motion_index).trace();
-      for (const auto& [pivot_id, pivot] : known) {
+          kMostLeft * belief.P.block<3, 3>(robot.motion_index, robot.motion_index).trace();
+      for (const TeamRobot* pivot : known) {
         const double variance = variance_of(belief, robot, *pivot);
         if (variance > own || (best && variance >= least)) continue;
-        best = {robot.motion_index, pivot_id, pivot->motion_index, robot.motion, pivot->motion};
+        best = {robot.motion_index, pivot->motion_index, robot.motion, pivot->motion};
         which = i;
         least = variance;
       }

@@ -70,7 +70,6 @@ class TeamArcs {
   /// One robot and its pivot, as the belief has them.
   struct Arc {
     int motion = 0;
-    RobotId pivot_id{};
     int pivot_motion = -1;  ///< none if that is this robot itself
     FreeMotion at{};
     FreeMotion pivot{};
