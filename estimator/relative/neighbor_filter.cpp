@@ -144,7 +144,8 @@ NeighborFilter::NeighborFilter(Timestamp stamp, const GaussianPose& T_B_N,
                                const ProcessNoise& noise, const Priors& priors)
     : stamp_(stamp),
       P_(first_covariance(T_B_N.covariance, priors.speed_mps, priors)),
-      noise_(noise) {
+      noise_(noise),
+      was_seen_by_(false) {
   state_.motion.T_B_N = T_B_N.pose;
 }
 
@@ -159,6 +160,7 @@ NeighborFilter::NeighborFilter(Timestamp stamp, const GraphPose& first, const Pr
 void NeighborFilter::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
   CREPES_EXPECT(to >= stamp_, "a filter moves forward only");
   propagate(imu_B, imu_N, stamp_, to, noise_, state_, P_);
+  if (held_) held_ = imu_N.rotation(stamp_, to).conjugate() * *held_;
   stamp_ = to;
 }
 
@@ -168,14 +170,31 @@ Fusion NeighborFilter::correct(std::optional<Innovation> z, double gate_nis) {
   auto outcome = kalman_gain(*z, gate_nis, P_);
   const Fusion fusion = fusion_of(*z, outcome);
   if (outcome.verdict != Verdict::kFused) return fusion;
+  const auto before = held();
   if (has_ranges()) {
     const E::Vector withheld = withhold_distance(*z, state_.motion.T_B_N.p, P_, outcome);
     correct_covariance(outcome, withheld, P_);
   } else {
     correct_covariance(outcome, P_);
   }
+  hold(before, outcome.correction);
   apply(outcome.correction);
   return fusion;
+}
+
+std::optional<NeighborFilter::Held> NeighborFilter::held() const {
+  if (!held_) return std::nullopt;
+  const E::Vector with_turn = P_.columns<E::kTheta, 3>() * *held_;
+  const double variance = held_->dot(with_turn.segment<3>(E::kTheta));
+  return Held{with_turn / variance, variance};
+}
+
+// As Joseph's form gives it for the smaller gain.
+void NeighborFilter::hold(const std::optional<Held>& before, E::Vector& correction) {
+  if (!before) return;
+  const double variance = held_->dot(P_.block<E::kTheta, E::kTheta, 3, 3>() * *held_);
+  P_.subtract_outer((variance - before->variance) * before->by_turn, before->by_turn);
+  correction -= held_->dot(correction.segment<3>(E::kTheta)) * before->by_turn;
 }
 
 void NeighborFilter::apply(const E::Vector& correction) {
@@ -189,7 +208,8 @@ void NeighborFilter::apply(const E::Vector& correction) {
   // frame is turned about us, and P must move with the estimate.
   Eigen::Matrix<double, E::kMotion, 3> by_m = motion_by_misalignment(before);
   if (is_far || !has_ranges() || is_blind()) {
-    const MotionTransport T = error_transport(before, state_.motion);
+    const MotionTransport T = was_seen_by_ ? error_transport(before, state_.motion)
+                                           : error_transport_of_blind(before, state_.motion);
     transport_motion(T, P_);
     by_m = (T * by_m).eval();
   }
@@ -241,7 +261,10 @@ Fusion NeighborFilter::fuse_bearing(const DirectionReading& z, const Eigen::Vect
 
 Fusion NeighborFilter::fuse_peer_bearing(const DirectionReading& z, const Eigen::Vector3d& p_B_M,
                                          double gate_nis) {
-  return correct(linearize_peer_bearing(state_, z.u, z.camera, p_B_M, z.sigma_rad), gate_nis);
+  const Fusion fusion =
+      correct(linearize_peer_bearing(state_, z.u, z.camera, p_B_M, z.sigma_rad), gate_nis);
+  was_seen_by_ = was_seen_by_ || fusion.verdict == Verdict::kFused;
+  return fusion;
 }
 
 Fusion NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& p_B_U,
@@ -249,9 +272,11 @@ Fusion NeighborFilter::fuse_range(const RangeReading& z, const Eigen::Vector3d& 
   const auto innovation = linearize_range(state_, p_B_U, p_N_Q, z.range_m, z.sigma_m);
   if (!innovation) return {};
   const double distance_m = z.range_m - state_.range_bias_m - innovation->residual(0);
-  const RangeUpdate update =
+  const auto before = held();
+  RangeUpdate update =
       update_by_range(*innovation, distance_m, gate_nis, P_, z.shared_m * z.shared_m);
   if (update.fusion.verdict != Verdict::kFused) return update.fusion;
+  hold(before, update.correction);
   apply(update.correction);
   std::rotate(ranges_used_.begin(), ranges_used_.begin() + 1, ranges_used_.end());
   ranges_used_.back() = stamp_;
@@ -264,9 +289,11 @@ Fusion NeighborFilter::fuse_ring_distance(const RingReading& z, const Eigen::Vec
   if (!innovation) return {};
   const double distance_m = z.distance_m - innovation->residual(0);
   const double shared_m = kRingScaleSigma * z.distance_m;
-  const RangeUpdate update =
-      update_by_range(*innovation, distance_m, gate_nis, P_, shared_m * shared_m);
-  if (update.fusion.verdict == Verdict::kFused) apply(update.correction);
+  const auto before = held();
+  RangeUpdate update = update_by_range(*innovation, distance_m, gate_nis, P_, shared_m * shared_m);
+  if (update.fusion.verdict != Verdict::kFused) return update.fusion;
+  hold(before, update.correction);
+  apply(update.correction);
   return update.fusion;
 }
 
@@ -292,8 +319,10 @@ void NeighborFilter::reset_distance(double sigma_m, const Priors& priors) {
   const Eigen::Vector3d u = state_.motion.T_B_N.p.normalized();
   GaussianPose known{state_.motion.T_B_N, pose_covariance()};
   known.covariance.topLeftCorner<3, 3>() += sigma_m * sigma_m * u * u.transpose();
+  const bool was_seen_by = was_seen_by_;
   *this = NeighborFilter(stamp_, known, noise_, priors);
   state_.motion.v_B_N = v_B_N;
+  was_seen_by_ = was_seen_by;
 }
 
 void NeighborFilter::reset_misalignment(MeasurementKind kind, double misalignment_rad) {

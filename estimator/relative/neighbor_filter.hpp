@@ -57,7 +57,7 @@ class NeighborFilter {
   /// The errors of `first` are correlated with the calibration states; the speed is unknown.
   NeighborFilter(Timestamp stamp, const RawPose& first, const ProcessNoise& noise,
                  const Priors& priors);
-  /// The errors of the pose are independent; the speed is unknown.
+  /// The errors of the pose are independent; the speed is unknown. The neighbor has not seen us.
   NeighborFilter(Timestamp stamp, const GaussianPose& T_B_N, const ProcessNoise& noise,
                  const Priors& priors);
   /// From the pose graph, which includes the speed.
@@ -94,6 +94,12 @@ class NeighborFilter {
   /// Bearings of this kind come from another camera from now on, with another misalignment.
   void reset_misalignment(MeasurementKind kind, double misalignment_rad);
 
+  /// From now on, the neighbor's turn about this axis (N's axes) is a considered parameter (Schmidt
+  /// 1966): nothing corrects it, and its uncertainty counts.
+  void hold_heading(const Eigen::Vector3d& up_N) { held_ = up_N.normalized(); }
+  /// From now on it is estimated again.
+  void release_heading() { held_.reset(); }
+
   /// One Gaussian of a split, and its weight.
   struct Part;
   /// Splits the Gaussian along its most uncertain attitude axis into parts that are narrow enough
@@ -114,6 +120,14 @@ class NeighborFilter {
   [[nodiscard]] bool has_ranges() const;
   /// Whether our camera has not seen the neighbor of late.
   [[nodiscard]] bool is_blind() const;
+  /// What goes with a turn about the held axis, and its variance.
+  struct Held {
+    ErrorState::Vector by_turn = ErrorState::Vector::Zero();
+    double variance = 0.0;
+  };
+  [[nodiscard]] std::optional<Held> held() const;
+  /// Takes back what an update since `before` tells of the held turn.
+  void hold(const std::optional<Held>& before, ErrorState::Vector& correction);
   /// Corrects the state, after P.
   void apply(const ErrorState::Vector& correction);
 
@@ -123,7 +137,9 @@ class NeighborFilter {
   ProcessNoise noise_;
   /// The newest, oldest first.
   std::array<Timestamp, 3> ranges_used_{Timestamp::min(), Timestamp::min(), Timestamp::min()};
-  Timestamp seen_ = kNever;  ///< when a bearing of our camera was last used
+  std::optional<Eigen::Vector3d> held_;  ///< axis of the turn that is not estimated, N's axes
+  Timestamp seen_ = kNever;              ///< when a bearing of our camera was last used
+  bool was_seen_by_ = true;              ///< whether the neighbor has ever seen us
 };
 
 /// One Gaussian of a split, and its weight.

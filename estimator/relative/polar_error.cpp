@@ -51,4 +51,11 @@ MotionTransport error_transport(const RelativeMotion& before, const RelativeMoti
   return T;
 }
 
+MotionTransport error_transport_of_blind(const RelativeMotion& before,
+                                         const RelativeMotion& after) {
+  MotionTransport T = error_transport(before, after);
+  T.middleRows<3>(E::kTheta) = MotionTransport::Identity().middleRows<3>(E::kTheta);
+  return T;
+}
+
 }  // namespace crepes

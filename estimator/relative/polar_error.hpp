@@ -32,4 +32,10 @@ using MotionTransport = Eigen::Matrix<double, ErrorState::kMotion, ErrorState::k
 [[nodiscard]] MotionTransport error_transport(const RelativeMotion& before,
                                               const RelativeMotion& after);
 
+/// Likewise if N has never seen B. Gravity ties N's attitude then, and its error stays as it is:
+/// how N would see B is not known, and to keep that would make N's turn about the vertical seem
+/// measured.
+[[nodiscard]] MotionTransport error_transport_of_blind(const RelativeMotion& before,
+                                                       const RelativeMotion& after);
+
 }  // namespace crepes

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "estimator/relative/propagation.hpp"
 #include "estimator/relative/range_update.hpp"
@@ -11,6 +12,11 @@ namespace crepes {
 namespace {
 
 constexpr double kFalseBearings = 0.1;  // density of clutter for each true one [1/sr]
+
+// How much of the evidence of each reading counts between headings.
+constexpr double kEvidence = 0.5;
+// So many parts are neighbors of one another: the heading is known to 20 degrees.
+constexpr std::size_t kFew = 3;
 
 // Squared Mahalanobis distance of a pose, by the covariance of the other.
 double distance2(const GaussianPose& from, const Pose& to) {
@@ -36,7 +42,7 @@ GaussianSum::GaussianSum(const NeighborTrack& whole) {
   normalize();
 }
 
-GaussianSum::GaussianSum(std::vector<NeighborTrack> parts) {
+GaussianSum::GaussianSum(std::vector<NeighborTrack> parts) : has_open_heading_(true) {
   for (NeighborTrack& track : parts) parts_.push_back({std::move(track)});
   normalize();
 }
@@ -57,14 +63,25 @@ Association GaussianSum::fuse(std::span<const Measurement> candidates, const Pai
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const Fusion fusion = parts_[i].track.fuse(reading, mounting, gates);
     if (i == heaviest_) association.fusion = fusion;
-    parts_[i].log_weight += log_likelihood_ratio(fusion, reading.kind);
+    parts_[i].gain = log_likelihood_ratio(fusion, reading.kind);
   }
-  association.score = normalize();
+  association.score = log_mean_gain();
+  for (Part& part : parts_) part.log_weight += (has_open_heading_ ? kEvidence : 1.0) * part.gain;
+  normalize();
   return association;
 }
 
-/// Scales the weights to a sum of one. Returns the logarithm of the sum before.
-double GaussianSum::normalize() {
+/// Of all parts together, by their weights before.
+double GaussianSum::log_mean_gain() const {
+  double largest = -std::numeric_limits<double>::infinity();
+  for (const Part& part : parts_) largest = std::max(largest, part.log_weight + part.gain);
+  double sum = 0.0;
+  for (const Part& part : parts_) sum += std::exp(part.log_weight + part.gain - largest);
+  return largest + std::log(sum);
+}
+
+/// Scales the weights to a sum of one.
+void GaussianSum::normalize() {
   const auto heaviest =
       std::max_element(parts_.begin(), parts_.end(),
                        [](const Part& a, const Part& b) { return a.log_weight < b.log_weight; });
@@ -74,7 +91,6 @@ double GaussianSum::normalize() {
   for (const Part& part : parts_) sum += std::exp(part.log_weight - largest);
   const double log_sum = largest + std::log(sum);
   for (Part& part : parts_) part.log_weight -= log_sum;
-  return log_sum;
 }
 
 void GaussianSum::prune() {
@@ -89,6 +105,10 @@ void GaussianSum::prune() {
            distance2(pose, part.track.pose().pose) < kEqual;
   };
   parts_.erase(std::remove_if(parts_.begin() + 1, parts_.end(), is_redundant), parts_.end());
+  if (has_open_heading_ && parts_.size() <= kFew) {
+    for (Part& part : parts_) part.track.release_heading();
+    has_open_heading_ = false;
+  }
   normalize();
 }
 

@@ -22,10 +22,17 @@ struct Association {
 /// A weighted bank of filters (Alspach and Sorenson 1972). They differ in what the first reading
 /// left open, for example 10 degrees of roll: too much for one linearization, not for each part.
 /// `prune` removes parts that became unlikely or equal to another; after a second one is left.
+///
+/// Where a heading is open, each part holds its own, and the weights alone tell headings apart
+/// (multiple-model estimation; Magill 1965) until few parts are left. A filter that estimates it
+/// from the start, with a tilt known to 10 degrees and an unknown speed, linearizes about a wrong
+/// motion and becomes certain of whatever heading it began with. Of what a reading tells, a part
+/// counts: directions and ranges share errors that their filters take for white noise (a power of
+/// the likelihood; Miller and Dunson 2019).
 class GaussianSum {
  public:
   explicit GaussianSum(const NeighborTrack& whole);
-  /// Parts of equal weight.
+  /// Parts of equal weight, each of which holds its heading.
   explicit GaussianSum(std::vector<NeighborTrack> parts);
 
   /// Sets the process noise of all parts.
@@ -41,6 +48,8 @@ class GaussianSum {
   [[nodiscard]] bool is_compatible_with(const GaussianSum& other) const;
   [[nodiscard]] const NeighborTrack& heaviest() const;
   [[nodiscard]] std::size_t size() const { return parts_.size(); }
+  /// Whether the parts hold headings, which the weights tell apart.
+  [[nodiscard]] bool has_open_heading() const { return has_open_heading_; }
 
   /// Mean and covariance of the sum. `heaviest` is the heaviest part, propagated to a later instant
   /// by these IMUs; the result is at that instant.
@@ -51,10 +60,13 @@ class GaussianSum {
   struct Part {
     NeighborTrack track;
     double log_weight = 0.0;
+    double gain = 0.0;  ///< what the latest reading tells
   };
-  double normalize();
+  [[nodiscard]] double log_mean_gain() const;
+  void normalize();
 
   std::vector<Part> parts_;
+  bool has_open_heading_ = false;
   std::size_t heaviest_ = 0;
 };
 

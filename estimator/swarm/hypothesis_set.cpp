@@ -97,10 +97,14 @@ bool HypothesisSet::initialize(Timestamp stamp, const MutualInitialization& firs
 }
 
 bool HypothesisSet::initialize(Timestamp stamp, const OneWayInitialization& first) {
-  if (!empty()) return false;
+  const bool is_heading_known = !first.up_seen;
+  if (!empty() && !(is_heading_known && has_open_heading())) return false;
+  clear();
   std::vector<NeighborTrack> parts;
-  for (const GaussianPose& T_B_N : first.T_B_N) parts.emplace_back(stamp, T_B_N, settings_);
-  hypotheses_.push_back(make(GaussianSum(std::move(parts))));
+  for (const GaussianPose& pose : first.T_seer_seen)
+    parts.emplace_back(stamp, pose, first, settings_);
+  hypotheses_.push_back(
+      make(is_heading_known ? GaussianSum(parts.front()) : GaussianSum(std::move(parts))));
   hypotheses_.back().one_way = true;
   return true;
 }

@@ -52,7 +52,8 @@ class HypothesisSet {
   /// Adds a rival at `stamp()`. False, and nothing changes, if an existing hypothesis explains the
   /// sighting, or if the set is full of better ones.
   bool initialize(Timestamp stamp, const MutualInitialization& first);
-  /// Starts the first hypothesis. False if there is one already.
+  /// Starts the first hypothesis. False if there is one already, unless this one knows the heading
+  /// that the other one has open.
   bool initialize(Timestamp stamp, const OneWayInitialization& first);
   /// Replaces all hypotheses by the graph's pose. Always true.
   bool initialize(Timestamp stamp, const GraphPose& first);
@@ -66,6 +67,9 @@ class HypothesisSet {
                    const ImuHistory& imu_N);
   /// Selects the leader and deletes hypotheses that lost or became equal to the leader.
   void prune();
+
+  /// Whether it is not known yet how a neighbor that only one robot sees is turned.
+  [[nodiscard]] bool has_open_heading() const { return !empty() && leader().has_open_heading(); }
 
   [[nodiscard]] const GaussianSum& leader() const { return hypotheses_.front().sum; }
   [[nodiscard]] Timestamp stamp() const { return leader().heaviest().stamp(); }

@@ -1,6 +1,7 @@
 /// One measurement of a neighbor, as its filter receives it.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <variant>
 #include <vector>
@@ -18,10 +19,16 @@ struct MutualInitialization {
   DirectionReading peer_bearing;
 };
 
-/// Poses for a track of which only one robot sees the other: a pose for every heading that a single
-/// bearing allows, or the inverse of the neighbor's estimate.
+/// The robot in whose axes a pair's filter works.
+enum class FilterAxes { kOurs, kNeighbors };
+
+/// Poses for a track of which only one robot sees the other, in the axes of the one that sees: a
+/// pose for every heading that a single bearing allows, or the neighbor's estimate.
 struct OneWayInitialization {
-  std::vector<GaussianPose> T_B_N;
+  std::vector<GaussianPose> T_seer_seen;
+  FilterAxes axes = FilterAxes::kOurs;
+  /// Vertical of the robot that is seen, its axes, where the poses are of all headings.
+  std::optional<Eigen::Vector3d> up_seen{};
 };
 
 /// A measurement that corrects or initializes a neighbor's filter.

@@ -7,6 +7,7 @@
 
 #include "estimator/core/constants.hpp"
 #include "estimator/core/contract.hpp"
+#include "estimator/relative/arc_pose.hpp"
 
 namespace crepes {
 namespace {
@@ -75,6 +76,30 @@ Fusion fuse_tight(NeighborFilter& filter, const Measurement& m, const PairMounti
   return {.verdict = Verdict::kNoState};  // a raw pose only initializes this filter
 }
 
+MeasurementKind mirrored(MeasurementKind kind) {
+  switch (kind) {
+    case MeasurementKind::kBearing:
+      return MeasurementKind::kPeerBearing;
+    case MeasurementKind::kPeerBearing:
+      return MeasurementKind::kBearing;
+    case MeasurementKind::kRange:
+      return MeasurementKind::kPeerRange;
+    case MeasurementKind::kPeerRange:
+      return MeasurementKind::kRange;
+    default:
+      return kind;
+  }
+}
+
+/// The same reading with the robots exchanged.
+Measurement mirrored(Measurement m) {
+  m.kind = mirrored(m.kind);
+  if (auto* const graph = std::get_if<GraphPose>(&m.reading)) graph->T_B_N = inverse(graph->T_B_N);
+  return m;
+}
+
+PairMounting mirrored(const PairMounting& m) { return {m.p_N_M, m.p_N_Q, m.p_B_M, m.p_B_U}; }
+
 Fusion fuse_paper(PaperFilter& filter, const Measurement& m, const Gates& gates) {
   if (m.kind == MeasurementKind::kRawPose) {
     return filter.fuse(std::get<MutualInitialization>(m.reading).raw, gates.raw_pose);
@@ -101,10 +126,17 @@ NeighborTrack::NeighborTrack(Timestamp stamp, const GraphPose& first,
   last_[static_cast<std::size_t>(MeasurementKind::kGraphPose)] = stamp;
 }
 
-NeighborTrack::NeighborTrack(Timestamp stamp, const GaussianPose& T_B_N,
-                             const FilterSettings& settings)
-    : filter_(NeighborFilter(stamp, T_B_N, settings.noise, settings.priors)),
-      priors_(settings.priors) {}
+NeighborTrack::NeighborTrack(Timestamp stamp, const GaussianPose& T_seer_seen,
+                             const OneWayInitialization& start, const FilterSettings& settings)
+    : filter_(NeighborFilter(stamp, T_seer_seen, settings.noise, settings.priors)),
+      axes_(start.axes),
+      priors_(settings.priors) {
+  if (start.up_seen) std::get<NeighborFilter>(filter_).hold_heading(*start.up_seen);
+}
+
+void NeighborTrack::release_heading() {
+  if (auto* const tight = std::get_if<NeighborFilter>(&filter_)) tight->release_heading();
+}
 
 void NeighborTrack::set_noise(const ProcessNoise& noise) {
   std::visit([&](auto& filter) { filter.set_noise(noise); }, filter_);
@@ -115,7 +147,12 @@ Timestamp NeighborTrack::stamp() const {
 }
 
 void NeighborTrack::advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N) {
-  std::visit([&](auto& filter) { filter.advance_to(to, imu_B, imu_N); }, filter_);
+  const bool is_ours = axes_ == FilterAxes::kOurs;
+  std::visit(
+      [&](auto& filter) {
+        filter.advance_to(to, is_ours ? imu_B : imu_N, is_ours ? imu_N : imu_B);
+      },
+      filter_);
 }
 
 Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& mounting,
@@ -133,7 +170,7 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
   const Fusion fusion = tight == nullptr
                             ? fuse_paper(std::get<PaperFilter>(filter_), measurement, gates)
                         : is_bearing ? fuse_bearing(*tight, measurement, mounting, gates)
-                                     : fuse_tight(*tight, doubted(measurement), mounting, gates);
+                                     : correct(*tight, doubted(measurement), mounting, gates);
   if (fusion.verdict == Verdict::kFused)
     last_[static_cast<std::size_t>(measurement.kind)] = measurement.stamp;
   gated_[run_of(measurement.kind)].add(measurement.stamp, fusion);
@@ -155,17 +192,26 @@ void NeighborTrack::GatedRun::add(Timestamp stamp, const Fusion& fusion) {
   residual = fusion.residual[0];
 }
 
+Fusion NeighborTrack::correct(NeighborFilter& filter, const Measurement& measurement,
+                              const PairMounting& mounting, const Gates& gates) const {
+  if (axes_ == FilterAxes::kOurs) return fuse_tight(filter, measurement, mounting, gates);
+  // Its filter knows the distance of a ring that its own camera sees.
+  if (measurement.kind == MeasurementKind::kRingDistance) return {.verdict = Verdict::kSkipped};
+  return fuse_tight(filter, mirrored(measurement), mirrored(mounting), gates);
+}
+
 Fusion NeighborTrack::fuse_bearing(NeighborFilter& filter, const Measurement& bearing,
                                    const PairMounting& mounting, const Gates& gates) {
   const Eigen::Vector3d& camera = std::get<DirectionReading>(bearing.reading).camera;
   auto& in_use = bearing.kind == MeasurementKind::kBearing ? p_B_C_ : p_N_C_;
   Fusion fusion{.verdict = Verdict::kSkipped};
   if (!in_use || *in_use == camera) {
-    fusion = fuse_tight(filter, bearing, mounting, gates);
+    fusion = correct(filter, bearing, mounting, gates);
   } else if (bearing.stamp - last(bearing.kind) > kHandover) {
     NeighborFilter trial = filter;
-    trial.reset_misalignment(bearing.kind, priors_.misalignment_rad);
-    fusion = fuse_tight(trial, bearing, mounting, gates);
+    trial.reset_misalignment(axes_ == FilterAxes::kOurs ? bearing.kind : mirrored(bearing.kind),
+                             priors_.misalignment_rad);
+    fusion = correct(trial, bearing, mounting, gates);
     if (fusion.verdict == Verdict::kFused) filter = trial;
   }
   if (fusion.verdict == Verdict::kFused) in_use = camera;
@@ -180,7 +226,7 @@ std::size_t NeighborTrack::most_likely(std::span<const Measurement> candidates,
   std::size_t best = 0;
   double least_nis = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const Fusion fusion = fuse_tight(trial, candidates[i], mounting, Gates{});  // all gated
+    const Fusion fusion = correct(trial, candidates[i], mounting, Gates{});  // all gated
     if (fusion.verdict == Verdict::kGated && fusion.nis < least_nis) {
       least_nis = fusion.nis;
       best = i;
@@ -201,15 +247,20 @@ std::vector<NeighborTrack::Part> NeighborTrack::split() const {
 }
 
 RelativeMotion NeighborTrack::motion() const {
-  return std::visit([](const auto& filter) { return filter.motion(); }, filter_);
+  const RelativeMotion motion =
+      std::visit([](const auto& filter) { return filter.motion(); }, filter_);
+  if (axes_ == FilterAxes::kOurs) return motion;
+  const Pose T_B_N = motion.T_B_N.inverse();
+  return {T_B_N, -(T_B_N.q * motion.v_B_N)};
 }
 
 GaussianPose NeighborTrack::pose() const {
-  return std::visit(
+  const GaussianPose pose = std::visit(
       [](const auto& filter) {
         return GaussianPose{filter.motion().T_B_N, filter.pose_covariance()};
       },
       filter_);
+  return axes_ == FilterAxes::kOurs ? pose : inverse_on_arc(pose);
 }
 
 double NeighborTrack::speed_sigma() const {
@@ -226,19 +277,20 @@ std::optional<CalibrationRecord> NeighborTrack::calibration() const {
   using R = CalibrationRecord;
   R record;
   record.stamp = tight->stamp();
+  const bool is_ours = axes_ == FilterAxes::kOurs;
   const auto put = [&](R::Index index, const auto& value, int state) {
     constexpr int kSize = std::decay_t<decltype(value)>::RowsAtCompileTime;
     using Values = Eigen::Matrix<double, kSize, 1>;
     Values::Map(&record.value[index]) = value;
     Values::Map(&record.sigma[index]) = variance.segment<kSize>(state).cwiseSqrt();
   };
-  put(R::kGyroB, x.bias_B.gyro_radps, ErrorState::kGyroB);
-  put(R::kAccelB, x.bias_B.accel_mps2, ErrorState::kAccelB);
-  put(R::kGyroN, x.bias_N.gyro_radps, ErrorState::kGyroN);
-  put(R::kAccelN, x.bias_N.accel_mps2, ErrorState::kAccelN);
+  put(is_ours ? R::kGyroB : R::kGyroN, x.bias_B.gyro_radps, ErrorState::kGyroB);
+  put(is_ours ? R::kAccelB : R::kAccelN, x.bias_B.accel_mps2, ErrorState::kAccelB);
+  put(is_ours ? R::kGyroN : R::kGyroB, x.bias_N.gyro_radps, ErrorState::kGyroN);
+  put(is_ours ? R::kAccelN : R::kAccelB, x.bias_N.accel_mps2, ErrorState::kAccelN);
   put(R::kRangeBias, Eigen::Matrix<double, 1, 1>(x.range_bias_m), ErrorState::kRangeBias);
-  put(R::kMisalignB, x.misalignment_B, ErrorState::kMisalignB);
-  put(R::kMisalignN, x.misalignment_N, ErrorState::kMisalignN);
+  put(is_ours ? R::kMisalignB : R::kMisalignN, x.misalignment_B, ErrorState::kMisalignB);
+  put(is_ours ? R::kMisalignN : R::kMisalignB, x.misalignment_N, ErrorState::kMisalignN);
   return record;
 }
 

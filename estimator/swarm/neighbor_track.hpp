@@ -20,13 +20,22 @@ inline constexpr Duration kDivergenceTime = std::chrono::milliseconds{250};
 /// At most 1 m and 20 deg, one sigma, in any direction.
 [[nodiscard]] bool is_certain(const Matrix6d& covariance);
 
+/// A filter that starts while only the neighbor sees us works in the neighbor's axes: its errors
+/// are those of T_N_B. In our axes, N would be on an arc about us that turns with the open heading,
+/// and a Gaussian has the arc's tangent only. Whatever goes in or comes out is in our axes.
+///
 /// Has value semantics: OutputPredictor works on copies.
 class NeighborTrack {
  public:
   NeighborTrack(Timestamp stamp, const RawPose& first, const FilterSettings& settings);
   NeighborTrack(Timestamp stamp, const GraphPose& first, const FilterSettings& settings);
-  /// With the prior of the speed.
-  NeighborTrack(Timestamp stamp, const GaussianPose& T_B_N, const FilterSettings& settings);
+  /// One of the poses of `start`, with the prior of the speed. If they are of all headings, this
+  /// one's is held.
+  NeighborTrack(Timestamp stamp, const GaussianPose& T_seer_seen, const OneWayInitialization& start,
+                const FilterSettings& settings);
+
+  /// The heading is estimated from now on.
+  void release_heading();
 
   /// Sets the process noise.
   void set_noise(const ProcessNoise& noise);
@@ -47,6 +56,7 @@ class NeighborTrack {
   [[nodiscard]] std::vector<Part> split() const;
 
   [[nodiscard]] RelativeMotion motion() const;
+  /// T_B_N, with what an arc is off its tangent.
   [[nodiscard]] GaussianPose pose() const;
   /// Of the velocity, the largest of the axes [m/s]; zero for the paper's filter.
   [[nodiscard]] double speed_sigma() const;
@@ -70,6 +80,9 @@ class NeighborTrack {
   [[nodiscard]] bool is_contradicted() const;
 
  private:
+  /// Corrects by the reading, in the filter's axes.
+  Fusion correct(NeighborFilter& filter, const Measurement& measurement,
+                 const PairMounting& mounting, const Gates& gates) const;
   /// The filter has one misalignment a robot: that of the camera in use. Bearings of the robot's
   /// other cameras are skipped until that camera has been silent for a while.
   Fusion fuse_bearing(NeighborFilter& filter, const Measurement& bearing,
@@ -92,6 +105,7 @@ class NeighborTrack {
   };
 
   std::variant<NeighborFilter, PaperFilter> filter_;
+  FilterAxes axes_ = FilterAxes::kOurs;
   Priors priors_;
   std::array<Timestamp, kMeasurementKindCount> last_ = [] {
     std::array<Timestamp, kMeasurementKindCount> never{};

@@ -119,10 +119,12 @@ std::optional<RangeReading> ObservationBuffer::range_at(Timestamp t) const {
 }
 
 /// Between the antennas, whose places relative to camera and ring are not known before the pose.
-std::optional<RangeReading> ObservationBuffer::range_by_ring(const Bearing& bearing) const {
+std::optional<RangeReading> ObservationBuffer::range_by_ring(const Bearing& bearing,
+                                                             const MemberConfig& seer,
+                                                             const MemberConfig& seen) {
   if (bearing.distance_m <= 0.0) return std::nullopt;
-  const double arms_m = (self_.p_body_uwb - bearing.p_B_C).norm() +
-                        (neighbor_.p_body_uwb - neighbor_.p_body_led).norm();
+  const double arms_m =
+      (seer.p_body_uwb - bearing.p_B_C).norm() + (seen.p_body_uwb - seen.p_body_led).norm();
   const double scale_m = kRingScaleSigma * bearing.distance_m;
   return RangeReading{bearing.distance_m, std::hypot(bearing.distance_sigma_m, scale_m, arms_m)};
 }
@@ -152,7 +154,7 @@ MutualInitializations ObservationBuffer::mutual_initializations(const Bearing& p
   std::vector<MutualInitialization> found;
   NoPoseReason reason = NoPoseReason::kNone;
   for (const Bearing& bearing : own) {
-    const auto range = measured ? measured : range_by_ring(bearing);
+    const auto range = measured ? measured : range_by_ring(bearing, self_, neighbor_);
     if (!range) {
       reason = NoPoseReason::kNoRange;
       continue;
@@ -176,27 +178,34 @@ MutualInitializations ObservationBuffer::mutual_initializations(const Bearing& p
 }
 
 std::optional<Measurement> ObservationBuffer::one_way_initialization(
-    const RobotState& self, const RobotState& neighbor) const {
+    FilterAxes axes, const RobotState& self, const RobotState& neighbor) const {
   constexpr int kHeadings = 24;
+  const bool we_see = axes == FilterAxes::kOurs;
+  const MemberConfig& seer = we_see ? self_ : neighbor_;
+  const MemberConfig& seen = we_see ? neighbor_ : self_;
+  const std::vector<Bearing>& bearings = we_see ? own_.all() : peer_.all();
   // A range may arrive later than the picture of its instant.
   std::optional<RangeReading> range;
-  const auto newest = std::find_if(own_.all().rbegin(), own_.all().rend(), [&](const Bearing& own) {
-    range = range_at(own.stamp);
-    if (!range) range = range_by_ring(own);
+  const auto newest = std::find_if(bearings.rbegin(), bearings.rend(), [&](const Bearing& bearing) {
+    range = range_at(bearing.stamp);
+    if (!range) range = range_by_ring(bearing, seer, seen);
     return range.has_value();
   });
-  if (newest == own_.all().rend()) return std::nullopt;
-  const Bearing& bearing = *newest;
-  const auto tilt_B = self.tilt_at(bearing.stamp);
-  const auto tilt_N = neighbor.tilt_at(bearing.stamp);
+  if (newest == bearings.rend()) return std::nullopt;
+  const auto tilt_B = self.tilt_at(newest->stamp);
+  const auto tilt_N = neighbor.tilt_at(newest->stamp);
   if (!tilt_B || !tilt_N) return std::nullopt;
   // Only now: without a tilt there may be no inertial sample either.
-  if (!is_confirmed(bearing, own_.all(), self.imu)) return std::nullopt;
-  auto poses = poses_by_heading(sighting(bearing, *tilt_B, self_), sighting({}, *tilt_N, neighbor_),
-                                range->range_m, range->sigma_m, kHeadings);
+  if (we_see ? !is_confirmed(*newest, bearings, self.imu)
+             : !is_confirmed_by_next(*newest, bearings, neighbor.imu))
+    return std::nullopt;
+  auto poses = poses_by_heading(sighting(*newest, we_see ? *tilt_B : *tilt_N, seer),
+                                sighting({}, we_see ? *tilt_N : *tilt_B, seen), range->range_m,
+                                range->sigma_m, kHeadings);
   if (poses.empty()) return std::nullopt;
-  return Measurement{bearing.stamp, MeasurementKind::kRawPose,
-                     OneWayInitialization{std::move(poses)}};
+  return Measurement{
+      newest->stamp, MeasurementKind::kRawPose,
+      OneWayInitialization{std::move(poses), axes, (we_see ? tilt_N : tilt_B)->up_B}};
 }
 
 }  // namespace crepes

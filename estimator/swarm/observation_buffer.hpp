@@ -45,9 +45,10 @@ class ObservationBuffer {
                                                              const RobotState& self,
                                                              const RobotState& neighbor) const;
 
-  /// Poses at the stamp of the newest own bearing with a range, for a neighbor that does not see
-  /// us.
-  [[nodiscard]] std::optional<Measurement> one_way_initialization(const RobotState& self,
+  /// Poses at the stamp of the newest bearing with a range, in the axes of the robot that sees the
+  /// other one.
+  [[nodiscard]] std::optional<Measurement> one_way_initialization(FilterAxes axes,
+                                                                  const RobotState& self,
                                                                   const RobotState& neighbor) const;
 
  private:
@@ -56,7 +57,8 @@ class ObservationBuffer {
                                   const MemberConfig& member) const;
   [[nodiscard]] std::vector<Bearing> own_at(Timestamp t, const ImuHistory& imu) const;
   [[nodiscard]] std::optional<RangeReading> range_at(Timestamp t) const;
-  [[nodiscard]] std::optional<RangeReading> range_by_ring(const Bearing& bearing) const;
+  static std::optional<RangeReading> range_by_ring(const Bearing& bearing, const MemberConfig& seer,
+                                                   const MemberConfig& seen);
 
   struct StampedRange {
     Timestamp stamp{};

@@ -3,8 +3,12 @@
 #include <utility>
 #include <variant>
 
+#include "estimator/core/constants.hpp"
+
 namespace crepes {
 namespace {
+
+constexpr double kKnown = radians(5.0);  // one sigma, all axes together
 
 bool lacks_reading(const MutualInitializations& result) {
   const auto* const reason = std::get_if<NoPoseReason>(&result);
@@ -73,9 +77,12 @@ void TrackInitiator::join_waiting(Timestamp due, const RobotState& self, const R
 void TrackInitiator::add_peer_estimate(const NeighborEstimate& estimate,
                                        const HypothesisSet& hypotheses,
                                        ReadingIntake& intake) const {
-  if (!traits_.starts_one_way || !hypotheses.empty() || !one_way_lasts_) return;
-  intake.enqueue(
-      {estimate.stamp, MeasurementKind::kRawPose, OneWayInitialization{{inverse(estimate.T_B_N)}}});
+  const bool is_wanted = hypotheses.empty() || hypotheses.has_open_heading();
+  if (!is_wanted || one_way_ != FilterAxes::kNeighbors) return;
+  // One that hardly knows how we are turned may be wrong by more than it says.
+  if (estimate.T_B_N.covariance.bottomRightCorner<3, 3>().trace() > kKnown * kKnown) return;
+  intake.enqueue({estimate.stamp, MeasurementKind::kRawPose,
+                  OneWayInitialization{{estimate.T_B_N}, FilterAxes::kNeighbors}});
 }
 
 void TrackInitiator::tick(Timestamp now, const RobotState& self, const RobotState& neighbor,
@@ -86,9 +93,11 @@ void TrackInitiator::tick(Timestamp now, const RobotState& self, const RobotStat
   const bool we_see = now - intake.last_contact().seen < kSeenRecently;
   const bool it_sees = now - intake.last_contact().seen_by < kSeenRecently;
   if (one_way_since_ == kNever || we_see == it_sees) one_way_since_ = now;
-  one_way_lasts_ = now - one_way_since_ > kLasting;
-  if (!one_way_lasts_ || !we_see || !hypotheses.empty() || !traits_.starts_one_way) return;
-  if (auto first = observations_.one_way_initialization(self, neighbor))
+  one_way_.reset();
+  if (traits_.starts_one_way && now - one_way_since_ > kLasting)
+    one_way_ = we_see ? FilterAxes::kOurs : FilterAxes::kNeighbors;
+  if (!one_way_ || !hypotheses.empty()) return;
+  if (auto first = observations_.one_way_initialization(*one_way_, self, neighbor))
     intake.enqueue(std::move(*first));
 }
 

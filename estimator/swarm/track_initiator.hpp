@@ -29,11 +29,12 @@ class TrackInitiator {
   /// ours is missing, it may come later than the bearing: the next ticks try again.
   void add_peer_bearing(const Bearing& bearing, const RobotState& self, const RobotState& neighbor,
                         const HypothesisSet& hypotheses, ReadingIntake& intake);
-  /// Queues the inverse of the neighbor's estimate of us, if only the neighbor sees us.
+  /// Queues the neighbor's estimate of us, if only the neighbor sees us, it knows how we are
+  /// turned, and we do not.
   void add_peer_estimate(const NeighborEstimate& estimate, const HypothesisSet& hypotheses,
                          ReadingIntake& intake) const;
   /// Queues raw poses of bearings that have waited for the reorder buffer's lag, and a one-way
-  /// initialization, if only we see the neighbor. Call once a tick.
+  /// initialization, if only one of the two sees the other. Call once a tick.
   void tick(Timestamp now, const RobotState& self, const RobotState& neighbor,
             const HypothesisSet& hypotheses, ReadingIntake& intake);
 
@@ -60,7 +61,7 @@ class TrackInitiator {
   ObservationBuffer observations_;
   BoundedFifo<Bearing, 256> waiting_;  ///< of the neighbor; readings of ours are missing
   Timestamp one_way_since_ = kNever;
-  bool one_way_lasts_ = false;
+  std::optional<FilterAxes> one_way_;  ///< of the robot that sees, if only one has for a while
   NoPoseReason raw_pose_reason_ = NoPoseReason::kNotSeen;
 };
 

@@ -92,7 +92,7 @@ inline Matrix6d covariance(double attitude_rad = 0.02) {
 }
 
 inline NeighborTrack track_at(Timestamp t, const GaussianPose& pose = {kTruth, covariance()}) {
-  return {t, pose, settings()};
+  return {t, pose, OneWayInitialization{{pose}}, settings()};
 }
 
 inline Fusion fuse(NeighborTrack& track, const Measurement& z) {

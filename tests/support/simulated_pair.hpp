@@ -146,6 +146,14 @@ class SimulatedPair {
             .range_sigma_m = std::hypot(noise_.range, noise_.priors.range_bias_m)};
   }
 
+  /// Both robots move `pace` times as fast from the start. Call before anything is sampled.
+  void set_pace(double pace) {
+    for (SmoothFlight* flight : {&B_, &N_}) {
+      flight->rate *= pace;
+      flight->yaw_rate *= pace;
+    }
+  }
+
   /// Something hits B, or N: its velocity changes at once.
   void hit_B(Timestamp stamp, const Eigen::Vector3d& v_W) {
     B_.blows.push_back({seconds(stamp), v_W});

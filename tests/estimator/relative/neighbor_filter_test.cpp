@@ -159,5 +159,34 @@ TEST(PaperFilter, IsAtLeastAsAccurateAsTheRawPosesItIsFed) {
   EXPECT_LT(filtered(1), raw(1));
 }
 
+/// The variance of a turn about this axis.
+double turn_variance(const NeighborFilter& filter, const Eigen::Vector3d& axis_N) {
+  return axis_N.dot(filter.pose_covariance().bottomRightCorner<3, 3>() * axis_N);
+}
+
+TEST(NeighborFilter, HeldHeadingIsNotCorrectedAndStaysAsUncertain) {
+  SimulatedPair pair(4);
+  pair.sample_imus(Timestamp{test::kStart});
+  const Pose truth = pair.truth(Timestamp{test::kStart}).motion.T_B_N;
+  const GaussianPose start{truth, 0.04 * Matrix6d::Identity()};
+  NeighborFilter held(Timestamp{test::kStart}, start, pair.process_noise(), pair.priors());
+  const Eigen::Vector3d up_N = so3_exp({0.1, -0.2, 0.4}) * Eigen::Vector3d::UnitZ();
+  NeighborFilter estimated = held;
+  held.hold_heading(up_N);
+  const double before = turn_variance(held, up_N);
+
+  test::run(held, pair, 1s);
+  test::run(estimated, pair, 1s);
+
+  const Eigen::Quaterniond turn = pair.imu_N.rotation(Timestamp{test::kStart}, held.stamp());
+  const Eigen::Vector3d up_then = turn.conjugate() * up_N;
+  EXPECT_NEAR(std::sqrt(turn_variance(held, up_then)), std::sqrt(before), 0.02 * std::sqrt(before));
+  EXPECT_LT(turn_variance(estimated, up_then), 0.5 * before);
+
+  held.release_heading();
+  test::run(held, pair, 1s);
+  EXPECT_LT(turn_variance(held, up_then), 0.5 * before);
+}
+
 }  // namespace
 }  // namespace crepes::neighbor_filter_test

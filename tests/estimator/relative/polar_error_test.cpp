@@ -141,5 +141,17 @@ TEST(PolarError, WhatBearingsDoNotObserveStaysSo) {
   }
 }
 
+TEST(PolarError, TheAttitudeOfARobotThatSeesNothingKeepsItsError) {
+  RandomGeometry random(5);
+  for (int i = 0; i < kMotions; ++i) {
+    const RelativeMotion before = random_motion(random);
+    const RelativeMotion after = near(before, random);
+    const MotionTransport T = error_transport_of_blind(before, after);
+    const MotionTransport seeing = error_transport(before, after);
+    EXPECT_EQ(T.middleRows<3>(E::kTheta), MotionTransport::Identity().middleRows<3>(E::kTheta));
+    EXPECT_EQ(T.topRows<6>(), seeing.topRows<6>());
+  }
+}
+
 }  // namespace
 }  // namespace crepes::polar_error_test

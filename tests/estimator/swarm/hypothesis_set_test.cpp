@@ -18,11 +18,12 @@ using namespace test::resting;
 /// `count` filters of a robot four meters ahead, which differ in its heading.
 OneWayInitialization headings(int count) {
   OneWayInitialization start;
+  start.up_seen = Eigen::Vector3d::UnitZ();
   const Vector6d sigma{{0.1, 0.1, 0.1, 0.02, 0.02, 0.02}};
   for (int i = 0; i < count; ++i) {
     Vector6d turn = Vector6d::Zero();
     turn(5) = 0.3 * i / count;
-    start.T_B_N.push_back({perturbed(kTruth, turn), sigma.cwiseAbs2().asDiagonal()});
+    start.T_seer_seen.push_back({perturbed(kTruth, turn), sigma.cwiseAbs2().asDiagonal()});
   }
   return start;
 }
@@ -247,6 +248,19 @@ TEST(Hypotheses, AOneWayTrackStartsOnlyIfThereIsNone) {
   hypotheses.clear();
   EXPECT_TRUE(hypotheses.initialize(at_ms(0), headings(3)));
   EXPECT_EQ(hypotheses.leader().size(), 3U);
+}
+
+TEST(Hypotheses, AKnownHeadingReplacesAnOpenOneOnly) {
+  HypothesisSet hypotheses(settings(), kMounting);
+  const OneWayInitialization known{{{kTruth, covariance()}}};
+  ASSERT_TRUE(hypotheses.initialize(at_ms(0), headings(24)));
+  ASSERT_TRUE(hypotheses.has_open_heading());
+
+  EXPECT_TRUE(hypotheses.initialize(at_ms(0), known));
+
+  EXPECT_EQ(hypotheses.leader().size(), 1U);
+  EXPECT_FALSE(hypotheses.has_open_heading());
+  EXPECT_FALSE(hypotheses.initialize(at_ms(0), known));
 }
 
 TEST(Hypotheses, TheGraphsPoseReplacesAll) {

@@ -73,12 +73,13 @@ class View {
     for (; now_ <= end; now_ += 1s) neighbor_.tick(now_, self_);
   }
 
-  /// What the other makes of us at this instant, off by a few centimeters and degrees.
-  void add_estimate_of_us() {
+  /// What the other makes of us at this instant, off by a few centimeters and `attitude_rad` about
+  /// each axis.
+  void add_estimate_of_us(double attitude_rad) {
     ReceivedReport received = report({});
     const RelativeMotion motion = pair_.truth(received.report.stamp).motion;
     Vector6d sigma;
-    sigma << Eigen::Vector3d::Constant(0.05), Eigen::Vector3d::Constant(0.03);
+    sigma << Eigen::Vector3d::Constant(0.05), Eigen::Vector3d::Constant(attitude_rad);
     const Matrix6d P = sigma.cwiseAbs2().asDiagonal();
     received.report.estimates = {{received.report.stamp,
                                   kSelf,
@@ -238,17 +239,39 @@ TEST(Neighbor, IsLocatedInTimeAlthoughItDoesNotSeeUs) {
   EXPECT_EQ(view.neighbor().output().pose()->reset_counter, 1U);
 }
 
-TEST(Neighbor, IsLocatedByItsOwnEstimateOfUsWhereWeDoNotSeeIt) {
+TEST(Neighbor, IsLocatedByWhatItSeesOfUsWhereWeDoNotSeeIt) {
   View view;
-  view.run_until(Timestamp{3s}, {.bearings = false});
+
+  view.run_until(Timestamp{13s}, {.bearings = false});
+
+  ASSERT_TRUE(view.neighbor().output().pose());
+  const GaussianPose& said = view.neighbor().output().pose()->T_B_N;
+  const Vector6d e = view.error();
+  EXPECT_LT(e.dot(said.covariance.inverse() * e), 22.5);  // one in a thousand
+  EXPECT_LT(e.tail<3>().norm(), 0.15);
+}
+
+TEST(Neighbor, IsLocatedAtOnceByItsOwnEstimateOfUsWhereWeDoNotSeeIt) {
+  View view;
+  view.run_until(Timestamp{2s} + 600ms, {.bearings = false});
   ASSERT_EQ(view.reason(), NoPoseReason::kNotSeen);
 
-  view.add_estimate_of_us();
-  view.run_until(Timestamp{4s}, {.bearings = false});
+  view.add_estimate_of_us(0.03);
+  view.run_until(Timestamp{2s} + 800ms, {.bearings = false});
 
   ASSERT_TRUE(view.neighbor().output().pose());
   EXPECT_LT(view.error().head<3>().norm(), 0.35);
   EXPECT_LT(view.error().tail<3>().norm(), 0.1);
+}
+
+TEST(Neighbor, IsNotLocatedByAnEstimateThatHardlyKnowsHowWeAreTurned) {
+  View view;
+  view.run_until(Timestamp{2s} + 600ms, {.bearings = false});
+
+  view.add_estimate_of_us(0.1);
+  view.run_until(Timestamp{2s} + 800ms, {.bearings = false});
+
+  EXPECT_FALSE(view.neighbor().output().pose());
 }
 
 TEST(Neighbor, IsPredictedForAWhileAndSaysSo) {

@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 
+#include "estimator/relative/arc_pose.hpp"
 #include "tests/support/resting_pair.hpp"
+#include "tests/support/simulated_pair.hpp"
 
 namespace crepes::neighbor_track_test {
 namespace {
@@ -224,6 +227,48 @@ TEST(NeighborTrack, OfThePapersProfileIsOnePartWithoutCalibration) {
   EXPECT_EQ(track.split().size(), 1U);
   EXPECT_FALSE(track.calibration());
   EXPECT_EQ(track.last(MeasurementKind::kRawPose), at_ms(0));
+}
+
+/// Two tracks of one pair: ours, in the neighbor's axes, and the neighbor's, in its own.
+TEST(TrackInTheNeighborsAxes, IsTheNeighborsTrackOfUsInverted) {
+  test::SimulatedPair pair(3);
+  const Timestamp start{std::chrono::milliseconds{50}};
+  pair.sample_imus(start);
+  const GaussianPose T_N_B{pair.truth(start).motion.T_B_N.inverse(), covariance(0.05)};
+  NeighborTrack ours(start, T_N_B, {{T_N_B}, FilterAxes::kNeighbors}, settings());
+  NeighborTrack theirs(start, T_N_B, {{T_N_B}, FilterAxes::kOurs}, settings());
+  const PairMounting mounting{pair.mounting_B.led, pair.mounting_B.antenna, pair.mounting_N.led,
+                              pair.mounting_N.antenna};
+  const PairMounting mirrored{mounting.p_N_M, mounting.p_N_Q, mounting.p_B_M, mounting.p_B_U};
+  const auto fuse_both = [&](Timestamp t, MeasurementKind kind, MeasurementKind mirrored_kind,
+                             const auto& reading) {
+    const Measurement z{t, kind, reading};
+    const Measurement mirrored_z{t, mirrored_kind, reading};
+    const Fusion fusion = ours.fuse(z, mounting, settings().gates);
+    EXPECT_EQ(fusion.nis, theirs.fuse(mirrored_z, mirrored, settings().gates).nis);
+  };
+  for (int ms = 60; ms <= 2000; ms += 10) {
+    const Timestamp t = at_ms(ms);
+    pair.sample_imus(t);
+    ours.advance_to(t, pair.imu_B, pair.imu_N);
+    theirs.advance_to(t, pair.imu_N, pair.imu_B);
+    using enum MeasurementKind;
+    fuse_both(t, kPeerBearing, kBearing, pair.peer_bearing(t));
+    if (ms > 1000) fuse_both(t, kBearing, kPeerBearing, pair.bearing(t));
+    if (ms % 40 == 0) fuse_both(t, kRange, kPeerRange, pair.range(t));
+  }
+
+  const GaussianPose T_B_N = inverse_on_arc(theirs.pose());
+  EXPECT_LT(pose_difference(ours.pose().pose, T_B_N.pose).norm(), 1e-12);
+  EXPECT_LT((ours.pose().covariance - T_B_N.covariance).norm(), 1e-12);
+  const Vector6d e = pose_difference(T_B_N.pose, pair.truth(at_ms(2000)).motion.T_B_N);
+  EXPECT_LT(e.dot(T_B_N.covariance.inverse() * e), 22.5);
+  const RelativeMotion truth = pair.truth(at_ms(2000)).motion;
+  EXPECT_LT((ours.motion().v_B_N - truth.v_B_N).norm(), 0.1);
+  using R = CalibrationRecord;
+  EXPECT_EQ(ours.calibration()->value[R::kGyroB], theirs.calibration()->value[R::kGyroN]);
+  EXPECT_EQ(ours.calibration()->value[R::kMisalignN], theirs.calibration()->value[R::kMisalignB]);
+  EXPECT_EQ(ours.last(MeasurementKind::kPeerBearing), at_ms(2000));
 }
 
 }  // namespace

@@ -228,9 +228,9 @@ TEST_F(Sighted, ItsCovarianceIsPositiveDefinite) {
 TEST_F(Sighted, ARobotWithoutAnImuStartsNothingFromWhatItSees) {
   buffer_.add_own_bearing(own(kNow));
   add_range(kNow);
-  EXPECT_TRUE(buffer_.one_way_initialization(self_, neighbor_));
+  EXPECT_TRUE(buffer_.one_way_initialization(FilterAxes::kOurs, self_, neighbor_));
 
-  EXPECT_FALSE(buffer_.one_way_initialization({}, neighbor_));
+  EXPECT_FALSE(buffer_.one_way_initialization(FilterAxes::kOurs, {}, neighbor_));
 }
 
 }  // namespace
