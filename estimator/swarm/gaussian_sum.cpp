@@ -121,8 +121,8 @@ const NeighborTrack& GaussianSum::heaviest() const { return parts_[heaviest_].tr
 
 GaussianPose GaussianSum::mean(const NeighborTrack& heaviest, const ImuHistory& imu_B,
                                const ImuHistory& imu_N) const {
+  if (parts_.size() == 1) return heaviest.pose();
   const GaussianPose now = heaviest.pose();
-  if (parts_.size() == 1) return now;
   const GaussianPose center = this->heaviest().pose();
   Vector6d mean = Vector6d::Zero();
   Matrix6d moment = Matrix6d::Zero();

@@ -247,11 +247,12 @@ std::vector<NeighborTrack::Part> NeighborTrack::split() const {
 }
 
 RelativeMotion NeighborTrack::motion() const {
-  const RelativeMotion motion =
-      std::visit([](const auto& filter) { return filter.motion(); }, filter_);
-  if (axes_ == FilterAxes::kOurs) return motion;
-  const Pose T_B_N = motion.T_B_N.inverse();
-  return {T_B_N, -(T_B_N.q * motion.v_B_N)};
+  RelativeMotion motion = std::visit([](const auto& filter) { return filter.motion(); }, filter_);
+  if (axes_ == FilterAxes::kNeighbors) {
+    motion.T_B_N = motion.T_B_N.inverse();
+    motion.v_B_N = -(motion.T_B_N.q * motion.v_B_N);
+  }
+  return motion;
 }
 
 GaussianPose NeighborTrack::pose() const {

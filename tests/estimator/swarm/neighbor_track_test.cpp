@@ -163,8 +163,9 @@ TEST_F(RangedTrack, IsHonestWhereRangesGrowLongerOutOfSight) {
 TEST_F(RangedTrack, IsContradictedByAllRangesOfASecondUntilOneFits) {
   for (int ms = kRangedMs; ms <= kRangedMs + 1010; ms += 10) {
     add_sightings(ms);
-    if (ms == kRangedMs || ms == kRangedMs + 1000)
+    if (ms == kRangedMs || ms == kRangedMs + 1000) {
       ASSERT_EQ(fuse_at(ms, range({}, 7.0)).verdict, Verdict::kGated);
+    }
     EXPECT_EQ(track_.is_contradicted(), ms >= kRangedMs + 1000) << ms;
   }
   ASSERT_EQ(fuse_at(kRangedMs + 1010, peer_range({})).verdict, Verdict::kFused);
