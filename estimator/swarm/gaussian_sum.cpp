@@ -15,7 +15,7 @@ constexpr double kFalseBearings = 0.1;  // density of clutter for each true one 
 
 // How much of the evidence of each reading counts between headings.
 constexpr double kEvidence = 0.5;
-// So many parts are neighbors of one another: the heading is known to 20 degrees.
+// Once so few are left, tilt and speed are known, and the parts may estimate their headings.
 constexpr std::size_t kFew = 3;
 
 // Squared Mahalanobis distance of a pose, by the covariance of the other.

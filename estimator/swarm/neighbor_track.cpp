@@ -195,7 +195,7 @@ void NeighborTrack::GatedRun::add(Timestamp stamp, const Fusion& fusion) {
 Fusion NeighborTrack::correct(NeighborFilter& filter, const Measurement& measurement,
                               const PairMounting& mounting, const Gates& gates) const {
   if (axes_ == FilterAxes::kOurs) return fuse_tight(filter, measurement, mounting, gates);
-  // Its filter knows the distance of a ring that its own camera sees.
+  // A filter has no model of what the other robot's camera sees of a ring's size.
   if (measurement.kind == MeasurementKind::kRingDistance) return {.verdict = Verdict::kSkipped};
   return fuse_tight(filter, mirrored(measurement), mirrored(mounting), gates);
 }

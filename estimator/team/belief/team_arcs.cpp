@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "estimator/core/so3.hpp"
+#include "estimator/relative/arc_pose.hpp"
 
 namespace crepes {
 namespace {
@@ -22,11 +23,6 @@ constexpr double kMostLeft = 0.5;
 // A bend lasts as long as its attitude's error. One that lasts for ten seconds weighs as much as
 // independent ones of so many times its variance in each interval.
 constexpr double kLastingBend = 100.0;
-
-/// u . (phi x (phi x arm)) as a quadratic form in phi.
-Matrix3d turned_twice(const Vector3d& u, const Vector3d& arm) {
-  return 0.5 * (u * arm.transpose() + arm * u.transpose()) - u.dot(arm) * Matrix3d::Identity();
-}
 
 bool is_open(const TeamBelief& belief, const TeamRobot& robot) {
   return robot.motion_index >= 0 &&
