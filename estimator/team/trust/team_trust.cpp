@@ -20,6 +20,7 @@ constexpr Duration kLateProbation = std::chrono::seconds{3};
 constexpr double kAgreed = 4.0;    // times what contradicts
 constexpr int kMostDoublings = 5;  // of a probation, that is 32 s
 constexpr Duration kLossMemory = std::chrono::seconds{10};
+constexpr Duration kMisplacedRecord = std::chrono::seconds{60};  // then ranges may be repaired
 constexpr int kMostRestarts = 2;  // of an attitude, within kLossMemory
 constexpr double kDoubtPerLoss = 4.0;
 constexpr double kTurnedChi2 = 25.0;  // exceeded by one right camera in 65,000
@@ -151,6 +152,7 @@ std::vector<RobotId> TeamTrust::note_lost(const TeamInterval& interval, const Te
   std::erase_if(losses_, is_away);
   std::erase_if(restarts_, is_away);
   std::erase_if(misled_by_, is_away);
+  std::erase_if(misplaced_, is_away);
   std::erase_if(leaps_, [&](const auto& entry) { return is_away(entry.first); });
   // A robot with a false gyroscope may be silent for that very reason.
   std::erase_if(gyro_doubts_, [&](const auto& entry) {
@@ -184,7 +186,8 @@ std::vector<RobotId> TeamTrust::note_lost(const TeamInterval& interval, const Te
     if (is_tried_again || id == belief.self) continue;
     const double variance = belief.P.diagonal().segment<3>(robot.motion_index).sum();
     const bool has_imu = interval.member(id) != nullptr;
-    const bool is_wrong = has_imu && is_contradicted(belief, all, id);
+    const bool is_wrong =
+        has_imu && (note_misplaced(belief, id) || is_contradicted(belief, all, id));
     const bool is_restarted = has_imu && !is_disoriented(belief, id) &&
                               std::ranges::any_of(robot.cameras, std::bind_front(is_alone_of, id));
     if (is_wrong) count(losses_, id, belief.stamp);
@@ -193,6 +196,14 @@ std::vector<RobotId> TeamTrust::note_lost(const TeamInterval& interval, const Te
       lost.push_back(id);
   }
   return lost;
+}
+
+/// If ranges contradict its next place, too, they are false.
+bool TeamTrust::note_misplaced(const TeamBelief& belief, RobotId id) {
+  const auto last = misplaced_.try_emplace(id, kNever).first;
+  const bool is_new = belief.stamp - last->second >= kMisplacedRecord && is_misplaced(belief, id);
+  if (is_new) last->second = belief.stamp;
+  return is_new;
 }
 
 std::vector<RobotId> TeamTrust::note_turned(const TeamInterval& interval,

@@ -18,9 +18,11 @@ class TeamTrust {
  public:
   /// Notices robots that must be removed from the belief, and counts that: they have no IMU, are
   /// too uncertain, or are contradicted by most cameras that see them. In a tie, the robot that
-  /// came last is removed. Also robots whose camera agrees with nobody and contradicts only whom
-  /// other cameras confirm, at most twice in ten seconds: their attitude is wrong. Also robots
-  /// whose camera was refused for so long that it is tried again. Forgets verdicts that have ended.
+  /// came last is removed. Also robots whose place most ranges contradict, in both directions, once
+  /// a minute. Also robots whose camera agrees with nobody and
+  /// contradicts only whom other cameras confirm, at most twice in ten seconds: their attitude is
+  /// wrong. Also robots whose camera was refused for so long that it is tried again. Forgets
+  /// verdicts that have ended.
   [[nodiscard]] std::vector<RobotId> note_lost(const TeamInterval& interval,
                                                const TeamBelief& belief);
 
@@ -95,6 +97,7 @@ class TeamTrust {
     bool is_withdrawn = false;
     std::optional<std::size_t> knocked{};  ///< which of its cameras
   };
+  [[nodiscard]] bool note_misplaced(const TeamBelief& belief, RobotId id);
   void review_verdicts(const TeamInterval& interval, const TeamBelief& belief);
   void convict(RobotId robot, std::size_t camera, Timestamp now, const Eigen::Vector3d& turn);
   [[nodiscard]] bool is_strained(RobotId robot, Timestamp now) const;
@@ -113,6 +116,7 @@ class TeamTrust {
   std::map<RobotId, Verdict> verdicts_;
   std::map<RobotId, GyroDoubt> gyro_doubts_;
   std::map<std::pair<RobotId, std::size_t>, Timestamp> leaps_;  ///< of what a camera sees
+  std::map<RobotId, Timestamp> misplaced_;                      ///< when ranges showed that
   std::map<RobotId, Timestamp> misled_by_;                      ///< when that robot was found
 };
 

@@ -1,9 +1,12 @@
 #include "estimator/team/trust/witnesses.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace crepes {
 namespace {
+
+constexpr double kExplained = 4.0;  // sigmas of a distance by which it may be wrong
 
 /// Whether another camera than `observer`'s contradicts the place of `id`.
 bool others_contradict(const TeamBelief& belief, RobotId observer, RobotId id) {
@@ -38,6 +41,22 @@ bool contradicts_more(const TeamBelief& belief, RobotId observer, const TeamCame
     }
   }
   return contradicted > agreed;
+}
+
+/// Whether the ranges that both robots of a pair measured are refused, and by no more than their
+/// places may be wrong.
+bool contradicts_place(const TeamBelief& belief, const RobotPair& pair,
+                       const TeamRangeBias& range) {
+  const auto [i, j] = pair;
+  const Eigen::Vector3d u =
+      (belief.robots.at(j).motion.p_F - belief.robots.at(i).motion.p_F).normalized();
+  const double sigma_m = std::sqrt(u.dot(belief.position_covariance(i, j) * u));
+  return range.agreement.size() == 2 &&
+         std::ranges::all_of(range.agreement, [&](const auto& entry) {
+           const auto& [observer, agreement] = entry;
+           return agreement.gated > agreement.fused &&
+                  std::abs(range.refused_m.at(observer)) < kExplained * sigma_m;
+         });
 }
 
 }  // namespace
@@ -138,6 +157,22 @@ bool is_contradicted(const TeamBelief& belief, const Witnesses& all, RobotId id)
   });
   return of_robot.contradict > of_robot.agree ||
          (of_robot.contradict == of_robot.agree && came_last);
+}
+
+bool is_misplaced(const TeamBelief& belief, RobotId id) {
+  if (!ranges_of(belief, id).is_contradiction()) return false;
+  int measured = 0;
+  int contradicted = 0;
+  for (const auto& [pair, range] : belief.ranges) {
+    if (pair.first != id && pair.second != id) continue;
+    double readings = 0.0;
+    for (const auto& [observer, agreement] : range.agreement)
+      readings += agreement.fused + agreement.gated;
+    if (readings <= 1.0) continue;
+    ++measured;
+    contradicted += contradicts_place(belief, pair, range) ? 1 : 0;
+  }
+  return contradicted >= 2 && 2 * contradicted > measured;
 }
 
 bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id) {

@@ -51,6 +51,9 @@ struct OwnRanges {
 /// Whether most of these witnesses contradict the robot's place. In a tie, it is the robot that
 /// came last of all that are contradicted.
 [[nodiscard]] bool is_contradicted(const TeamBelief& belief, const Witnesses& all, RobotId id);
+/// Whether ranges contradict the robot's place, as a wrong place would let them: those that it
+/// measured and those to it, to most of the others and to two at least.
+[[nodiscard]] bool is_misplaced(const TeamBelief& belief, RobotId id);
 /// Whether the robot's place agrees with the ranges that it measured, but not with those that
 /// trusted robots measured to it. A trusted robot whose own ranges are false says nothing of that.
 [[nodiscard]] bool is_placed_by_its_own_ranges(const TeamBelief& belief, RobotId id);

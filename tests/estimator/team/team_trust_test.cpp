@@ -34,6 +34,33 @@ TEST_F(TrustOfFour, ARobotWhosePlaceMostCamerasContradictIsLost) {
   EXPECT_EQ(lost(), Ids{kAccused});
 }
 
+TEST_F(TrustOfFour, ARobotWhosePlaceMostRangesContradictInBothDirectionsIsLostOnce) {
+  range_to_all(kAccused, kContradicts, kContradicts, 0.15);
+  EXPECT_EQ(lost(), Ids{kAccused});
+  EXPECT_TRUE(lost().empty());
+  wait(61s);
+  EXPECT_EQ(lost(), Ids{kAccused});
+}
+
+TEST_F(TrustOfFour, RangesThatOnlyOneModuleMeasuresLongSayNothingOfAPlace) {
+  range_to_all(kAccused, kContradicts, kAgrees, 0.15);
+  EXPECT_TRUE(lost().empty());
+  range_to_all(kAccused, kAgrees, kContradicts, 0.15);
+  EXPECT_TRUE(lost().empty());
+}
+
+// The distance is known to 5 cm: ranges that are half a metre too long went through something.
+TEST_F(TrustOfFour, RangesThatAreMuchTooLongSayNothingOfAPlace) {
+  range_to_all(kAccused, kContradicts, kContradicts, 0.5);
+  EXPECT_TRUE(lost().empty());
+}
+
+TEST_F(TrustOfFour, RangesToOneOtherRobotSayNothingOfAPlace) {
+  range_to_all(kAccused, kContradicts, kContradicts, 0.15);
+  for (const RobotId robot : {kSelf, kSecond}) range(robot, kAccused, kAgrees, kAgrees, 0.0);
+  EXPECT_TRUE(lost().empty());
+}
+
 TEST_F(TrustOfFour, ARobotIsLessCertainEachTimeItIsLostAndLikeOthersLater) {
   contradict_its_place(kAccused);
   EXPECT_EQ(lost(), Ids{kAccused});

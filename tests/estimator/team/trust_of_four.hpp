@@ -42,6 +42,17 @@ class TrustOfFour : public testing::Test {
     for (auto& [id, robot] : belief_.robots)
       for (auto& [other, agreement] : robot.cameras[0].agreement) agreement = kAgrees;
   }
+  /// What `one` and `other` think of their ranges to each other, by which those are too long.
+  void range(RobotId one, RobotId other, Agreement of_one, Agreement of_other, double long_m) {
+    TeamRangeBias& range = belief_.ranges.at(ordered(one, other));
+    range.agreement = {{one, of_one}, {other, of_other}};
+    range.refused_m = {{one, long_m}, {other, long_m}};
+  }
+  /// Likewise between a robot and all others.
+  void range_to_all(RobotId robot, Agreement by_it, Agreement to_it, double long_m) {
+    for (const RobotId other : {kSelf, kSecond, kThird, kAccused})
+      if (other != robot) range(robot, other, by_it, to_it, long_m);
+  }
   /// Without anything that happens.
   void wait(Duration time) {
     belief_.stamp += time;
