@@ -12,6 +12,7 @@ constexpr double kNoiseShare = 0.02;       // of one sample in the smoothed nois
 constexpr double kPredictionShare = 0.01;  // ... in the prediction's weights: 1 s
 constexpr double kRidge = 1e-3;            // of the changes' power, in both
 constexpr double kMostGrowth = 2.0;        // from one change to the next
+constexpr double kBeyond = 0.5;            // of its range, for the signal beyond it
 
 using Changes = Eigen::Matrix<double, 3, SignalModel::kChanges>;
 
@@ -46,6 +47,9 @@ double SignalModel::newest_noise_density2(const Past& past, double period_s) {
 void SignalModel::observe(const Past& past, double period_s) {
   const auto smooth = [](double value, double& mean) { mean += kNoiseShare * (value - mean); };
   smooth(newest_noise_density2(past, period_s), noise_density2_);
+  const Eigen::Vector3d newest = past.col(0);
+  low_ = newest.cwiseMin(low_ + kPredictionShare * (newest - low_));
+  high_ = newest.cwiseMax(high_ + kPredictionShare * (newest - high_));
 
   for (int i = 0; i < kHorizons; ++i) {
     Horizon& horizon = horizons_.at(static_cast<std::size_t>(i));
@@ -74,7 +78,13 @@ Eigen::Vector3d SignalModel::change_after(double strides, const Window& window) 
   const Eigen::Vector3d change = before * weights;
   const double most = kMostGrowth * std::max(1.0, strides) * before.colwise().norm().maxCoeff();
   const double size = change.norm();
-  return size > most ? Eigen::Vector3d(most / size * change) : change;
+  const Eigen::Vector3d newest = window.col(0);
+  return limited(newest + (size > most ? most / size : 1.0) * change) - newest;
+}
+
+Eigen::Vector3d SignalModel::limited(const Eigen::Vector3d& signal) const {
+  const Eigen::Vector3d beyond = kBeyond * (high_ - low_);
+  return signal.cwiseMin(high_ + beyond).cwiseMax(low_ - beyond);
 }
 
 double SignalModel::noise_density() const { return std::sqrt(noise_density2_); }

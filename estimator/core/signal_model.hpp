@@ -9,7 +9,9 @@ namespace crepes {
 /// Needs equally spaced samples; its memory is about a second. The second differences of successive
 /// samples, in which motion cancels, give the white noise with the vibration of the airframe. A
 /// linear prediction from the last changes (Makhoul 1975) gives the next ones, each horizon by
-/// weights of its own: a slow swing continues and returns, a vibration returns to the mean.
+/// weights of its own: a slow swing continues and returns, a vibration returns to the mean. The
+/// signal is assumed to stay near what it was within the memory: of a shock after a quiet time,
+/// weights say anything.
 class SignalModel {
  public:
   /// Samples of one change.
@@ -48,7 +50,12 @@ class SignalModel {
     double innovation_density2 = 0.0;
   };
 
+  [[nodiscard]] Eigen::Vector3d limited(const Eigen::Vector3d& signal) const;
+
   double noise_density2_ = 0.0;
+  // The range of the signal, an axis each, which shrinks towards the newest sample.
+  Eigen::Vector3d low_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d high_ = Eigen::Vector3d::Zero();
   std::array<Horizon, kHorizons> horizons_{};
 };
 

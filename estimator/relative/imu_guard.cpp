@@ -28,6 +28,9 @@ constexpr Duration kTypicalPeriod = std::chrono::milliseconds{10};
 // Across a longer gap there is no prediction.
 constexpr Duration kLongestGap = std::chrono::milliseconds{100};
 
+// After a gap no longer than that, a shock that rings may not have ended.
+constexpr Duration kLongestShock = std::chrono::milliseconds{500};
+
 // The change of a robot's speed by a blow, an axis. A robot that hits a wall at 0.5 m/s and is
 // thrown back changes by as much.
 constexpr double kHardestBlow = 1.0;  // m/s
@@ -172,9 +175,12 @@ void ImuGuard::compare(const ImuSample& sample) {
   const ImuSample* const last = newest();
   if (last == nullptr || sample.stamp - last->stamp > kLongestGap) {
     const bool is_doubtful = has_jumped_ || has_refused_;
+    // A first sample that is far off may be a part of a blow.
+    const bool may_be_blow =
+        reference_ && sample.stamp - last->stamp <= kLongestShock && !is_reachable(sample);
     drop_held(ImuFault::kSpike);
     has_jumped_ = is_doubtful && reference_;
-    if (!has_jumped_) reference_.reset();
+    if (!has_jumped_ && !may_be_blow) reference_.reset();
   }
   // The scale learns from refused samples too: a vibration that begins must not be refused for
   // long.

@@ -214,12 +214,21 @@ WireLimits PeerLink::limits(Timestamp now, std::size_t overhead, std::uint32_t m
   const Pace pace = this->pace(now);
   const std::size_t reports = pace.reports * std::max<std::size_t>(mark, 1);
   const std::size_t most = bytes_of(pace, mark > 0, sessions_.relay().is_needed(now));
+  const std::size_t copies =
+      mark > 0 ? kMarkedCopies : copies_for(sessions_.worst_loss_of_ours(now));
   return {.bytes = std::clamp(most, kMinPeerMessage + overhead, kMaxPeerMessage) - overhead,
-          .copies = mark > 0 ? kMarkedCopies : copies_for(sessions_.worst_loss_of_ours(now)),
+          .copies = copies,
           .period = from_seconds(static_cast<double>(reports) / settings_.rate_hz),
           .reports = reports,
           .gyro_step_radps = settings_.gyro_step_radps,
-          .accel_step_mps2 = settings_.accel_step_mps2};
+          .accel_step_mps2 = settings_.accel_step_mps2,
+          .samples_sent = samples_sent(copies)};
+}
+
+/// The newest inertial sample that so many datagrams could carry.
+Timestamp PeerLink::samples_sent(std::size_t copies) const {
+  const std::size_t sent = newest_samples_.size();
+  return sent < copies ? Timestamp::max() : newest_samples_[sent - copies];
 }
 
 std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,
@@ -241,6 +250,9 @@ std::vector<std::uint8_t> PeerLink::compose(const Report& report, Timestamp now,
   const std::size_t overhead =
       (seal ? PacketSeal::kOverhead : 0) + (signer ? PacketSigner::kOverhead : 0);
   EncodedPeerMessage encoded = encode_peer_message(message, limits(now, overhead, message.mark));
+  if (!report.imu.empty())
+    newest_samples_.push_back(std::ranges::max(report.imu, {}, &ImuSample::stamp).stamp);
+  if (newest_samples_.size() > kMostCopies) newest_samples_.pop_front();
   if (signer) encoded.bytes = signer->sign(encoded.bytes);
   if (seal) encoded.bytes = seal->seal(encoded.bytes);
   count(MeshCounter::kSent);

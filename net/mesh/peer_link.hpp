@@ -96,6 +96,7 @@ class PeerLink {
   [[nodiscard]] Pace pace(Timestamp now) const;
   [[nodiscard]] double forwarded_air(Timestamp now) const;
   [[nodiscard]] WireLimits limits(Timestamp now, std::size_t overhead, std::uint32_t mark) const;
+  [[nodiscard]] Timestamp samples_sent(std::size_t copies) const;
 
   RobotId self_;
   SendSettings settings_;
@@ -103,6 +104,7 @@ class PeerLink {
   MeshTrust trust_;
   SignatureLimiter limiter_;
   std::deque<std::pair<Timestamp, std::size_t>> forwarded_;  ///< bytes, in the last second
+  std::deque<Timestamp> newest_samples_;  ///< of the IMU, in each of the latest datagrams
   std::optional<Timestamp> first_sent_;
   std::uint32_t next_sequence_ = 0;
 };

@@ -64,6 +64,9 @@ struct WireLimits {
   std::size_t reports = 1;              ///< that a datagram stands for
   double gyro_step_radps = 1e-3;        ///< coarsest rounding of angular rates
   double accel_step_mps2 = 1e-2;        ///< coarsest rounding of specific forces
+  /// Inertial samples until then have all their copies. Later ones are sent however old they are:
+  /// an IMU's samples may be believed only when others confirm them.
+  Timestamp samples_sent = Timestamp::max();
 };
 
 /// A datagram, and the number of measurements that had no room.

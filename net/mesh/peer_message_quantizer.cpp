@@ -202,7 +202,8 @@ class Quantizer {
     auto samples = newest_first(all);
     const auto copies = static_cast<std::int64_t>(limits_.copies);
     std::erase_if(samples, [&](const ImuSample* sample) {
-      return samples.front()->stamp - sample->stamp >= copies * limits_.period;
+      return samples.front()->stamp - sample->stamp >= copies * limits_.period &&
+             sample->stamp <= limits_.samples_sent;
     });
     if (samples.size() > kMaxItems) samples.resize(kMaxItems);
     if (samples.empty()) return;

@@ -26,10 +26,9 @@ double bytes_within(double air_s, const Broadcasts& broadcasts) {
 std::size_t copies_for(double loss) {
   constexpr double kAllLost = 1.0 / 500;
   constexpr double kLeast = 2.0;
-  constexpr double kMost = 6.0;
   const double p = std::clamp(loss, 1e-9, 0.99);
   return static_cast<std::size_t>(
-      std::clamp(std::ceil(std::log(kAllLost) / std::log(p)), kLeast, kMost));
+      std::clamp(std::ceil(std::log(kAllLost) / std::log(p)), kLeast, double{kMostCopies}));
 }
 
 Pace pace_of(const SendSettings& settings, std::size_t neighbors, double forwarded_air) {

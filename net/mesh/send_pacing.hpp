@@ -31,6 +31,9 @@ struct SendSettings {
   [[nodiscard]] bool operator==(const SendSettings&) const = default;
 };
 
+/// Datagrams that carry a measurement, at most.
+inline constexpr std::size_t kMostCopies = 6;
+
 /// Datagrams that carry each measurement so that one in 500 is lost with all its copies, at least 2
 /// and at most 6. `loss` is the share of datagrams that is lost, each by itself.
 [[nodiscard]] std::size_t copies_for(double loss);

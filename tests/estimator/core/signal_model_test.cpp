@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numbers>
 #include <vector>
 
 #include "tests/support/random_geometry.hpp"
@@ -112,6 +115,34 @@ TEST(SignalModel, ReadsNoiseOffASwing) {
     model.observe(window_at(samples, i), kPeriod);
 
   EXPECT_NEAR(model.noise_density() / (0.1 * std::sqrt(kPeriod)), 1.0, 0.3);
+}
+
+// A rover that drives smoothly hits something, and its suspension rings.
+TEST(SignalModel, DoesNotExplainAShockByTheNoiseBeforeIt) {
+  constexpr int kQuiet = 200;
+  constexpr int kRinging = 50;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    RandomGeometry random(500 + seed);
+    const Eigen::Vector3d amplitude = random.vector(1.0);
+    const double omega = 2.0 * std::numbers::pi * random.uniform(6.0, 14.0);
+    SignalModel model;
+    std::vector<Eigen::Vector3d> samples;
+    double largest = 0.0;
+    for (int i = 0; i < kQuiet + kRinging; ++i) {
+      const double t = kPeriod * std::max(0, i - kQuiet);
+      const double ringing = std::exp(-12.0 * t) * std::sin(omega * t);
+      samples.emplace_back(ringing * amplitude + random.vector(0.01));
+      if (i < SignalModel::Past::ColsAtCompileTime) continue;
+      const auto newest = static_cast<std::size_t>(i);
+      model.observe(window_at(samples, newest), kPeriod);
+      if (i > kQuiet) largest = std::max(largest, samples.back().norm());
+      const auto window = window_at<SignalModel::Window>(samples, newest);
+      for (int strides = 1; strides <= SignalModel::kHorizons && i > kQuiet; ++strides) {
+        const Eigen::Vector3d predicted = samples.back() + model.change_after(strides, window);
+        ASSERT_LT(predicted.norm(), 2.0 * largest + 0.1) << seed << ", " << i << ", " << strides;
+      }
+    }
+  }
 }
 
 TEST(SignalModel, StaysWithinReasonWhateverItSees) {

@@ -446,5 +446,21 @@ TEST(ImuGuard, ForgetsThePredictionInAGap) {
   EXPECT_EQ(guard.accept(after).size(), 1U);
 }
 
+// Else it would stand for the force until the next one is believed: a shock that rings lasts 0.2 s.
+TEST(ImuGuard, DoesNotBelieveAPartOfABlowThatAGapEndsWith) {
+  const auto before = samples_of(kMotions[0], 1, 2 * kSecond);
+  ImuGuard guard;
+  static_cast<void>(believed_of(guard, before));
+  ImuSample blow = before.back();
+  blow.stamp += 120ms;
+  blow.accel_mps2.z() -= 15.0;
+  ImuSample after = before.back();
+  after.stamp = blow.stamp + kPeriod;
+
+  EXPECT_TRUE(guard.accept(blow).empty());
+  EXPECT_EQ(guard.accept(after).size(), 1U);
+  EXPECT_LT(guard.blow_mps(after).z(), 0.0);
+}
+
 }  // namespace
 }  // namespace crepes::imu_guard_test

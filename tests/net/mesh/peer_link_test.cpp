@@ -54,6 +54,26 @@ TEST(PeerLink, ReportsEveryMeasurementOnceAlthoughOneDatagramInThreeIsLost) {
   EXPECT_NEAR(static_cast<double>(traffic[0].lost), 165.0, 50.0);
 }
 
+// An IMU's samples are believed late where others must confirm them.
+TEST(PeerLink, SendsSamplesThatAreBelievedLateHoweverOldTheyAre) {
+  MeshOfTwo mesh;
+  mesh.run_until(102.0);
+  Report report;
+  report.sender = RobotId{2};
+  for (int i = 1; i <= 20; ++i) {
+    report.stamp = mesh.local_of_two() + milliseconds{10 * i};
+    report.imu.push_back({.stamp = report.stamp,
+                          .gyro_radps = Eigen::Vector3d::Zero(),
+                          .accel_mps2 = Eigen::Vector3d::UnitZ()});
+  }
+  const auto bytes = mesh.two.compose(report, report.stamp);
+
+  const auto received = mesh.one.receive(bytes, mesh.local_of_one() + milliseconds{203});
+
+  ASSERT_TRUE(received.has_value());
+  EXPECT_EQ(received->report.imu.size(), 20U);
+}
+
 TEST(PeerLink, RefusesAndCountsForeignDatagrams) {
   MeshOfTwo mesh;
   mesh.run_until(102.0);
