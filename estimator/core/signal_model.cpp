@@ -78,13 +78,10 @@ Eigen::Vector3d SignalModel::change_after(double strides, const Window& window) 
   const Eigen::Vector3d change = before * weights;
   const double most = kMostGrowth * std::max(1.0, strides) * before.colwise().norm().maxCoeff();
   const double size = change.norm();
+  const Eigen::Vector3d bounded = size > most ? Eigen::Vector3d(most / size * change) : change;
   const Eigen::Vector3d newest = window.col(0);
-  return limited(newest + (size > most ? most / size : 1.0) * change) - newest;
-}
-
-Eigen::Vector3d SignalModel::limited(const Eigen::Vector3d& signal) const {
   const Eigen::Vector3d beyond = kBeyond * (high_ - low_);
-  return signal.cwiseMin(high_ + beyond).cwiseMax(low_ - beyond);
+  return bounded.cwiseMin(high_ + beyond - newest).cwiseMax(low_ - beyond - newest);
 }
 
 double SignalModel::noise_density() const { return std::sqrt(noise_density2_); }

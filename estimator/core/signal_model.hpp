@@ -50,8 +50,6 @@ class SignalModel {
     double innovation_density2 = 0.0;
   };
 
-  [[nodiscard]] Eigen::Vector3d limited(const Eigen::Vector3d& signal) const;
-
   double noise_density2_ = 0.0;
   // The range of the signal, an axis each, which shrinks towards the newest sample.
   Eigen::Vector3d low_ = Eigen::Vector3d::Zero();
