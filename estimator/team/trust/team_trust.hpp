@@ -19,10 +19,9 @@ class TeamTrust {
   /// Notices robots that must be removed from the belief, and counts that: they have no IMU, are
   /// too uncertain, or are contradicted by most cameras that see them. In a tie, the robot that
   /// came last is removed. Also robots whose place most ranges contradict, in both directions, once
-  /// a minute. Also robots whose camera agrees with nobody and
-  /// contradicts only whom other cameras confirm, at most twice in ten seconds: their attitude is
-  /// wrong. Also robots whose camera was refused for so long that it is tried again. Forgets
-  /// verdicts that have ended.
+  /// a minute. Also robots whose camera agrees with nobody and contradicts only whom other cameras
+  /// confirm, at most twice in ten seconds: their attitude is wrong. Also robots whose camera was
+  /// refused for so long that it is tried again. Forgets verdicts that have ended.
   [[nodiscard]] std::vector<RobotId> note_lost(const TeamInterval& interval,
                                                const TeamBelief& belief);
 
