@@ -79,9 +79,12 @@ Eigen::Vector3d SignalModel::change_after(double strides, const Window& window) 
   const double most = kMostGrowth * std::max(1.0, strides) * before.colwise().norm().maxCoeff();
   const double size = change.norm();
   const Eigen::Vector3d bounded = size > most ? Eigen::Vector3d(most / size * change) : change;
+  // After a gap the newest sample may be outside the range that was learned before it.
   const Eigen::Vector3d newest = window.col(0);
-  const Eigen::Vector3d beyond = kBeyond * (high_ - low_);
-  return bounded.cwiseMin(high_ + beyond - newest).cwiseMax(low_ - beyond - newest);
+  const Eigen::Vector3d low = low_.cwiseMin(newest);
+  const Eigen::Vector3d high = high_.cwiseMax(newest);
+  const Eigen::Vector3d beyond = kBeyond * (high - low);
+  return bounded.cwiseMin(high + beyond - newest).cwiseMax(low - beyond - newest);
 }
 
 double SignalModel::noise_density() const { return std::sqrt(noise_density2_); }

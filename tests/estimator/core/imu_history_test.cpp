@@ -259,6 +259,20 @@ TEST(ImuHistory, HoldsAfterAGapAndForgetsNothing) {
   EXPECT_NEAR(ahead(20ms), swing_mean(3.18, 3.181), 0.03) << "of what it had learned before";
 }
 
+TEST(ImuHistory, ARateThatTheModelHasNotSeenIsHeld) {
+  ImuHistory imu;
+  const auto expect_held = [&imu](int first, int last, double rate) {
+    for (int i = first; i < last; ++i) {
+      imu.push(sample_at(i * 10ms, rate));
+      const Timestamp t = imu.newest().stamp + 20ms;
+      EXPECT_EQ(imu.mean(t, t + 1ms).gyro_radps.x(), rate) << i;
+    }
+  };
+
+  expect_held(1, 120, 1.8);     // turning since before the first sample
+  expect_held(150, 180, -0.9);  // and another way, after a gap
+}
+
 TEST(ImuHistory, AConstantIsPredictedToTheBit) {
   ImuHistory imu;
   for (int i = 1; i < 300; ++i) imu.push(sample_at(i * 10ms, 0.7));
