@@ -21,12 +21,20 @@ void add(const ImuSample& sample, double dt, ImuMean& sum) {
   sum.accel_mps2 += dt * sample.accel_mps2;
 }
 
-// Integral of the square of the time to the sample that is held, from `since` on and for `dt`.
-double extrapolation_time_squared(double since, double dt) {
+// Adds a time that no sample covers, which begins `since` seconds from the nearest one.
+void extrapolate(double since, double dt, ImuMean& sum) {
   const double most = to_seconds(ImuHistory::kMaxHold);
   const double end = std::min(since + dt, most);
   const double begin = std::min(since, most);
-  return (end * end * end - begin * begin * begin) / 3.0 + most * most * (dt - (end - begin));
+  sum.extrapolated += dt;
+  sum.extrapolation_time2_s2 +=
+      (end * end * end - begin * begin * begin) / 3.0 + most * most * (dt - (end - begin));
+}
+
+// The larger ones hold for all of an interval.
+void raise_densities(double gyro, double accel, ImuMean& sum) {
+  sum.gyro_innovation_density = std::max(sum.gyro_innovation_density, gyro);
+  sum.accel_innovation_density = std::max(sum.accel_innovation_density, accel);
 }
 
 }  // namespace
@@ -103,36 +111,54 @@ double ImuHistory::strides_to(Timestamp from, Timestamp to, double period_s) con
   return std::max(0.0, since / period_s + 0.5) / SignalModel::kStride;
 }
 
+void ImuHistory::add_held(const ImuSample& sample, double dt, ImuMean& sum) const {
+  add(sample, dt, sum);
+  raise_densities(gyro_.hold_density(), accel_.hold_density(), sum);
+}
+
+void ImuHistory::add_bridge(std::size_t after, Timestamp from, Timestamp to, ImuMean& sum) const {
+  const ImuSample& first = (*this)[after - 1];
+  const ImuSample& last = (*this)[after];
+  const Timestamp middle = first.stamp + (last.stamp - first.stamp) / 2;
+  const Timestamp turn = std::clamp(middle, from, to);
+  extrapolate(to_seconds(from - first.stamp), to_seconds(turn - from), sum);
+  extrapolate(to_seconds(last.stamp - to), to_seconds(to - turn), sum);
+  const double dt = to_seconds(to - from);
+  const double part = 0.5 * (to_seconds(from - first.stamp) + to_seconds(to - first.stamp)) /
+                      to_seconds(last.stamp - first.stamp);
+  add_held(first, (1.0 - part) * dt, sum);
+  add_held(last, part * dt, sum);
+}
+
 // The prediction is limited to the horizons for which there are weights.
 void ImuHistory::add_predicted(Timestamp from, Timestamp to, ImuMean& sum) const {
   const double dt = to_seconds(to - from);
-  add(newest(), dt, sum);
+  extrapolate(to_seconds(from - newest().stamp), dt, sum);
   const auto samples = recent<SignalModel::Window>();
-  if (!samples) return;
+  if (!samples) return add_held(newest(), dt, sum);
+  add(newest(), dt, sum);
   const double strides = strides_to(from, to, samples->period_s);
   sum.gyro_radps += dt * gyro_.change_after(strides, samples->gyro);
   sum.accel_mps2 += dt * accel_.change_after(strides, samples->accel);
-  sum.gyro_innovation_density = gyro_.innovation_density(strides);
-  sum.accel_innovation_density = accel_.innovation_density(strides);
+  raise_densities(gyro_.innovation_density(strides), accel_.innovation_density(strides), sum);
 }
 
 ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
   CREPES_EXPECT(size_ > 0 && from < to, "mean over an interval with samples");
-  ImuMean sum{.gyro_innovation_density = gyro_.innovation_density(),
-              .accel_innovation_density = accel_.innovation_density()};
-  const auto extrapolate = [&](double since, double dt) {
-    sum.extrapolated += dt;
-    sum.extrapolation_time2_s2 += extrapolation_time_squared(since, dt);
-  };
+  ImuMean sum;
   Timestamp t = from;
   for (std::size_t i = first_after(from); i < size_ && t < to; ++i) {
     const ImuSample& sample = (*this)[i];
-    const bool covered = i > 0 && sample.stamp - (*this)[i - 1].stamp <= kMaxGap;
     const Timestamp end = std::min(to, sample.stamp);
     const double dt = to_seconds(end - t);
-    add(sample, dt, sum);
-    // In a gap the next sample is held, so that the error shrinks towards it.
-    if (!covered) extrapolate(to_seconds(sample.stamp - end), dt);
+    if (i == 0) {
+      extrapolate(to_seconds(sample.stamp - end), dt, sum);
+      add_held(sample, dt, sum);
+    } else if (sample.stamp - (*this)[i - 1].stamp > kMaxGap) {
+      add_bridge(i, t, end, sum);
+    } else {
+      add(sample, dt, sum);
+    }
     const bool is_unsteady = !kept(i).blow_mps.isZero() || !kept(i).turn_rad.isZero() ||
                              kept(i).bias_variance_m2ps4 > 0.0;
     if (i > 0 && is_unsteady) {
@@ -143,11 +169,7 @@ ImuMean ImuHistory::mean(Timestamp from, Timestamp to) const {
     }
     t = end;
   }
-  if (t < to) {
-    const double dt = to_seconds(to - t);
-    add_predicted(t, to, sum);
-    extrapolate(to_seconds(t - newest().stamp), dt);
-  }
+  if (t < to) add_predicted(t, to, sum);
 
   const double width = to_seconds(to - from);
   return {.gyro_radps = sum.gyro_radps / width,

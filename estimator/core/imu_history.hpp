@@ -18,13 +18,12 @@ struct ImuMean {
   Eigen::Vector3d gyro_radps = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_mps2 = Eigen::Vector3d::Zero();
   double extrapolated = 0.0;  ///< share of the interval, 0..1, that no sample covers
-  /// Mean square of the time to the nearest sample that is held where none covers, at most
-  /// kMaxHold^2 [s^2].
+  /// Mean square of the time to the nearest sample where none covers, at most kMaxHold^2 [s^2].
   double extrapolation_time2_s2 = 0.0;
   /// White noise measured in the samples, with vibration.
   double gyro_noise_density = 0.0;   ///< [rad/s/sqrt(Hz)]
   double accel_noise_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
-  /// Errors of the extrapolation, as the density of a random walk.
+  /// Errors of the extrapolation, if there is any, as the density of a random walk.
   double gyro_innovation_density = 0.0;   ///< [rad/s/sqrt(s)]
   double accel_innovation_density = 0.0;  ///< [m/s^2/sqrt(s)]
   /// Variance of the velocity after the interval by forces that were refused, but may be real; body
@@ -43,8 +42,10 @@ struct ImuMean {
 
 /// Bounded: keeps the newest `kCapacity` samples in order of their stamps. A sample is the mean
 /// since the one before, stamped at its end, as from an IMU that integrates internally. So sums
-/// over samples are exact. Beyond the newest sample a SignalModel predicts the signals. Before the
-/// oldest, and in gaps longer than `kMaxGap`, the next sample is held. Both are extrapolation.
+/// over samples are exact. Beyond the newest sample a SignalModel predicts the signals, or the
+/// sample is held if there was a gap shortly before. Before the oldest, the next one is held. Gaps
+/// longer than `kMaxGap` are bridged by a straight line, whose error is that of a random walk
+/// between two known ends (a Brownian bridge). All this is extrapolation.
 class ImuHistory {
  public:
   /// A second of the fastest IMU (`imu.update_rate`): a filter may be that far behind.
@@ -99,6 +100,9 @@ class ImuHistory {
   /// Strides from the newest sample to the middle of an interval beyond it.
   [[nodiscard]] double strides_to(Timestamp from, Timestamp to, double period_s) const;
   void add_predicted(Timestamp from, Timestamp to, ImuMean& sum) const;
+  void add_held(const ImuSample& sample, double dt, ImuMean& sum) const;
+  /// Of the gap before a sample, of which the interval is a part.
+  void add_bridge(std::size_t after, Timestamp from, Timestamp to, ImuMean& sum) const;
 
   std::array<Kept, kCapacity> kept_{};
   std::size_t first_ = 0;

@@ -59,6 +59,7 @@ void SignalModel::observe(const Past& past, double period_s) {
     const double span_s = then * period_s;
     smooth((next - before * horizon.weights).squaredNorm() / 3.0 / span_s,
            horizon.innovation_density2);
+    if (i + 1 == kHorizons) smooth(next.squaredNorm() / 3.0 / span_s, hold_density2_);
 
     horizon.changes += kPredictionShare * (before.transpose() * before - horizon.changes);
     horizon.with_next += kPredictionShare * (before.transpose() * next - horizon.with_next);
@@ -95,7 +96,10 @@ double SignalModel::innovation_density(double strides) const {
     const auto known = static_cast<std::size_t>(std::max(i - 1, 0));
     return Scalar(horizons_.at(known).innovation_density2);
   });
-  return std::sqrt(density2(0));
+  const double held = std::max(0.0, strides - kHorizons);
+  return std::sqrt((kHorizons * density2(0) + held * hold_density2_) / (kHorizons + held));
 }
+
+double SignalModel::hold_density() const { return std::sqrt(hold_density2_); }
 
 }  // namespace crepes

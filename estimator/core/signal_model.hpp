@@ -34,8 +34,10 @@ class SignalModel {
   /// White noise, in the unit of the signal per sqrt(Hz).
   [[nodiscard]] double noise_density() const;
   /// Error of the prediction after so many strides, as a random walk, in the unit of the signal per
-  /// sqrt(s).
+  /// sqrt(s). Beyond the last horizon, what is predicted for it is held.
   [[nodiscard]] double innovation_density(double strides = 1.0) const;
+  /// Error of a sample that is held instead, likewise.
+  [[nodiscard]] double hold_density() const;
 
  private:
   using Weights = Eigen::Matrix<double, kChanges, 1>;
@@ -51,6 +53,7 @@ class SignalModel {
   };
 
   double noise_density2_ = 0.0;
+  double hold_density2_ = 0.0;  // over the longest horizon
   // The range of the signal, an axis each, which shrinks towards the newest sample.
   Eigen::Vector3d low_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d high_ = Eigen::Vector3d::Zero();

@@ -259,6 +259,65 @@ TEST(ImuHistory, HoldsAfterAGapAndForgetsNothing) {
   EXPECT_NEAR(ahead(20ms), swing_mean(3.18, 3.181), 0.03) << "of what it had learned before";
 }
 
+TEST(ImuHistory, AGapIsBridgedByAStraightLine) {
+  ImuHistory imu;
+  imu.push(sample_at(100ms, 1.0));
+  imu.push(sample_at(300ms, 3.0));
+
+  EXPECT_NEAR(imu.mean(Timestamp{100ms}, Timestamp{300ms}).gyro_radps.x(), 2.0, 1e-12);
+  EXPECT_NEAR(imu.mean(Timestamp{140ms}, Timestamp{160ms}).gyro_radps.x(), 1.5, 1e-12);
+  const auto error = [&](Duration from, Duration to) {
+    return imu.mean(Timestamp{from}, Timestamp{to}).extrapolation_time2_s2 * to_seconds(to - from);
+  };
+  EXPECT_NEAR(error(100ms, 300ms), std::pow(0.2, 3) / 12.0, 1e-12);
+  EXPECT_NEAR(error(100ms, 170ms) + error(170ms, 240ms) + error(240ms, 300ms), error(100ms, 300ms),
+              1e-12);
+}
+
+/// The error of a turn about one axis over the sigma that it has.
+double turn_error(const ImuHistory& imu, Timestamp from, Timestamp to, double true_turn_rad) {
+  double turn_rad = 0.0;
+  double variance = 0.0;
+  for (Timestamp t = from; t < to; t += 10ms) {
+    const ImuMean mean = imu.mean(t, t + 10ms);
+    turn_rad += mean.gyro_radps.x() * 0.01;
+    variance += std::pow(mean.gyro_innovation_density, 2) * mean.extrapolation_time2_s2 * 0.01;
+  }
+  return (turn_rad - true_turn_rad) / std::sqrt(variance);
+}
+
+/// The errors of turns without samples for so long, after a gap and so many samples.
+double rms_turn_error(Duration gap, int samples, Duration unknown) {
+  double sum = 0.0;
+  constexpr int kTrials = 200;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    ImuHistory imu;
+    const Duration end = 3s + trial * 10ms;
+    const auto push = [&imu](Duration t) {
+      imu.push(sample_at(t, swing_mean(to_seconds(t - 10ms), to_seconds(t))));
+    };
+    Duration t = 10ms;
+    for (; t <= end; t += 10ms) push(t);
+    t += gap;
+    for (int i = 0; i < samples; ++i, t += 10ms) push(t);
+    const Timestamp newest = imu.newest().stamp;
+    const double from_s = to_seconds(newest.time_since_epoch());
+    const double unknown_s = to_seconds(unknown);
+    sum += std::pow(turn_error(imu, newest, newest + unknown,
+                               unknown_s * swing_mean(from_s, from_s + unknown_s)),
+                    2);
+  }
+  return std::sqrt(sum / kTrials);
+}
+
+TEST(ImuHistory, TurnsThatNoSampleShowsErrAsTheySay) {
+  for (const Duration unknown : {100ms, 200ms, 300ms, 400ms}) {
+    EXPECT_LT(rms_turn_error(0ms, 0, unknown), 2.0) << to_seconds(unknown);
+    for (const int samples : {1, 5, 12})
+      EXPECT_LT(rms_turn_error(200ms, samples, unknown), 1.5) << to_seconds(unknown);
+  }
+}
+
 TEST(ImuHistory, ARateThatTheModelHasNotSeenIsHeld) {
   ImuHistory imu;
   const auto expect_held = [&imu](int first, int last, double rate) {
