@@ -162,9 +162,10 @@ Fusion NeighborTrack::fuse(const Measurement& measurement, const PairMounting& m
   // ranges are rare, and the IMUs misled it. Bearings do not depend on the distance.
   if (tight != nullptr && is_range(measurement.kind) && is_range_diverged()) {
     // Where ranges are many, they reset it again until one is accepted.
-    const GatedRun& gated = gated_[run_of(measurement.kind)];
+    GatedRun& gated = gated_[run_of(measurement.kind)];
     const double off_m = gated.count < kMinGatedRanges ? std::abs(gated.residual) : 0.0;
     tight->reset_distance(std::max(kDistanceSigma, off_m), priors_);
+    gated.used = 0;
   }
   const bool is_bearing = std::holds_alternative<DirectionReading>(measurement.reading);
   const Fusion fusion = tight == nullptr
@@ -185,7 +186,11 @@ Measurement NeighborTrack::doubted(Measurement measurement) const {
 }
 
 void NeighborTrack::GatedRun::add(Timestamp stamp, const Fusion& fusion) {
-  if (fusion.verdict == Verdict::kFused) *this = {};
+  if (fusion.verdict == Verdict::kFused) {
+    const int more = std::min(used + 1, kMinContradicting);
+    *this = {};
+    used = more;
+  }
   if (fusion.verdict != Verdict::kGated) return;
   if (count++ == 0) since = stamp;
   latest = stamp;
@@ -321,8 +326,9 @@ bool NeighborTrack::is_contradicted() const {
            (gated.since > sighted + kGlimpseGap || gated.latest >= sighted + kDivergenceTime);
   };
   const GatedRun& ranges = gated_[run_of(MeasurementKind::kRange)];
+  const int enough = std::max(1, ranges.used);
   const bool are_ranges_contrary =  // old ones say nothing, if no more come
-      (ranges.count >= kMinContradicting || ranges.length() >= kDoubtfulTime) &&
+      (ranges.count >= enough || ranges.length() >= kDoubtfulTime) &&
       stamp() - ranges.latest < kRareRangesTime;
   return is_contrary(MeasurementKind::kBearing) || is_contrary(MeasurementKind::kPeerBearing) ||
          are_ranges_contrary;

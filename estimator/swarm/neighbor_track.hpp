@@ -74,9 +74,9 @@ class NeighborTrack {
   [[nodiscard]] Duration contradicted_for() const;
   /// True if that is kDivergenceTime or more.
   [[nodiscard]] bool is_diverged() const { return contradicted_for() >= kDivergenceTime; }
-  /// True if the latest readings contradict the pose: some ranges in a row or all of a second were
-  /// gated, or some bearings, after a gap or for kDivergenceTime, while none of either side was
-  /// used.
+  /// True if the latest readings contradict the pose: ranges in a row, three or as many as ever
+  /// fitted, or all of a second were gated, or some bearings, after a gap or for kDivergenceTime,
+  /// while none of either side was used.
   [[nodiscard]] bool is_contradicted() const;
 
  private:
@@ -98,6 +98,7 @@ class NeighborTrack {
     Timestamp since = kNever;
     Timestamp latest = kNever;
     int count = 0;
+    int used = 0;           ///< readings before, at most kMinContradicting are counted
     double residual = 0.0;  ///< first component of the latest
 
     [[nodiscard]] Duration length() const { return count > 0 ? latest - since : Duration{0}; }

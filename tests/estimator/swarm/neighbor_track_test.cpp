@@ -87,14 +87,28 @@ TEST_F(RestingTrack, IsContradictedByBearingsThatStopToFitWithoutAGap) {
 }
 
 TEST_F(RestingTrack, IsContradictedByRangesInARowUntilOneFits) {
-  ASSERT_EQ(fuse_at(0, range({}, kDistance)).verdict, Verdict::kFused);
-  for (const int ms : {10, 20}) ASSERT_EQ(fuse_at(ms, range({}, 7.0)).verdict, Verdict::kGated);
+  for (const int ms : {0, 10, 20, 30})
+    ASSERT_EQ(fuse_at(ms, range({}, kDistance)).verdict, Verdict::kFused);
+  for (const int ms : {40, 50}) ASSERT_EQ(fuse_at(ms, range({}, 7.0)).verdict, Verdict::kGated);
   EXPECT_FALSE(track_.is_contradicted());
-  ASSERT_EQ(fuse_at(30, range({}, 7.0)).verdict, Verdict::kGated);
+  ASSERT_EQ(fuse_at(60, range({}, 7.0)).verdict, Verdict::kGated);
   EXPECT_TRUE(track_.is_contradicted());
 
-  ASSERT_EQ(fuse_at(40, range({}, kDistance)).verdict, Verdict::kFused);
+  ASSERT_EQ(fuse_at(70, range({}, kDistance)).verdict, Verdict::kFused);
   EXPECT_FALSE(track_.is_contradicted());
+}
+
+// Which of them are false is not known: the first one may be.
+TEST_F(RestingTrack, IsContradictedByAsManyRangesAsEverFitted) {
+  int ms = 0;
+  for (const int fitted : {1, 2, 3}) {
+    ASSERT_EQ(fuse_at(ms += 10, range({}, kDistance)).verdict, Verdict::kFused);
+    EXPECT_FALSE(track_.is_contradicted()) << ms;
+    for (int gated = 1; gated <= fitted; ++gated) {
+      ASSERT_EQ(fuse_at(ms += 10, range({}, 7.0)).verdict, Verdict::kGated);
+      EXPECT_EQ(track_.is_contradicted(), gated == fitted) << ms;
+    }
+  }
 }
 
 /// A track that six seconds of ranges have made certain of its speed, too.
