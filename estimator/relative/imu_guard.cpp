@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "estimator/core/constants.hpp"
-#include "estimator/core/quantile.hpp"
 #include "estimator/core/so3.hpp"
 
 namespace crepes {
@@ -21,19 +20,12 @@ constexpr PerSensor kHarmless{.gyro = 0.1, .accel = 0.5};
 constexpr PerSensor kLargestChange{.gyro = 2.0, .accel = 5.0};
 // Samples after which a change is a vibration that begins, or else, longer than a blow, a jump.
 constexpr std::size_t kVibrates = 6;
-constexpr std::size_t kJumps = 10;
-constexpr std::size_t kTooMany = kJumps + 1;  // refused, for their rates to be kept
-constexpr double kMostSteps = 10.0;           // over which an innovation grows as a random walk
-constexpr Duration kTypicalPeriod = std::chrono::milliseconds{10};
+constexpr std::size_t kJumps = ImuBlow::kLongest;
 // Across a longer gap there is no prediction.
 constexpr Duration kLongestGap = std::chrono::milliseconds{100};
 
 // After a gap no longer than that, a shock that rings may not have ended.
 constexpr Duration kLongestShock = std::chrono::milliseconds{500};
-
-// The change of a robot's speed by a blow, an axis. A robot that hits a wall at 0.5 m/s and is
-// thrown back changes by as much.
-constexpr double kHardestBlow = 1.0;  // m/s
 
 // Medians of innovations: half again the vibration of a sample, which no airframe exceeds.
 constexpr PerSensor kMostVibration{.gyro = 3.0, .accel = 30.0};
@@ -47,49 +39,7 @@ constexpr double kMostGrowth = 4.0;  // of the gyroscope's noise, if the acceler
 constexpr Duration kOutdated = std::chrono::seconds{5};  // gravity's direction before the jump
 constexpr double kForceShare = 0.05;                     // of one sample in the smoothed force
 
-PerSensor distance(const ImuSample& a, const ImuSample& b) {
-  return {(a.gyro_radps - b.gyro_radps).norm(), (a.accel_mps2 - b.accel_mps2).norm()};
-}
-
-ImuSample extrapolated(const ImuSample& before, const ImuSample& last, double steps) {
-  return {last.stamp, last.gyro_radps + steps * (last.gyro_radps - before.gyro_radps),
-          last.accel_mps2 + steps * (last.accel_mps2 - before.accel_mps2)};
-}
-
-PerSensor largest(const PerSensor& a, const PerSensor& b) {
-  return {std::max(a.gyro, b.gyro), std::max(a.accel, b.accel)};
-}
-
-bool is_within(const PerSensor& size, const PerSensor& most) {
-  return size.gyro <= most.gyro && size.accel <= most.accel;
-}
-
-/// The time since the last sample, in periods.
-double steps_since(const ImuGuard::Reference& reference, Timestamp stamp) {
-  const Duration period =
-      reference.before ? reference.last.stamp - reference.before->stamp : kTypicalPeriod;
-  return std::min(to_seconds(stamp - reference.last.stamp) / to_seconds(period), kMostSteps);
-}
-
-/// The smaller difference from two predictions: a swing continues, a vibration does not.
-PerSensor innovation(const ImuSample& sample, const ImuGuard::Reference& reference) {
-  const PerSensor constant = distance(sample, reference.last);
-  if (!reference.before) return constant;
-  const double steps = steps_since(reference, sample.stamp);
-  const PerSensor linear = distance(sample, extrapolated(*reference.before, reference.last, steps));
-  return {std::min(constant.gyro, linear.gyro), std::min(constant.accel, linear.accel)};
-}
-
 }  // namespace
-
-void InnovationScale::add(double size) {
-  sizes_.at(count_++ % kKept) = size;
-  const std::size_t n = std::min(count_, kKept);
-  if (n < kLeast) return;
-  std::array<double, kKept> sorted = sizes_;
-  median_ = upper_median(std::span(sorted).first(n));
-  is_known_ = true;
-}
 
 std::span<const ImuSample> ImuGuard::accept(const ImuSample& sample) {
   believed_count_ = 0;
@@ -152,14 +102,14 @@ PerSensor ImuGuard::limit() const {
 PerSensor ImuGuard::largest_change() const { return largest(kLargestChange, limit()); }
 
 /// The innovations over their limits.
-PerSensor ImuGuard::excess(const ImuSample& sample, const Reference& reference) const {
+PerSensor ImuGuard::excess(const ImuSample& sample, const ImuReference& reference) const {
   const PerSensor size = innovation(sample, reference);
   const PerSensor most = limit();
-  const double growth = std::sqrt(std::max(1.0, steps_since(reference, sample.stamp)));
+  const double growth = std::sqrt(std::max(1.0, reference.steps_to(sample.stamp)));
   return {size.gyro / (growth * most.gyro), size.accel / (growth * most.accel)};
 }
 
-ImuGuard::Reference ImuGuard::reference_of_held(std::size_t i) const {
+ImuReference ImuGuard::reference_of_held(std::size_t i) const {
   return {held_.at(i), before_held(i)};
 }
 
@@ -203,50 +153,18 @@ void ImuGuard::add_innovation(const PerSensor& innovation) {
   accel_.add(innovation.accel);
 }
 
-Eigen::Vector3d ImuGuard::blow_mps(const ImuSample& believed) const {
-  return believed.stamp == blow_ ? blow_mps_ : Eigen::Vector3d::Zero();
-}
-
-std::span<const ImuGuard::KeptRate> ImuGuard::rates_before(const ImuSample& believed) const {
-  return {rates_.data(), believed.stamp == rates_until_ ? rate_count_ : 0};
-}
-
-void ImuGuard::keep_rates(const ImuSample& after) {
-  rate_count_ = 0;
-  rates_until_ = after.stamp;
-  const std::size_t count = std::exchange(doubtful_count_, 0);
-  if (count == kTooMany) return;
-  const ImuSample& before = reference_->last;
-  const double duration_s = to_seconds(after.stamp - before.stamp);
-  ImuSample last = before;
-  for (const ImuSample& sample : std::span(doubtful_).first(count)) {
-    if (distance(sample, last).gyro > largest_change().gyro) continue;
-    const double share = to_seconds(sample.stamp - before.stamp) / duration_s;
-    const Eigen::Vector3d expected =
-        before.gyro_radps + share * (after.gyro_radps - before.gyro_radps);
-    const double dt = to_seconds(sample.stamp - std::exchange(last, sample).stamp);
-    rates_.at(rate_count_++) = {.sample = {sample.stamp, sample.gyro_radps, before.accel_mps2},
-                                .turn_rad = dt * (sample.gyro_radps - expected)};
-  }
-}
-
 void ImuGuard::believe(const ImuSample& sample) {
-  if (!refused_mps_.isZero()) {
-    blow_ = sample.stamp;
-    blow_mps_ = refused_mps_.cwiseMax(-kHardestBlow).cwiseMin(kHardestBlow);
-    refused_mps_.setZero();
-  }
   if (reference_) {
-    if (doubtful_count_ > 0) keep_rates(sample);
+    blow_.end(sample, reference_->last, largest_change().gyro);
     turn_force(sample, reference_->last.stamp);
     correct_force(sample);
-    reference_ = Reference{sample, reference_->last};
+    reference_ = ImuReference{sample, reference_->last};
   } else {
     if (force_.isZero() || angle_between(sample.accel_mps2, force_) > kMostTurned) {
       force_ = sample.accel_mps2;
       since_ = sample.stamp;
     }
-    reference_ = Reference{sample, std::nullopt};
+    reference_ = ImuReference{sample, std::nullopt};
   }
   has_refused_ = false;
   believed_.at(believed_count_++) = sample;
@@ -278,7 +196,7 @@ void ImuGuard::believe_held(std::size_t from) {
 }
 
 void ImuGuard::refuse_spike(const ImuSample& spike) {
-  doubt(spike);
+  blow_.add(spike, reference_->last);
   if (spike_count_ == kMostSpikes) {
     std::shift_left(spikes_.begin(), spikes_.end(), 1);
     --spike_count_;
@@ -286,28 +204,9 @@ void ImuGuard::refuse_spike(const ImuSample& spike) {
   spikes_.at(spike_count_++) = spike;
 }
 
-/// Samples that are refused for longer than a blow lasts are no blow.
-void ImuGuard::doubt(const ImuSample& sample) {
-  if (doubtful_count_ >= kJumps) {
-    refused_mps_.setZero();
-    doubtful_count_ = kTooMany;
-    return;
-  }
-  const ImuSample& before =
-      doubtful_count_ > 0 ? doubtful_.at(doubtful_count_ - 1) : reference_->last;
-  refused_mps_ +=
-      to_seconds(sample.stamp - before.stamp) * (sample.accel_mps2 - reference_->last.accel_mps2);
-  doubtful_.at(doubtful_count_++) = sample;
-}
-
-void ImuGuard::forget_doubtful() {
-  doubtful_count_ = 0;
-  refused_mps_.setZero();
-}
-
 void ImuGuard::drop_held(ImuFault fault) {
   count(has_jumped_ ? ImuFault::kJump : fault, held_count_);
-  forget_doubtful();
+  blow_.forget();
   clear_held();
 }
 
@@ -319,7 +218,7 @@ void ImuGuard::clear_held() {
 void ImuGuard::hold(const ImuSample& sample) {
   follow_force(sample, before_held(held_count_));
   if (held_count_ == kMostHeld) {
-    doubt(held_.front());
+    blow_.add(held_.front(), reference_->last);
     std::shift_left(held_.begin(), held_.end(), 1);
     --held_count_;
     count(ImuFault::kJump);
@@ -420,8 +319,8 @@ bool ImuGuard::held_are_plausible() const {
 void ImuGuard::restart_from_held() {
   for (std::size_t i = 2; i < held_count_; ++i)
     add_innovation(innovation(held_.at(i), reference_of_held(i - 1)));
-  if (gyro_has_jumped_) forget_doubtful();
-  if (doubtful_count_ > 0) keep_rates(held_.front());
+  if (gyro_has_jumped_) blow_.forget();
+  blow_.end(held_.front(), reference_->last, largest_change().gyro);
   reference_.reset();
   force_.setZero();
   believe_held(0);

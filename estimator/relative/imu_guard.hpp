@@ -9,36 +9,11 @@
 #include "estimator/core/imu_history.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/outputs.hpp"
+#include "estimator/relative/imu_blow.hpp"
+#include "estimator/relative/imu_innovation.hpp"
 #include "estimator/relative/imu_watch.hpp"
 
 namespace crepes {
-
-/// The median of the latest innovations of a sensor: a scale that outliers do not move (Huber and
-/// Ronchetti 2009, "Robust Statistics", 5.1).
-class InnovationScale {
- public:
-  /// Adds the size of an innovation.
-  void add(double size);
-  [[nodiscard]] double median() const { return median_; }
-  /// False before there are enough.
-  [[nodiscard]] bool is_known() const { return is_known_; }
-
- private:
-  static constexpr std::size_t kKept = 64;
-  static constexpr std::size_t kLeast = 16;
-  std::array<double, kKept> sizes_{};
-  std::size_t count_ = 0;
-  double median_ = 0.0;
-  bool is_known_ = false;
-};
-
-/// One number each for gyroscope and accelerometer.
-struct PerSensor {
-  double gyro = 0.0;
-  double accel = 0.0;
-
-  [[nodiscard]] double most() const { return gyro > accel ? gyro : accel; }
-};
 
 /// Compares each sample with its prediction from the two before. A sample with an unlikely
 /// innovation waits for its successors, and nothing is believed meanwhile: ImuHistory extrapolates
@@ -55,18 +30,6 @@ struct PerSensor {
 /// and after five seconds the new ones in any case.
 class ImuGuard {
  public:
-  /// The samples that predict the next one.
-  struct Reference {
-    ImuSample last;
-    std::optional<ImuSample> before;
-  };
-
-  /// The rate of a refused sample, with the force of the believed one before it.
-  struct KeptRate {
-    ImuSample sample;
-    Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();  ///< by it, if it is damaged; body axes
-  };
-
   /// The samples that are believed from now on, in order of their stamps; valid until the next
   /// call. A sample older than the newest is passed on, see `agrees`.
   [[nodiscard]] std::span<const ImuSample> accept(const ImuSample& sample);
@@ -75,10 +38,14 @@ class ImuGuard {
   [[nodiscard]] bool agrees(const ImuSample& sample, const ImuMean& mean) const;
 
   /// The velocity that refused forces would have caused before this believed sample, body axes.
-  [[nodiscard]] Eigen::Vector3d blow_mps(const ImuSample& believed) const;
+  [[nodiscard]] Eigen::Vector3d blow_mps(const ImuSample& believed) const {
+    return blow_.velocity_mps(believed);
+  }
   /// The rates that are kept between this believed sample and the one before, in order of their
   /// stamps; valid until the next call of `accept`.
-  [[nodiscard]] std::span<const KeptRate> rates_before(const ImuSample& believed) const;
+  [[nodiscard]] std::span<const KeptRate> rates_before(const ImuSample& believed) const {
+    return blow_.rates_before(believed);
+  }
   /// The latest samples that were refused as spikes, in order of their stamps.
   [[nodiscard]] std::span<const ImuSample> spikes() const { return {spikes_.data(), spike_count_}; }
 
@@ -99,8 +66,8 @@ class ImuGuard {
   [[nodiscard]] bool shows_gravity() const;
   [[nodiscard]] PerSensor limit() const;
   [[nodiscard]] PerSensor largest_change() const;
-  [[nodiscard]] PerSensor excess(const ImuSample& sample, const Reference& reference) const;
-  [[nodiscard]] Reference reference_of_held(std::size_t i) const;
+  [[nodiscard]] PerSensor excess(const ImuSample& sample, const ImuReference& reference) const;
+  [[nodiscard]] ImuReference reference_of_held(std::size_t i) const;
   /// The sample before the held one `i`; the last believed one before the first of them.
   [[nodiscard]] const ImuSample& before_held(std::size_t i) const;
   /// The last sample that was held or believed; null before the first.
@@ -111,9 +78,6 @@ class ImuGuard {
   void add_innovation(const PerSensor& innovation);
   void believe(const ImuSample& sample);
   void refuse_spike(const ImuSample& spike);
-  void doubt(const ImuSample& sample);
-  void forget_doubtful();
-  void keep_rates(const ImuSample& after);
   void believe_held(std::size_t from);
   void drop_held(ImuFault fault);
   void clear_held();
@@ -131,21 +95,14 @@ class ImuGuard {
   ImuWatch watch_;
   Timestamp weighed_ = kNever;  ///< the latest sample whose force is in the mean
   double mean_force_ = 0.0;     ///< of the last seconds [m/s^2]
-  std::optional<Reference> reference_;
+  std::optional<ImuReference> reference_;
   InnovationScale gyro_;
   InnovationScale accel_;
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  ///< smoothed specific force, body axes
   Timestamp since_ = kNever;  ///< the first of the samples whose forces agree
-  Eigen::Vector3d refused_mps_ = Eigen::Vector3d::Zero();  ///< since the last believed sample
-  Eigen::Vector3d blow_mps_ = Eigen::Vector3d::Zero();
-  Timestamp blow_ = kNever;                      ///< the believed sample after it
-  std::array<ImuSample, kMostHeld> doubtful_{};  ///< refused since the last believed sample
-  std::size_t doubtful_count_ = 0;
-  std::array<KeptRate, kMostHeld> rates_{};
-  std::size_t rate_count_ = 0;
-  Timestamp rates_until_ = kNever;  ///< the believed sample after them
-  bool has_refused_ = false;        ///< since the last sample that was believed
-  bool has_jumped_ = false;         ///< the held samples must be plausible to be believed
+  ImuBlow blow_;
+  bool has_refused_ = false;  ///< since the last sample that was believed
+  bool has_jumped_ = false;   ///< the held samples must be plausible to be believed
   bool gyro_has_jumped_ = false;
   bool accel_has_jumped_ = false;
 

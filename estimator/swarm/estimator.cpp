@@ -193,7 +193,7 @@ void Estimator::State::reconfigure(const EstimatorSettings& now) {
 
 Outputs Estimator::State::handle(const ImuSample& sample) {
   for (const ImuSample& believed : self.guard.accept(sample)) {
-    for (const ImuGuard::KeptRate& rate : self.guard.rates_before(believed)) {
+    for (const KeptRate& rate : self.guard.rates_before(believed)) {
       tilt_filter.add(rate.sample);
       cameras.add_imu(rate.sample);
     }

@@ -38,7 +38,7 @@ struct RobotState {
       const Duration passed = stamp - std::exchange(last, stamp);
       return std::sqrt(to_seconds(passed) / to_seconds(sample.stamp - before)) * blow_mps;
     };
-    for (const ImuGuard::KeptRate& rate : rates)
+    for (const KeptRate& rate : rates)
       imu.push(rate.sample, part(rate.sample.stamp), rate.turn_rad);
     return imu.push(sample, part(sample.stamp));
   }

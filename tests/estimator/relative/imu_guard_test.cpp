@@ -196,7 +196,7 @@ TEST(ImuGuard, KeepsTheRatesOfABlow) {
     std::size_t kept = 0;
     for (const ImuSample& sample : samples) {
       for (const ImuSample& believed : guard.accept(sample)) {
-        for (const ImuGuard::KeptRate& rate : guard.rates_before(believed)) {
+        for (const KeptRate& rate : guard.rates_before(believed)) {
           history.push_back(rate.sample);
           EXPECT_LT(rate.turn_rad.norm(), 0.03) << seed;
           ++kept;
@@ -219,7 +219,7 @@ TEST(ImuGuard, KeepsADamagedRateThatARobotReachesAndTellsWhatItDoes) {
     samples[150].gyro_radps.y() += 1.0;
     samples[200].gyro_radps.y() += 4.0;
     ImuGuard guard;
-    std::vector<ImuGuard::KeptRate> kept;
+    std::vector<KeptRate> kept;
     for (const ImuSample& sample : samples) {
       for (const ImuSample& believed : guard.accept(sample)) {
         const auto rates = guard.rates_before(believed);
