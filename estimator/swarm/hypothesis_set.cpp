@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "estimator/core/so3.hpp"
+
 namespace crepes {
 namespace {
 
@@ -32,6 +34,13 @@ bool is_lost(const NeighborTrack& track) {
 // One that takes another robot for its neighbor seldom does so for longer.
 constexpr Duration kMistake = std::chrono::milliseconds{800};
 
+// So long two are compared before one that is disputed can lose to a younger one.
+constexpr Duration kTogether = std::chrono::milliseconds{500};
+
+// A mirror image is as bright as its robot, but it tilts the pose. Tilts err by less than they say.
+constexpr double kTilted = 4.0;      // NIS
+constexpr double kTiltScore = 50.0;  // by NIS
+
 // Scores forget. This part of a steady one is gathered within a hypothesis' age.
 double gathered(Duration age) { return 1.0 - std::exp(-to_seconds(age) / kScoreMemory); }
 
@@ -48,8 +57,8 @@ bool HypothesisSet::accepts_raw_pose(Timestamp now) const {
   const Hypothesis& leader = hypotheses_.front();
   const NeighborTrack& track = leader.sum.heaviest();
   const bool on_probation = !leader.confirmed || now - leader.born < kProbation + settings_.lag;
-  return (on_probation && settings_.traits.hypotheses_compete) || leader.one_way ||
-         !track.is_certain() || track.is_diverged() ||
+  return ((on_probation || leader.is_disputed()) && settings_.traits.hypotheses_compete) ||
+         leader.one_way || !track.is_certain() || track.is_diverged() ||
          now - track.last_sighting() > kDivergenceTime + settings_.lag;
 }
 
@@ -124,6 +133,18 @@ void HypothesisSet::Hypothesis::add_score(MeasurementKind kind, double log_likel
   confirmed = confirmed || support >= kConfirmed;
 }
 
+void HypothesisSet::Hypothesis::note_beside(MeasurementKind kind, bool has_one) {
+  constexpr double kShare = 0.05;  // of one reading
+  if (kind != MeasurementKind::kBearing && kind != MeasurementKind::kPeerBearing) return;
+  double& share = kind == MeasurementKind::kBearing ? bearings_beside : peer_bearings_beside;
+  share += kShare * ((has_one ? 1.0 : 0.0) - share);
+}
+
+bool HypothesisSet::Hypothesis::is_disputed() const {
+  constexpr double kDisputed = 0.3;
+  return std::max(bearings_beside, peer_bearings_beside) > kDisputed && tilt_nis > kTilted;
+}
+
 bool HypothesisSet::has_budget_for(std::size_t raw_poses, Timestamp now) {
   CorrectionBudget& corrections = budget(MeasurementKind::kRawPose);
   if (!corrections.allows(now)) return false;
@@ -164,9 +185,22 @@ Association HypothesisSet::fuse(std::span<const Measurement> candidates, const I
     hypothesis.advance_to(stamp, imu_B, imu_N);
     const Association association = hypothesis.sum.fuse(candidates, mounting_, settings_.gates);
     hypothesis.add_score(kind, association.score);
+    hypothesis.note_beside(kind,
+                           candidates.size() > 1 || association.fusion.verdict == Verdict::kGated);
     if (leads) of_leader = association;
   }
   return of_leader;
+}
+
+void HypothesisSet::compare_tilts(const Tilt& ours, const Tilt& neighbors) {
+  const double variance =
+      ours.sigma_rad * ours.sigma_rad + neighbors.sigma_rad * neighbors.sigma_rad;
+  for (Hypothesis& hypothesis : hypotheses_) {
+    const GaussianPose pose = hypothesis.sum.heaviest().pose();
+    const double angle = angle_between(pose.pose.q * neighbors.up_B, ours.up_B);
+    const double of_pose = pose.covariance.bottomRightCorner<3, 3>().trace() / 3.0;
+    hypothesis.tilt_nis = angle * angle / (variance + of_pose);
+  }
 }
 
 void HypothesisSet::prune() {
@@ -201,18 +235,22 @@ bool HypothesisSet::must_start_anew() const {
 
 bool HypothesisSet::is_unambiguous() const {
   if (empty() || !hypotheses_.front().confirmed) return false;
+  if (hypotheses_.front().is_disputed()) return false;
   return std::none_of(hypotheses_.begin() + 1, hypotheses_.end(),
                       [this](const Hypothesis& h) { return h.confirmed && lead(h) > -kMargin; });
 }
 
 double HypothesisSet::lead(const Hypothesis& rival) const {
   const auto score = [this](const Hypothesis& of, const Hypothesis& beside) {
-    const bool is_favored =
-        of.born < beside.born && of.sum.heaviest().contradicted_for() >= kMistake;
-    return of.score() * (is_favored ? gathered(stamp() - beside.born) : 1.0);
+    const Duration together = stamp() - beside.born;
+    const bool is_doubted = of.sum.heaviest().contradicted_for() >= kMistake ||
+                            (of.is_disputed() && together >= kTogether);
+    return of.score() * (of.born < beside.born && is_doubted ? gathered(together) : 1.0);
   };
   const Hypothesis& leader = hypotheses_.front();
-  return score(rival, leader) - score(leader, rival);
+  const double by_tilt =
+      leader.is_disputed() ? kTiltScore * (leader.tilt_nis - rival.tilt_nis) : 0.0;
+  return score(rival, leader) - score(leader, rival) + by_tilt;
 }
 
 }  // namespace crepes

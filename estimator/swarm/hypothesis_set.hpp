@@ -65,6 +65,10 @@ class HypothesisSet {
   /// reading, all are deleted. Returns the leader's association; `kNoState` if there is no leader.
   Association fuse(std::span<const Measurement> candidates, const ImuHistory& imu_B,
                    const ImuHistory& imu_N);
+  /// The tilts of both robots at `stamp()`. A mirror image tilts the pose of its robot. A leader
+  /// that they contradict by two sigmas is disputed if beside it readings are seen that do not fit:
+  /// it is ambiguous, and accepts rivals. Tilts alone may err, where a robot flies on a circle.
+  void compare_tilts(const Tilt& ours, const Tilt& neighbors);
   /// Selects the leader and deletes hypotheses that lost or became equal to the leader.
   void prune();
 
@@ -86,18 +90,26 @@ class HypothesisSet {
     std::uint32_t generation = 0;
     double bearing_score = 0.0;
     double peer_bearing_score = 0.0;
-    bool one_way = false;  ///< bearings of one direction confirm it
+    /// Shares of the latest readings, of each direction, beside which there was one that did not
+    /// fit.
+    double bearings_beside = 0.0;
+    double peer_bearings_beside = 0.0;
+    double tilt_nis = 0.0;  ///< of the angle between both robots' verticals
+    bool one_way = false;   ///< bearings of one direction confirm it
     bool confirmed = false;
 
     void advance_to(Timestamp to, const ImuHistory& imu_B, const ImuHistory& imu_N);
     void add_score(MeasurementKind kind, double log_likelihood_ratio);
+    void note_beside(MeasurementKind kind, bool has_one);
+    /// An image may be what it takes for the neighbor: readings do not fit, and it is tilted.
+    [[nodiscard]] bool is_disputed() const;
     [[nodiscard]] double score() const { return bearing_score + peer_bearing_score; }
   };
   /// Whether the leader became so uncertain out of sight that a mutual sighting says more.
   [[nodiscard]] bool must_start_anew() const;
   /// How much more a rival explains than the leader. The older of the two has gathered its score
-  /// for longer. If all readings of a kind have contradicted it for a while, only the common time
-  /// counts.
+  /// for longer. If all readings of a kind have contradicted it for a while, or it is disputed,
+  /// only the common time counts. The tilts count if it is the leader that is disputed.
   [[nodiscard]] double lead(const Hypothesis& rival) const;
   /// The best is the greatest.
   [[nodiscard]] auto rank() const {

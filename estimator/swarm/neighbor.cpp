@@ -126,6 +126,11 @@ void Neighbor::fuse_released(Timestamp now, const RobotState& self) {
                      reading_of(group[i]));
     }
   }
+  if (can_move && !hypotheses_.empty()) {
+    const auto ours = self.tilt_at(hypotheses_.stamp());
+    const auto neighbors = body_.tilt_at(hypotheses_.stamp());
+    if (ours && neighbors) hypotheses_.compare_tilts(*ours, *neighbors);
+  }
   hypotheses_.prune();
   // Without readings the filter advances too: IMU samples are kept for a limited time, and the cost
   // of a prediction must not grow with the silence.

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <numbers>
+#include <span>
 
 #include "tests/support/resting_pair.hpp"
 
@@ -98,6 +100,45 @@ void feed(HypothesisSet& hypotheses, int from_ms, int count, double azimuth_rad 
 }
 
 constexpr double kMirror = 1.5;  // rad, azimuth of the image
+
+/// As `feed`, with ranges, so that the pose stays certain; our camera may see the image, too.
+void feed_ranged(HypothesisSet& hypotheses, int from_ms, int count, bool with_image) {
+  const ImuHistory imu = imu_at_rest(2500);
+  for (int ms = from_ms; ms < from_ms + 10 * count; ms += 10) {
+    const Timestamp t = at_ms(ms);
+    const std::array own{bearing(t, 0.0), bearing(t, kMirror)};
+    hypotheses.fuse(std::span(own).first(with_image ? 2 : 1), imu, imu);
+    for (const Measurement& other : {peer_bearing(t), range(t)})
+      hypotheses.fuse({&other, 1}, imu, imu);
+    hypotheses.prune();
+  }
+}
+
+Tilt tilt(double roll_rad) {
+  return {.stamp = at_ms(0),
+          .up_B = Eigen::Vector3d(0.0, std::sin(roll_rad), std::cos(roll_rad)),
+          .sigma_rad = 0.05};
+}
+
+// It may be the image: then the pose is tilted, and readings of the robot do not fit.
+TEST(Hypotheses, ATiltedOneBesideWhichReadingsDoNotFitIsWithheldAndAdmitsRivals) {
+  constexpr double kTilted = 0.3;  // rad
+  HypothesisSet hypotheses(settings(), kMounting);
+  ASSERT_TRUE(hypotheses.initialize(at_ms(0), sighting()));
+
+  feed_ranged(hypotheses, 10, 190, false);
+  hypotheses.compare_tilts(tilt(kTilted), tilt(0.0));
+  EXPECT_TRUE(hypotheses.is_unambiguous()) << "nothing else is seen: tilts may err";
+  EXPECT_FALSE(hypotheses.accepts_raw_pose(at_ms(1910)));
+
+  feed_ranged(hypotheses, 1910, 20, true);
+  EXPECT_FALSE(hypotheses.is_unambiguous());
+  EXPECT_TRUE(hypotheses.accepts_raw_pose(at_ms(2110)));
+
+  hypotheses.compare_tilts(tilt(kTilted), tilt(kTilted));
+  EXPECT_TRUE(hypotheses.is_unambiguous()) << "the other one is the image";
+  EXPECT_FALSE(hypotheses.accepts_raw_pose(at_ms(2110)));
+}
 
 TEST(Hypotheses, OneSightingStartsATrackButDoesNotConfirmIt) {
   HypothesisSet hypotheses(settings(), kMounting);
