@@ -143,9 +143,11 @@ std::optional<Matrix3d> MountingEvidence::rotation() const {
   const double elevation = elevations_.root_mean(R);
   const double without = elevations_.root_mean(Matrix3d::Identity());
   const bool is_level = without > kImplausibleElevation && elevation < 0.5 * without;
-  const bool is_found =
-      unexplained - rest > kLeastTurns && unexplained > (is_level ? kBetter : kMuchBetter) * rest &&
-      elevation < kPlausibleElevation && Eigen::AngleAxisd(R).angle() > kLeastAngle;
+  const bool neighbors_turn_along = turns_.at(Matrix3d::Zero()) < kBetter * rest;
+  const bool is_found = !neighbors_turn_along && unexplained - rest > kLeastTurns &&
+                        unexplained > (is_level ? kBetter : kMuchBetter) * rest &&
+                        elevation < kPlausibleElevation &&
+                        Eigen::AngleAxisd(R).angle() > kLeastAngle;
   return is_found ? std::optional(R) : std::nullopt;
 }
 

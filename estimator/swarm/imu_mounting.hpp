@@ -18,6 +18,10 @@ namespace crepes {
 /// the two move. If they see each other at once, their elevations above the horizon are opposite.
 /// Both are linear in the elements of R. So the sum of squares is a quadratic form in them, and no
 /// reading needs to be kept.
+///
+/// In a formation that turns about a point, neighbors stay where they are in the body, and the bank
+/// of the turn tilts the horizon: as if the IMU lay on its side. So a rotation must explain the
+/// turns much better than neighbors that turn with the robot do, too.
 class MountingEvidence {
  public:
   /// Unit directions of a neighbor before and after a turn by theta [rad], as the IMU reads it.

@@ -20,7 +20,7 @@ constexpr Duration kOutOfSight = std::chrono::milliseconds{250};
 constexpr double kOutlierSigma = 0.14;  // m
 // How fast the line of sight may turn because robots pass each other. The gyroscope does not
 // measure this.
-constexpr double kLineRate = 0.3;  // rad/s
+constexpr double kLineRate = 1.0;  // rad/s
 // Errors of the mounting, which do not average out. They also keep the covariance of z regular:
 // p_B_N and p_N_B contain the same distance.
 constexpr double kMountingSigma = 0.01;   // m

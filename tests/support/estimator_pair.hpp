@@ -80,6 +80,11 @@ class EstimatorPair {
     own ? pair_.hit_B(stamp, v_W) : pair_.hit_N(stamp, v_W);
   }
 
+  /// Before anything is measured: the neighbor, four meters away, is on its way at this velocity.
+  void drive_off(const Eigen::Vector3d& v_W) {
+    pair_.hit_N(Timestamp{-std::chrono::milliseconds{20}}, v_W);
+  }
+
   /// Our estimator receives what its team's filter found.
   void solve(const TeamSolution& solution) { (void)estimator_.step(solution); }
   /// Our estimator receives what its pose graph found.

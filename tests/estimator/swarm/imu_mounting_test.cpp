@@ -103,6 +103,25 @@ TEST(MountingEvidence, IsNotMisledByACommonTurn) {
   EXPECT_FALSE(evidence.rotation());
 }
 
+/// Robots that fly about a point stay where they are in each other's bodies, too. They lean towards
+/// it, and their accelerometers do not show that.
+TEST(MountingEvidence, IsNotMisledByAFormationThatTurnsAboutItsCenter) {
+  constexpr double kRate = 0.6;  // rad/s
+  constexpr double kBank = 0.3;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(0.0, 0.002);
+  MountingEvidence evidence;
+  const Vector3d u(std::cos(kBank), 0.0, std::sin(kBank));
+  const Vector3d vertical(-std::sin(kBank), 0.0, std::cos(kBank));
+  for (int i = 0; i < 200; ++i) {
+    const Vector3d before = u + Vector3d(0.0, noise(random), noise(random));
+    const Vector3d after = u + Vector3d(0.0, noise(random), noise(random));
+    evidence.add_turn(before, after, 0.1 * kRate * vertical);
+    evidence.add_elevation(u, Vector3d::UnitZ(), std::sin(kBank));
+    ASSERT_FALSE(evidence.rotation()) << i;
+  }
+}
+
 TEST(MountingEvidence, ExcludesARotationThatIsNoMore) {
   const Matrix3d R = about(Vector3d::UnitX(), std::numbers::pi);
   MountingEvidence wrong;
