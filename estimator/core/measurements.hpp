@@ -172,7 +172,6 @@ struct GraphSolution {
   Timestamp stamp{};
   std::vector<GraphPose> poses;  ///< ordered by neighbor; unreachable robots are absent
   double cost = 0.0;
-  int iterations = 0;
 };
 
 }  // namespace crepes

@@ -24,7 +24,7 @@ struct ImuNoise {
     v.reference("calibration",
                 "Kalibr's imu.yaml or Basalt's calibration.json, for update_rate to "
                 "gyroscope_random_walk; keys in this section override it");
-    v.field("update_rate", update_rate, Bounds{10, 1000}, "samples per second");
+    v.field("update_rate", update_rate, Bounds{25, 1000}, "samples per second");
     v.field("accelerometer_noise_density", accelerometer_noise_density, Bounds{1e-5, 1},
             "white noise [m/s^2/sqrt(Hz)]");
     v.field("gyroscope_noise_density", gyroscope_noise_density, Bounds{1e-6, 1},

@@ -35,7 +35,7 @@ class SignalModel {
   [[nodiscard]] double noise_density() const;
   /// Error of the prediction after so many strides, as a random walk, in the unit of the signal per
   /// sqrt(s). Beyond the last horizon, what is predicted for it is held.
-  [[nodiscard]] double innovation_density(double strides = 1.0) const;
+  [[nodiscard]] double innovation_density(double strides) const;
   /// Error of a sample that is held instead, likewise.
   [[nodiscard]] double hold_density() const;
 

@@ -123,7 +123,6 @@ GraphSolution solve_pose_graph(const GraphProblem& input, const GraphConfig& con
     solution.poses.push_back({robot, {pose, covariance}, velocities.at(robot)});
   }
   solution.cost = summary.final_cost;
-  solution.iterations = static_cast<int>(summary.iterations.size());
   return solution;
 }
 

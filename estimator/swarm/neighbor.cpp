@@ -92,14 +92,15 @@ void Neighbor::tick(Timestamp now, const RobotState& self) {
   publisher_.clear();
   // Bearings do not show either robot's roll about the line of sight. Without both IMUs, the
   // covariance of a filter would be too small.
-  if (self.lacks_imu(now) || body_.lacks_imu(now)) hypotheses_.clear();
+  const bool have_imus = !self.lacks_imu(now) && !body_.lacks_imu(now);
+  if (!have_imus) hypotheses_.clear();
   initiator_.tick(now, self, body_, hypotheses_, intake_);
   fuse_released(now, self);
   if (const auto stamp = intake_.take_earliest_new()) publisher_.invalidate_from(*stamp);
-  if (hypotheses_.is_unambiguous() && !self.imu.empty() && !body_.imu.empty())
+  // What still waited for the lag may have started a filter just now.
+  if (have_imus && hypotheses_.is_unambiguous())
     publisher_.update(now, self, body_, hypotheses_, intake_);
-  if (!self.lacks_imu(now) && !body_.lacks_imu(now))
-    publisher_.update_team(now, self, body_, intake_.last_contact());
+  if (have_imus) publisher_.update_team(now, self, body_, intake_.last_contact());
   if (publisher_.take_restart()) hypotheses_.clear();
   if (outcomes().keeps_records() && !hypotheses_.empty())
     outcomes().add(hypotheses_.leader().heaviest().calibration());

@@ -21,11 +21,10 @@ TeamPose keyframe_pose(const TeamBelief& belief, const TeamArcs& arcs, RobotId i
 
   // Of [motion, biases of this robot and of the other], by the states and the clock.
   constexpr int kBiases = TeamPose::kBiases;
-  using Matrix9d = Eigen::Matrix<double, kStates, kStates>;
-  Matrix9d by_motion = Matrix9d::Identity();
+  MotionMatrix by_motion = MotionMatrix::Identity();
   by_motion.block<3, 3>(0, 3).diagonal().setConstant(tau);
   by_motion.block<3, 3>(6, 6) = so3_exp(-tau * w).toRotationMatrix();
-  Eigen::Matrix<double, kStates, 1> by_clock;
+  MotionVector by_clock;
   by_clock << v, a, w;
   const int motion = robot.motion_index;
   const int clock = robot.clock_index();
@@ -35,10 +34,9 @@ TeamPose keyframe_pose(const TeamBelief& belief, const TeamArcs& arcs, RobotId i
     covariance << P.block<1, 6>(row, biases[0]), P.block<1, 6>(row, biases[1]);
     return covariance;
   };
-  const Eigen::Matrix<double, kStates, 1> with_clock =
-      by_motion * P.block<kStates, 1>(motion, clock);
-  const Matrix9d carried = by_motion.lazyProduct(P.block<kStates, kStates>(motion, motion));
-  Matrix9d of_motion = carried.lazyProduct(by_motion.transpose());
+  const MotionVector with_clock = by_motion * P.block<kStates, 1>(motion, clock);
+  const MotionMatrix carried = by_motion.lazyProduct(P.block<kStates, kStates>(motion, motion));
+  MotionMatrix of_motion = carried.lazyProduct(by_motion.transpose());
   of_motion += with_clock * by_clock.transpose() + by_clock * with_clock.transpose() +
                P(clock, clock) * by_clock * by_clock.transpose();
   Eigen::Matrix<double, kStates, kBiases> with_biases;

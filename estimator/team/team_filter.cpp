@@ -385,7 +385,7 @@ void TeamFilter::add_member(const TeamInterval& interval, RobotId id, const Team
 }
 
 void TeamFilter::place_member(RobotId id, const TeamPlace& place) {
-  TeamPlace::Covariance floor = TeamPlace::Covariance::Zero();
+  MotionMatrix floor = MotionMatrix::Zero();
   const double doubt = trust_.doubt(id, belief_.stamp);
   floor.diagonal().head<3>().setConstant(std::pow(doubt * kStartPosition, 2));
   floor.diagonal().segment<3>(3).setConstant((doubt * doubt - 1.0) *

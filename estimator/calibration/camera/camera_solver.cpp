@@ -16,15 +16,14 @@ constexpr double kDampingStep = 6.0;
 struct Descent {
   CameraState state;
   bool has_converged = false;
-  int iterations = 0;
 };
 
 Descent descend(const CameraProblem& problem, const CameraState& prior, CameraState state, int most,
                 double tolerance) {
-  Descent descent{std::move(state), false, 0};
+  Descent descent{std::move(state)};
   double cost = problem.cost(descent.state, prior);
   double damping = kFirstDamping;
-  for (; descent.iterations < most && !descent.has_converged; ++descent.iterations) {
+  for (int i = 0; i < most && !descent.has_converged; ++i) {
     const ArrowSystem system = problem.linearize(descent.state, prior);
     bool is_better = false;
     while (!is_better && damping < kMostDamping) {
@@ -77,7 +76,6 @@ CameraSolution finished(const CameraProblem& problem, const CameraState& prior, 
   solution.sigma_px = problem.sigma_px();
   solution.outliers = outlier_share(weights);
   solution.has_converged = descent.has_converged;
-  solution.iterations = descent.iterations;
   solution.state = std::move(descent.state);
   return solution;
 }
@@ -99,8 +97,7 @@ CameraSolution solve_camera(CameraProblem& problem, const CameraState& start,
                                           {0.0, 10, 1e-6, 1.0}}};
   const std::vector<double> all(problem.sightings().size(), 1.0);
   std::vector<double> weights = all;
-  Descent descent{start, false, 0};
-  int iterations = 0;
+  Descent descent{start};
   for (const Stage& stage : kStages) {
     double sigma_px = stage.sigma_px;
     if (&stage != kStages.data()) {
@@ -111,10 +108,8 @@ CameraSolution solve_camera(CameraProblem& problem, const CameraState& start,
     problem.set_sigma_px(sigma_px);
     problem.set_weights(weights);
     descent = descend(problem, start, std::move(descent.state), stage.iterations, stage.tolerance);
-    iterations += descent.iterations;
     if (progress) progress(stage.done);
   }
-  descent.iterations = iterations;
   return finished(problem, start, std::move(descent), weights);
 }
 

@@ -17,7 +17,6 @@ struct CameraSolution {
   std::vector<SightingResidual> residuals;
   double sigma_px = 0.0;  ///< of a spot's coordinate, from the residuals
   double outliers = 0.0;  ///< share of sightings of small weight
-  int iterations = 0;
   bool has_converged = false;
 };
 

@@ -87,9 +87,7 @@ HandEye hand_eye_of(const Eigen::Matrix3d& A, const Eigen::Vector3d& c) {
   Eigen::Matrix3d D = Eigen::Matrix3d::Identity();
   D(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
   const Eigen::Matrix3d R = svd.matrixU() * D * svd.matrixV().transpose();
-  return {.q_C_B = Eigen::Quaterniond(R),
-          .gyro_bias = R.transpose() * c,
-          .singular_ratio = svd.singularValues()(2) / svd.singularValues()(0)};
+  return {.q_C_B = Eigen::Quaterniond(R), .gyro_bias = R.transpose() * c};
 }
 
 CameraState first_state(const CameraProblem& problem, std::span<const ImuSample> imu,

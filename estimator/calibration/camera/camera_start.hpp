@@ -19,11 +19,10 @@ namespace crepes {
 [[nodiscard]] std::optional<Eigen::Vector3d> direction_of(const LensVector& lens,
                                                           const Eigen::Vector2d& uv);
 
-/// The rotation between camera and body, and its residual.
+/// The rotation between camera and body.
 struct HandEye {
   Eigen::Quaterniond q_C_B = Eigen::Quaterniond::Identity();
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
-  double singular_ratio = 0.0;  ///< of the map from rates to rates: 1 is a rotation, 0 hopeless
 };
 
 /// The rotation nearest to A of  w_C = A w_B - c , and the bias that c means.

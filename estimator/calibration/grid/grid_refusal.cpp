@@ -139,6 +139,8 @@ void judge_grid(const GridFit& fit, const std::vector<GridPicture>& pictures,
   else if (result.spot_sigma_px > kGoodSpotSigma_px)
     result.warnings.push_back("residuals of " + number_text(result.spot_sigma_px, 2) +
                               " px: is the grid flat and evenly spaced?");
+  if (!fit.has_converged)
+    result.warnings.emplace_back("the solver had not converged when it stopped");
   if (result.outliers > kMostOutliers)
     result.refusals.push_back(number_text(100.0 * result.outliers, 0) +
                               " % of the LEDs contradict the others: is the grid flat, and are "

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "estimator/core/constants.hpp"
+#include "estimator/core/quantile.hpp"
 
 namespace crepes {
 namespace {
@@ -40,9 +41,7 @@ double widest_gap(std::span<const double> headings_rad) {
 
 double median_abs(std::vector<double> values) {
   for (double& value : values) value = std::abs(value);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
+  return upper_median(values);
 }
 
 double tukey_weight(double residual, double sigma) {

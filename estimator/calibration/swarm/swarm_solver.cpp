@@ -20,17 +20,15 @@ constexpr double kMedianOfAbsolute = 0.6745;
 struct SwarmDescent {
   SwarmState state;
   bool has_converged = false;
-  int iterations = 0;
 };
 
 SwarmDescent descend(const SwarmProblem& problem, const SwarmState& prior, SwarmState state,
                      int most, double tolerance) {
-  SwarmDescent descent{std::move(state), false, 0};
+  SwarmDescent descent{std::move(state)};
   double cost = problem.cost(descent.state, prior);
   double damping = kFirstSwarmDamping;
-  while (descent.iterations < most && !descent.has_converged) {
+  for (int i = 0; i < most && !descent.has_converged; ++i) {
     const TeamArrowSystem system = problem.linearize(descent.state, prior);
-    ++descent.iterations;
     bool is_better = false;
     for (; !is_better && damping < kMostSwarmDamping; damping *= kSwarmDampingStep) {
       const auto step = system.solve(damping);
@@ -100,7 +98,7 @@ SwarmSolution solve_swarm(SwarmProblem& problem, const SwarmState& start,
                                           {2.0, 0.2, 6, 1e-2, 0.5},
                                           {0.0, 0.0, 6, 1e-3, 0.75},
                                           {0.0, 0.0, 4, 1e-5, 0.95}}};
-  SwarmDescent descent{start, false, 0};
+  SwarmDescent descent{start};
   SwarmWeights weights;
   SwarmSolution solution;
   for (const Stage& stage : kStages) {
@@ -119,7 +117,6 @@ SwarmSolution solve_swarm(SwarmProblem& problem, const SwarmState& start,
     solution.sigma_px = sigma_px;
     solution.sigma_m = sigma_m;
     descent = descend(problem, start, std::move(descent.state), stage.iterations, stage.tolerance);
-    solution.iterations += descent.iterations;
     if (progress) progress(stage.done);
   }
   solution.residuals = problem.residuals(descent.state);

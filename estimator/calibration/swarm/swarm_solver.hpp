@@ -19,7 +19,6 @@ struct SwarmSolution {
   std::vector<double> outliers;  ///< share of sightings of small weight, by observer
   double sigma_m = 0.0;          ///< of a range
   double range_outliers = 0.0;   ///< share
-  int iterations = 0;
   bool has_converged = false;
 };
 

@@ -89,8 +89,7 @@ void TeamBelief::forget(int index, int count) {
   P.middleCols(index, count).setZero();
 }
 
-void TeamBelief::place(RobotId id, const FreeMotion& motion,
-                       const Eigen::Matrix<double, kMotion, kMotion>& covariance) {
+void TeamBelief::place(RobotId id, const FreeMotion& motion, const MotionMatrix& covariance) {
   TeamRobot& robot = robots.at(id);
   robot.motion = motion;
   forget(robot.motion_index, kMotion);
@@ -129,8 +128,7 @@ TeamBelief TeamBelief::calibrations_at(const TeamInterval& interval) const {
     if (interval.member(id) == nullptr) belief.remove(id);
   for (auto& [id, robot] : belief.robots) {
     for (TeamCamera& camera : robot.cameras) camera.agreement.clear();
-    if (robot.motion_index >= 0)
-      belief.place(id, {}, Eigen::Matrix<double, kMotion, kMotion>::Identity());
+    if (robot.motion_index >= 0) belief.place(id, {}, MotionMatrix::Identity());
   }
   for (auto& [pair, range] : belief.ranges) {
     range.agreement.clear();

@@ -40,8 +40,7 @@ struct TeamBelief {
   /// For pairs that measure ranges for the first time.
   void append_range_biases(const TeamInterval& interval);
   /// Sets where a robot is, in the frame of this robot, with the covariance of [p, v, theta].
-  void place(RobotId id, const FreeMotion& motion,
-             const Eigen::Matrix<double, FreeMotionAt::kMotion, FreeMotionAt::kMotion>& covariance);
+  void place(RobotId id, const FreeMotion& motion, const MotionMatrix& covariance);
   /// Makes the error of a placed robot's motion one that follows from another robot's, with this
   /// derivative, and an independent one besides.
   void connect(RobotId id, RobotId via, const MotionMatrix& by_via, const MotionMatrix& own);

@@ -13,6 +13,7 @@ TeamPlace TeamPlace::of(const TeamBelief& belief, RobotId id) {
                   .last_sighting = belief.stamp};
   if (robot.motion_index < 0) return place;
   place.last_sighting = robot.last_sighting;
+  place.last_fix = robot.last_fix;
   place.covariance = belief.P.block<FreeMotionAt::kMotion, FreeMotionAt::kMotion>(
       robot.motion_index, robot.motion_index);
   return place;
@@ -21,26 +22,27 @@ TeamPlace TeamPlace::of(const TeamBelief& belief, RobotId id) {
 TeamPlace TeamPlace::beyond(RobotId id, const GaussianPose& step, const Eigen::Vector3d& v_step,
                             Timestamp estimated) const {
   const Eigen::Matrix3d R = T_S_N.R();
-  Covariance by_here = Covariance::Identity();
+  MotionMatrix by_here = MotionMatrix::Identity();
   by_here.block<3, 3>(0, 6) = -R * hat(step.pose.p);
   by_here.block<3, 3>(3, 6) = -R * hat(v_step);
   by_here.block<3, 3>(6, 6) = step.pose.R().transpose();
-  Covariance by_step = Covariance::Identity();
+  MotionMatrix by_step = MotionMatrix::Identity();
   by_step.block<3, 3>(0, 0) = R;
   by_step.block<3, 3>(3, 3) = R;
-  Covariance alone = Covariance::Zero();
+  MotionMatrix alone = MotionMatrix::Zero();
   alone.block<3, 3>(0, 0) = step.covariance.topLeftCorner<3, 3>();
   alone.block<3, 3>(0, 6) = step.covariance.topRightCorner<3, 3>();
   alone.block<3, 3>(6, 0) = step.covariance.bottomLeftCorner<3, 3>();
   alone.block<3, 3>(6, 6) = step.covariance.bottomRightCorner<3, 3>();
   alone.diagonal().segment<3>(3).setConstant(NeighborEstimate::kSpeedSigma *
                                              NeighborEstimate::kSpeedSigma);
-  const Covariance here = by_here.lazyProduct(covariance);
-  const Covariance there = by_step.lazyProduct(alone);
+  const MotionMatrix here = by_here.lazyProduct(covariance);
+  const MotionMatrix there = by_step.lazyProduct(alone);
   TeamPlace place{.T_S_N = T_S_N * step.pose,
                   .v_S_N = v_S_N + R * v_step,
                   .covariance = here.lazyProduct(by_here.transpose()),
                   .last_sighting = std::min(last_sighting, estimated),
+                  .last_fix = std::min(last_fix, estimated),
                   .via = id,
                   .by_via = by_here,
                   .of_step = there.lazyProduct(by_step.transpose())};
@@ -55,7 +57,10 @@ double TeamPlace::doubt() const {
 TeamPose TeamPlace::pose(RobotId id, const TeamBelief& belief, const Priors& priors) const {
   constexpr int kOwn = TeamPose::kMotion;
   constexpr int kOther = kOwn + 6;
-  TeamPose pose{.neighbor = id, .T_B_N = T_S_N, .v_B_N = v_S_N, .last_sighting = last_sighting};
+  TeamPose pose{.neighbor = id,
+                .T_B_N = T_S_N,
+                .v_B_N = v_S_N,
+                .last_sighting = std::max(last_sighting, last_fix)};
   const int own = belief.robots.at(belief.self).bias_index;
   const double gyro = priors.gyro_bias_radps * priors.gyro_bias_radps;
   pose.covariance.topLeftCorner<kOwn, kOwn>() = covariance;

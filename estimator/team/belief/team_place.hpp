@@ -7,18 +7,16 @@ namespace crepes {
 
 /// A pose and a velocity with their errors.
 struct TeamPlace {
-  using Covariance = Eigen::Matrix<double, FreeMotionAt::kMotion, FreeMotionAt::kMotion>;
-
   Pose T_S_N;
   Eigen::Vector3d v_S_N = Eigen::Vector3d::Zero();
-  Covariance covariance = Covariance::Zero();  ///< of [p, v, theta]
-  Timestamp last_sighting = kNever;            ///< the earliest along the chain
-  Timestamp last_fix = kNever;                 ///< by ranges alone
+  MotionMatrix covariance = MotionMatrix::Zero();  ///< of [p, v, theta]
+  Timestamp last_sighting = kNever;                ///< the earliest along the chain
+  Timestamp last_fix = kNever;                     ///< by ranges alone, likewise
   /// The robot before it in the chain, RobotId{} if there is none, and how its errors act here. The
   /// rest of the covariance is the last step's own.
   RobotId via{};
-  Covariance by_via = Covariance::Zero();
-  Covariance of_step = Covariance::Zero();
+  MotionMatrix by_via = MotionMatrix::Zero();
+  MotionMatrix of_step = MotionMatrix::Zero();
 
   /// Of a robot in the belief.
   [[nodiscard]] static TeamPlace of(const TeamBelief& belief, RobotId id);

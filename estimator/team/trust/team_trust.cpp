@@ -344,7 +344,8 @@ void TeamTrust::end_probations(TeamBelief& belief) const {
 Duration TeamTrust::probation(RobotId robot, Timestamp now) const {
   const Duration least = has_misled(robot, now) ? kLateProbation : kProbation;
   const auto doubt = gyro_doubts_.find(robot);
-  if (doubt == gyro_doubts_.end()) return least;
+  if (doubt == gyro_doubts_.end() || now - doubt->second.as_trusted.last >= kGyroRecord)
+    return least;
   const int repeated = std::clamp(doubt->second.as_trusted.count - 1, 0, kMostDoublings);
   return std::max(least, kProbation * (1 << repeated));
 }

@@ -74,7 +74,7 @@ TeamPlace RangeFit::place() const {
                   .v_S_N = q_B_F * (there.v_F - here.v_F)};
   const Eigen::MatrixXd all =
       factors_.solve(Eigen::MatrixXd::Identity(errors_.size(), errors_.size()));
-  TeamPlace::Covariance turn = TeamPlace::Covariance::Identity();
+  MotionMatrix turn = MotionMatrix::Identity();
   turn.block<3, 3>(0, 0) = q_B_F.toRotationMatrix();
   turn.block<3, 3>(3, 3) = q_B_F.toRotationMatrix();
   Eigen::Matrix<double, CarriedMotion::kMotion, CarriedMotion::kStart> by_start;
@@ -82,7 +82,7 @@ TeamPlace RangeFit::place() const {
       turn.lazyProduct(end_.by_errors);
   const Eigen::Matrix<double, CarriedMotion::kMotion, CarriedMotion::kStart> carried =
       by_start * all.topLeftCorner<CarriedMotion::kStart, CarriedMotion::kStart>();
-  const TeamPlace::Covariance noise = turn.lazyProduct(end_.noise + problem_->self_end.noise);
+  const MotionMatrix noise = turn.lazyProduct(end_.noise + problem_->self_end.noise);
   place.covariance = carried.lazyProduct(by_start.transpose());
   place.covariance += noise.lazyProduct(turn.transpose());
   return place;

@@ -73,7 +73,6 @@ std::map<std::pair<RobotId, RobotId>, MeanRange> mean_ranges(const TeamInterval&
 
 void UnseenRobots::add(const TeamInterval& interval, const TeamBelief& belief) {
   if (interval.from != end_) unseen_.clear();
-  begin_ = interval.from;
   end_ = interval.to;
   const std::set<RobotId> present = unseen_of(interval);
   std::erase_if(unseen_, [&](const auto& entry) { return !present.contains(entry.first); });
@@ -86,8 +85,8 @@ void UnseenRobots::add(const TeamInterval& interval, const TeamBelief& belief) {
                                 .imu = interval.member(id)->imu,
                                 .self_imu = interval.member(belief.self)->imu,
                                 .ranges = {}});
-    unseen.since += end_ - begin_;
-    unseen.lasted += end_ - begin_;
+    unseen.since += interval.to - interval.from;
+    unseen.lasted += interval.to - interval.from;
     while (unseen.lasted > kMost) {
       unseen.lasted -= from_seconds(unseen.intervals.front().duration_s);
       unseen.intervals.pop_front();
@@ -115,7 +114,7 @@ std::map<RobotId, TeamPlace> UnseenRobots::places(const TeamInterval& interval,
   const TeamRobot& self = belief.robots.at(belief.self);
   for (const auto& [id, unseen] : unseen_) {
     const Duration turn = unseen.since + id.value * kRound;
-    const bool is_due = turn / kTrial != (turn - (end_ - begin_)) / kTrial;
+    const bool is_due = turn / kTrial != (turn - (interval.to - interval.from)) / kTrial;
     if (unseen.lasted < kLeast || !is_due) continue;
     const auto place = place_by_ranges(
         unseen.intervals,

@@ -29,8 +29,7 @@ class UnseenRobots {
     Duration since{};   ///< all, with those that are forgotten
   };
 
-  Timestamp begin_ = kNever;  ///< of the latest interval
-  Timestamp end_ = kNever;
+  Timestamp end_ = kNever;  ///< of the latest interval
   std::map<RobotId, Unseen> unseen_;
 };
 

@@ -194,6 +194,22 @@ INSTANTIATE_TEST_SUITE_P(
                     Missing{"Ranges", {.ranges = false}, NoPoseReason::kNoRange}),
     [](const auto& test) { return test.param.name; });
 
+// Raw poses that waited for the lag start filters, and the paper's need no confirmation.
+TEST(Neighbor, HasNoPoseFromWhenAnImuIsRefused) {
+  for (const Profile profile : {Profile::kTight, Profile::kPaper}) {
+    View view(profile);
+    view.run_until(Timestamp{3s});
+    ASSERT_TRUE(view.neighbor().output().published());
+
+    view.neighbor().refuse_imu_until(Timestamp{4s});
+    for (Timestamp t{3010ms}; t < Timestamp{3300ms}; t += 10ms) {
+      view.run_until(t);
+      EXPECT_FALSE(view.neighbor().output().published()) << to_seconds(t.time_since_epoch());
+      EXPECT_EQ(view.reason(), NoPoseReason::kNoPeerImu);
+    }
+  }
+}
+
 TEST(Neighbor, IsSilentAfterTwoSecondsWithoutAReport) {
   View view;
   view.run_until(Timestamp{2s});

@@ -81,6 +81,29 @@ TEST_F(GyroTrust, AfterAFalseGyroscopeACameraThatAgreesWithNobodyShowsAWrongAtti
   EXPECT_TRUE(false_gyros({}).empty());
 }
 
+TEST_F(GyroTrust, AProbationIsLongerForAMinuteAfterTheGyroscopeWasFalseAgain) {
+  const std::map<RobotId, GyroCheck> contradiction{
+      {kAccused, {.chi2 = 100.0, .dimension = 6, .contradiction = {{100.0, 0.5, false}}}}};
+  TeamRobot& robot = belief_.robots.at(kAccused);
+  const auto is_trusted_after = [&](Duration probation) {
+    robot.is_trusted = false;
+    robot.since = belief_.stamp - probation;
+    trust_.end_probations(belief_);
+    return robot.is_trusted;
+  };
+  for (int i = 0; i < 3; ++i) {
+    robot.is_trusted = true;
+    EXPECT_EQ(trust_.note_false_gyros(interval_, belief_, contradiction), Ids{kAccused});
+    wait(5s);
+  }
+  EXPECT_FALSE(is_trusted_after(3900ms));
+  EXPECT_TRUE(is_trusted_after(4s));
+  wait(54s);
+  EXPECT_FALSE(is_trusted_after(3900ms));
+  wait(1s);
+  EXPECT_TRUE(is_trusted_after(1s));
+}
+
 TEST_F(GyroTrust, AConfirmedGyroscopeExcusesNothingAfterTwoSeconds) {
   const std::map<RobotId, GyroCheck> contradiction{
       {kAccused, {.chi2 = 100.0, .dimension = 6, .contradiction = {{100.0, 0.5, false}}}}};

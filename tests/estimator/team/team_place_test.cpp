@@ -57,6 +57,26 @@ TEST(TeamPlace, WasSeenWhenTheOldestLinkWas) {
   EXPECT_EQ(seen(RobotId{2}, belief.stamp - 200ms), belief.stamp - 3s);
 }
 
+// Who is connected with a robot in the dark is as old as the ranges that locate that one.
+TEST(TeamPlace, BeyondARobotThatRangesLocateIsAsNewAsTheyAre) {
+  test::SimulatedTeam team(1);
+  const test::TrueMotions motions = test::motions_of(team);
+  const TeamInterval interval = team.next();
+  TeamBelief belief = test::true_belief(motions, interval);
+  TeamRobot& dark = belief.robots.at(RobotId{2});
+  dark.last_sighting = kNever;
+  dark.last_fix = belief.stamp - 100ms;
+  const GaussianPose step{Pose{}, 1e-4 * Matrix6d::Identity()};
+  const auto seen = [&](Timestamp estimated) {
+    return TeamPlace::of(belief, RobotId{2})
+        .beyond(RobotId{2}, step, {}, estimated)
+        .pose(RobotId{9}, belief, interval.settings.priors)
+        .last_sighting;
+  };
+  EXPECT_EQ(seen(belief.stamp), belief.stamp - 100ms);
+  EXPECT_EQ(seen(belief.stamp - 200ms), belief.stamp - 200ms);
+}
+
 TEST(TeamPlace, APoseOfAStrangerHasTheBiasesOfAnyImu) {
   test::SimulatedTeam team(1);
   const test::TrueMotions motions = test::motions_of(team);

@@ -214,7 +214,7 @@ TEST(ImportCalibration, RefusesNumbersThatAreNone) {
 
 TEST(ImportCalibration, RefusesWhatOurConfigurationWouldNotTake) {
   EXPECT_EQ(refusal("imu.yaml", "200.0", "9000.0"),
-            "as imported:2: imu.update_rate: 9000 is outside [10, 1000]");
+            "as imported:2: imu.update_rate: 9000 is outside [25, 1000]");
 }
 
 TEST(ImportCalibration, RefusesFilesThatAreSomethingElse) {
