@@ -42,6 +42,9 @@ class DeviceClock {
     return stamp ? to_local(*stamp, arrival) : arrival;
   }
 
+  /// The stamps that follow are of another clock.
+  void change_clock() { segment_.reset(); }
+
   /// How often a trusted clock was rejected.
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
 

@@ -32,18 +32,6 @@ constexpr std::array<std::size_t, 32> kHi83Sizes{12, 12, 12, 12, 16, 8, 8, 4, 4,
                                                  12, 12, 12, 24, 4,  4, 4, 4, 4,  0,  0,
                                                  0,  0,  0,  0,  0,  0, 0, 0, 24, 12};
 
-/// CRC-16 with polynomial 0x1021, most significant bit first, initial value 0.
-std::uint16_t crc_of(Bytes bytes, std::uint16_t crc) {
-  for (const std::uint8_t byte : bytes) {
-    crc = static_cast<std::uint16_t>(crc ^ byte << 8U);
-    for (int bit = 0; bit < 8; ++bit) {
-      const unsigned shifted = static_cast<unsigned>(crc) << 1U;
-      crc = static_cast<std::uint16_t>((crc & 0x8000U) != 0 ? shifted ^ 0x1021U : shifted);
-    }
-  }
-  return crc;
-}
-
 ImuReading read_hi91(Bytes payload) {
   return {.verdict = ImuVerdict::kSample,
           .gyro_radps = vector_at<float>(payload, 24) * radians(1.0),
@@ -117,7 +105,7 @@ FrameCheck Hipnuc::examine(Bytes bytes) {
   if (length == kPayload || length > kMaxFrame) return {};
   if (bytes.size() < length) return {FrameKind::kIncomplete};
   const Bytes payload = bytes.subspan(kPayload, length - kPayload);
-  if (crc_of(payload, crc_of(bytes.first(4), 0)) != unsigned_at(bytes, 4, 2))
+  if (crc16(payload, crc16(bytes.first(4))) != unsigned_at(bytes, 4, 2))
     return {FrameKind::kBadChecksum};
   return {FrameKind::kComplete, length};
 }

@@ -203,7 +203,7 @@ bool MavlinkParser::is_chosen(Bytes frame, Timestamp arrival) {
   const bool is_same = source_ && *rank == source_->rank && header.sender == source_->sender;
   const bool is_better = !source_ || *rank < source_->rank || arrival - source_->heard > kGone;
   if (!is_same && !is_better) return false;
-  if (!is_same) clock_ = {};  // each sender's runs since it was switched on
+  if (!is_same) clock_.change_clock();  // each sender's runs since it was switched on
   source_ = Source{*rank, header.sender, arrival};
   return true;
 }

@@ -24,17 +24,6 @@ constexpr std::array<std::size_t, 15> kGroup1Sizes{8,  8,  8,  12, 16, 12, 24, 1
                                                    12, 24, 20, 28, 2,  4,  8};
 enum Group1Field : std::size_t { kTimeStartup = 0, kAngularRate = 5, kAccel = 8, kImu = 9 };
 
-/// CRC-16 with polynomial 0x1021, initial value 0; over a message with its CRC it is 0.
-std::uint16_t vectornav_crc(Bytes bytes) {
-  std::uint32_t crc = 0;
-  for (const std::uint8_t byte : bytes) {
-    crc ^= static_cast<std::uint32_t>(byte) << 8U;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x8000U) != 0 ? crc << 1U ^ 0x1021U : crc << 1U;
-    crc &= 0xffffU;
-  }
-  return static_cast<std::uint16_t>(crc);
-}
-
 bool has_field(std::uint64_t fields, std::size_t field) { return (fields >> field & 1U) != 0; }
 
 /// Position of a field; `kGroup1Sizes.size()` is that of the CRC.
@@ -51,7 +40,7 @@ FrameCheck examine_binary(Bytes bytes) {
   if (fields == 0 || has_field(fields, kGroup1Sizes.size())) return {};
   const std::size_t length = field_at_of(fields, kGroup1Sizes.size()) + kVectorNavCrc;
   if (bytes.size() < length) return {FrameKind::kIncomplete};
-  if (vectornav_crc(bytes.subspan(1, length - 1)) != 0) return {FrameKind::kBadChecksum};
+  if (crc16(bytes.subspan(1, length - 1)) != 0) return {FrameKind::kBadChecksum};
   return {FrameKind::kComplete, length};
 }
 

@@ -232,7 +232,7 @@ bool XsensParser::is_chosen(std::uint8_t bus, XsensQuantity quantity, Timestamp 
   const bool is_of_it = source_ && source_->bus == bus;
   if (!is_silent && (!is_of_it || quantity > source_->quantity)) return false;
   if (!is_of_it || quantity != source_->quantity) {
-    clock_ = {};
+    clock_.change_clock();
     period_ = {};
   }
   source_ = Source{bus, quantity, arrival};

@@ -52,6 +52,17 @@ template <class T>
   return static_cast<std::uint8_t>(std::accumulate(bytes.begin(), bytes.end(), 0U));
 }
 
+/// CRC-16 with polynomial 0x1021, most significant bit first; `before` is that of the bytes before
+/// them. Over bytes with their CRC it is 0.
+[[nodiscard]] inline std::uint16_t crc16(Bytes bytes, std::uint16_t before = 0) {
+  std::uint32_t crc = before;
+  for (const std::uint8_t byte : bytes) {
+    crc ^= static_cast<std::uint32_t>(byte) << 8U;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x8000U) != 0 ? crc << 1U ^ 0x1021U : crc << 1U;
+  }
+  return static_cast<std::uint16_t>(crc);
+}
+
 /// Whether the first bytes of the frame occur in it again. A truncated frame and the next one can
 /// together have a valid checksum (one in 256), which would yield a wrong value.
 [[nodiscard]] inline bool begins_twice(Bytes frame) {

@@ -20,8 +20,8 @@ constexpr auto kTable = make_table();
 
 }  // namespace
 
-std::uint32_t crc32(std::span<const std::uint8_t> bytes) {
-  std::uint32_t remainder = 0xFFFFFFFFU;
+std::uint32_t crc32(std::span<const std::uint8_t> bytes, std::uint32_t before) {
+  std::uint32_t remainder = ~before;
   for (const std::uint8_t byte : bytes)
     remainder = (remainder >> 8U) ^ kTable[(remainder ^ byte) & 0xFFU];
   return ~remainder;

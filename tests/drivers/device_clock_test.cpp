@@ -127,6 +127,21 @@ TEST(DeviceClock, FallsBackToArrivalsAtOnceWhenTheDeviceRestarts) {
   }
 }
 
+TEST(DeviceClock, CountsRestartsOfAllClocks) {
+  Device device(1, -40e-6);
+  DeviceClock clock;
+  run(clock, device, 0.0, 10.0);
+  device.set(0.0, 10.0);
+  run(clock, device, 10.0, 20.0);
+
+  clock.change_clock();
+  device.set(0.0, 20.0);
+  const auto stamps = run(clock, device, 20.0, 30.0);
+
+  EXPECT_EQ(clock.restarts(), 1U);
+  EXPECT_LT(worst(stamps, 21.2), 300us);
+}
+
 TEST(DeviceClock, SurvivesJumpsOfEverySizeInBothDirections) {
   for (const double jump_s : {-3000.0, -2.0, -0.3, -0.03, -0.007, 0.007, 0.03, 0.3, 2.0, 3000.0}) {
     SCOPED_TRACE(jump_s);

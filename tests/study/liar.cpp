@@ -31,7 +31,7 @@ void stamp_late(RobotRecording& robot) {
   for (UwbRange& range : robot.ranges) range.stamp += kStampedLate;
   for (CameraRecording& camera : robot.cameras) {
     for (SpotFrame& frame : camera.spots) frame.stamp += kStampedLate;
-    for (RecordedImage& image : camera.images) image.stamp += kStampedLate;
+    for (RecordedPicture& image : camera.images) image.stamp += kStampedLate;
   }
 }
 

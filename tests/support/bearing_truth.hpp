@@ -44,7 +44,7 @@ struct SeenNeighbor {
 inline void detect_spots(RobotRecording& robot) {
   SpotDetector detector(robot.config.vision);
   CameraRecording& camera = robot.cameras.front();
-  for (const RecordedImage& image : camera.images) {
+  for (const RecordedPicture& image : camera.images) {
     const auto picture = read_gray_image(image.file).value();
     const Detection found = detector.detect({.pixels = picture.pixels.data(),
                                              .width = picture.width,

@@ -61,7 +61,7 @@ class FrameSource {
   }
   [[nodiscard]] Result<SpotFrame> frame(std::size_t i) {
     if (!recording_.spots.empty()) return recording_.spots[i];
-    const RecordedImage& image = recording_.images[i];
+    const RecordedPicture& image = recording_.images[i];
     const auto picture = read_gray_image(image.file, camera_);
     if (!picture) return tl::unexpected(picture.error());
     const Detection found = detector_.detect({.pixels = picture->pixels.data(),

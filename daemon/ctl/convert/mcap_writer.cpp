@@ -4,6 +4,9 @@
 #include <type_traits>
 #include <utility>
 
+#include "drivers/serial/device_request.hpp"
+#include "net/mesh/crc32.hpp"
+
 namespace crepes {
 namespace {
 
@@ -58,10 +61,8 @@ std::string record(Opcode opcode, const RecordFields& fields) {
   return record(opcode, fields.bytes());
 }
 
-std::uint32_t crc_of(std::string_view bytes) {
-  Crc32 crc;
-  crc.add(bytes);
-  return crc.value();
+std::uint32_t crc_of(std::string_view text, std::uint32_t before = 0) {
+  return crc32(bytes_of_text(text), before);
 }
 
 }  // namespace
@@ -85,7 +86,7 @@ void McapWriter::put(std::string_view bytes) {
   file_.text() += bytes;
   file_.flush_if_large();
   position_ += bytes.size();
-  data_crc_.add(bytes);
+  data_crc_ = crc_of(bytes, data_crc_);
 }
 
 std::uint16_t McapWriter::add_schema(std::string_view name, std::string_view json_schema) {
@@ -199,7 +200,7 @@ void McapWriter::put_summary() {
 
 Result<void> McapWriter::finish() {
   close_chunk();
-  put(record(Opcode::kDataEnd, RecordFields().number(data_crc_.value())));
+  put(record(Opcode::kDataEnd, RecordFields().number(data_crc_)));
   put_summary();
   put(kMagic);
   return file_.publish();

@@ -8,7 +8,6 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/ctl/convert/crc32.hpp"
 #include "drivers/dataset/part_file.hpp"
 #include "estimator/core/result.hpp"
 
@@ -56,7 +55,7 @@ class McapWriter {
 
   PartFile file_;
   std::uint64_t position_ = 0;
-  Crc32 data_crc_;
+  std::uint32_t data_crc_ = 0;
   std::string schemas_;  ///< all records so far: they are repeated in the summary
   std::string channels_;
   std::string chunk_indexes_;

@@ -59,7 +59,7 @@ void add_camera(const RobotRecording& robot, std::size_t camera,
                                 return annotations_json(time_ns, row.spots);
                               }));
   streams.push_back(stream_of(topic + "/image", picture_kind(), recording.images, time_s,
-                              [frame](std::int64_t time_ns, const RecordedImage& row) {
+                              [frame](std::int64_t time_ns, const RecordedPicture& row) {
                                 return read_text_file(row.file).map([&](const std::string& bytes) {
                                   return picture_json(time_ns, frame, bytes);
                                 });

@@ -177,9 +177,9 @@ Result<std::vector<SpotFrame>> read_spots(const fs::path& file, std::uint8_t cam
   return frames;
 }
 
-Result<std::vector<RecordedImage>> read_images(const fs::path& file, const Context& context) {
+Result<std::vector<RecordedPicture>> read_images(const fs::path& file, const Context& context) {
   const fs::path pictures = file.parent_path() / "data";
-  const auto parse = [&](const CsvFile& csv, DatasetRow<RecordedImage>& row) {
+  const auto parse = [&](const CsvFile& csv, DatasetRow<RecordedPicture>& row) {
     const fs::path name = csv.field(1);
     std::error_code status;
     row.value = {.stamp = row.stamp, .file = pictures / name};
@@ -187,7 +187,7 @@ Result<std::vector<RecordedImage>> read_images(const fs::path& file, const Conte
     context.faults.add(csv.path(), csv.line(), "no such picture", csv.field(1));
     return false;
   };
-  return read_rows<RecordedImage>(file, 2, context, parse).map(values_of<RecordedImage>);
+  return read_rows<RecordedPicture>(file, 2, context, parse).map(values_of<RecordedPicture>);
 }
 
 Result<CameraRecording> read_camera(const fs::path& dir, std::uint8_t index,

@@ -6,22 +6,17 @@
 
 #include "config/schema/config.hpp"
 #include "daemon/ctl/dataset/swarm_manifest.hpp"
+#include "drivers/camera/image_folder.hpp"
 #include "drivers/dataset/dataset_faults.hpp"
 #include "estimator/core/measurements.hpp"
 #include "estimator/core/result.hpp"
 
 namespace crepes {
 
-/// The file of a picture and its stamp.
-struct RecordedImage {
-  Timestamp stamp{};
-  std::filesystem::path file;
-};
-
 /// The recording of one camera: spots, pictures, or both.
 struct CameraRecording {
   std::vector<SpotFrame> spots;
-  std::vector<RecordedImage> images;
+  std::vector<RecordedPicture> images;
 };
 
 /// The inputs of one robot. The stamps of each sensor never decrease.

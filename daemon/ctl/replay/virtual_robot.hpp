@@ -29,7 +29,7 @@ struct VirtualDatagram {
 /// Only the name of an image; it is decoded when it is due.
 struct PendingImage {
   std::uint8_t camera = 0;
-  RecordedImage image;
+  RecordedPicture image;
 };
 struct Forward {};  ///< what waits for it
 using VirtualInput = std::variant<Event, VirtualDatagram, PendingImage, Forward>;

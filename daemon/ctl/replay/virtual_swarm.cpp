@@ -102,7 +102,7 @@ void VirtualSwarm::schedule_recording(std::size_t index) {
     }
     // If a camera has both, the spots are the smaller input.
     if (!std::exchange(camera.spots, {}).empty()) continue;
-    for (const RecordedImage& image : camera.images) {
+    for (const RecordedPicture& image : camera.images) {
       schedule_at(image.stamp, index, PendingImage{static_cast<std::uint8_t>(k), image}, delay_s);
     }
   }

@@ -18,14 +18,6 @@ std::string written(const std::function<void(McapWriter&)>& fill) {
   return read_text_file(file).value();
 }
 
-TEST(Crc32, IsThatOfTheStandardCheck) {
-  Crc32 crc;
-  crc.add("1234");
-  crc.add("56789");
-
-  EXPECT_EQ(crc.value(), 0xCBF43926U);
-}
-
 TEST(McapWriter, BeginsAndEndsWithTheMagicEvenWithoutMessages) {
   const std::string_view magic{"\x89MCAP0\r\n", 8};
 
