@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <map>
 #include <optional>
@@ -76,6 +77,7 @@ class Recorder {
       if (listener_)
         log_message(LogLevel::kWarning, "recording: its socket was removed; there is another now");
       listener_ = std::move(*listener);
+      fault_.clear();
     } else if (listener.error().message != fault_) {
       fault_ = listener.error().message;
       log_message(LogLevel::kWarning, "recording: " + fault_);
@@ -93,7 +95,14 @@ class Recorder {
 
   void accept() {
     UniqueFd socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC));
-    if (!socket) return;
+    if (!socket) {
+      // A tool that cannot be accepted keeps waiting, and poll returns at once.
+      if (errno == EMFILE || errno == ENFILE) {
+        log_message(LogLevel::kWarning, "recording: too many open files; a tool was sent away");
+        listener_ = UniqueFd{};
+      }
+      return;
+    }
     Recipient recipient(std::move(socket));
     if (recipients_.size() == kMaxRecipients) {
       recipient.refuse("too many tools are connected");

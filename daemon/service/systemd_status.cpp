@@ -2,12 +2,12 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <cstddef>
 #include <string_view>
 #include <vector>
 
 #include "net/subscription/fault_text.hpp"
+#include "net/subscription/json_parts.hpp"
 
 namespace crepes {
 namespace {
@@ -15,8 +15,8 @@ namespace {
 constexpr std::size_t kMaxPart = 200;  // bytes
 
 /// The first line only, so that the status stays one line.
-std::string_view brief(std::string_view text) {
-  return text.substr(0, std::min(text.find('\n'), kMaxPart));
+std::string brief(std::string_view text) {
+  return truncated_utf8(text.substr(0, text.find('\n')), kMaxPart);
 }
 
 void append(std::string& line, std::string_view separator, std::string_view part) {
@@ -44,12 +44,14 @@ std::string neighbors_line(const std::vector<NeighborStatus>& neighbors) {
 
 std::string systemd_status(const SystemStatus& status) {
   std::string line = neighbors_line(status.estimator.neighbors);
+  std::string team;
+  for (const TeamFault& fault : status.estimator.faults)
+    append(team, "; ", fmt::format("this robot: {}", text_of(fault)));
   for (const NeighborStatus& neighbor : status.estimator.neighbors) {
     for (const TeamFault& fault : neighbor.faults)
-      append(line, "; ", fmt::format("{}: {}", neighbor.name, text_of(fault)));
+      append(team, "; ", fmt::format("{}: {}", neighbor.name, text_of(fault)));
   }
-  for (const TeamFault& fault : status.estimator.faults)
-    append(line, "; ", fmt::format("this robot: {}", text_of(fault)));
+  if (!team.empty()) append(line, "; ", brief(team));
   std::string faults;
   for (const SensorStatus& sensor : status.sensors) {
     if (!sensor.ok) append(faults, "; ", fmt::format("{}: {}", sensor.name, sensor.message));

@@ -29,7 +29,7 @@
 
 namespace crepes {
 
-/// State and counters of a tracker, for STATUS.
+/// State and counters of a tracker.
 struct TrackerStatus {
   std::size_t tracks = 0;
   std::size_t identified = 0;

@@ -1,4 +1,4 @@
-/// Building blocks of JSON replies. Include only where JSON is written.
+/// Building blocks of JSON replies. Include only where messages are written.
 #pragma once
 
 #include <Eigen/Core>

@@ -65,6 +65,7 @@ class CoverageView {
 Result<std::filesystem::path> record_for_camera(const RecordForCameraOptions& options) {
   std::optional<CameraCoverage> coverage;
   std::optional<Error> fault;
+  const StopSignals until_restored;
   std::optional<CoverageView> view(std::in_place, options.is_quiet, options.socket);
   const KeyReader keys;
   RecordOptions recording;

@@ -50,6 +50,7 @@ Result<void> run_record(RecordOptions options, bool json) {
                    static_cast<unsigned long long>(progress.rows));
     };
   }
+  const StopSignals until_restored;
   const KeyReader keys;
   options.is_enough = [&keys] { return keys.next() == 'q'; };
   const Result<RecordSummary> summary = record(options);

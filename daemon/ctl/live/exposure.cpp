@@ -186,9 +186,9 @@ constexpr const char* kHelp =
 
 /// Until q.
 Result<void> show_live(const ExposureOptions& options, CameraLights& lights) {
+  StopSignals stop;
   const LiveScreen screen;
   const KeyReader keys;
-  StopSignals stop;
   std::string refused;
   bool has_help = false;
   while (!stop.requested()) {

@@ -12,7 +12,8 @@
 namespace crepes {
 
 /// Blocks SIGINT, SIGTERM, SIGHUP and SIGPIPE (of an output that nobody reads any more) during its
-/// lifetime, so that child processes and subscriptions can be ended first.
+/// lifetime, so that child processes and subscriptions can be ended first. What changes the
+/// terminal is made after it: a second signal ends the program only when the terminal is restored.
 class StopSignals {
  public:
   StopSignals();

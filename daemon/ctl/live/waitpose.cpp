@@ -89,9 +89,11 @@ Result<std::string> wait_for_pose(const WaitposeOptions& options) {
   const MonotonicClock clock;
   const Timestamp end = clock.now() + from_seconds(options.timeout_s);
   Wait wait(options);
+  StopSignals stop;
   const KeyReader keys;
   while (clock.now() < end) {
-    if (keys.next() == 'q') return fail(ErrorCode::kNotFound, "stopped: " + wait.why());
+    if (stop.requested() || keys.next() == 'q')
+      return fail(ErrorCode::kNotFound, "stopped: " + wait.why());
     const auto answer = daemon->receive(50ms);
     if (!answer) continue;
     if (const auto found = wait.handle(*answer)) return *found + "\n";

@@ -87,6 +87,7 @@ Result<void> show_once(const WatchOptions& options) {
 
 Result<void> show_live(const WatchOptions& options) {
   WatchScreen screen;
+  const StopSignals until_restored;
   const LiveScreen terminal;
   const KeyReader keys;
   const Duration period = terminal.is_terminal() ? 100ms : 1000ms;

@@ -52,6 +52,30 @@ TEST(SystemdStatus, StaysOneShortLineWhateverThereIsToSay) {
   EXPECT_EQ(line.find('\n'), std::string::npos);
 }
 
+TEST(SystemdStatus, StaysShortWhateverTheTeamFindsWrong) {
+  SystemStatus status;
+  for (std::uint16_t id = 2; id < 50; ++id) {
+    status.estimator.neighbors.push_back(located(id));
+    status.estimator.neighbors.back().faults = {{.robot = RobotId{id}}};
+  }
+
+  EXPECT_LT(systemd_status(status).size(), 800);
+}
+
+// systemd refuses a status that is not UTF-8.
+TEST(SystemdStatus, CutsNoCharacter) {
+  SystemStatus status;
+  for (const std::string start : {"", "x"}) {
+    std::string message = start;
+    for (int i = 0; i < 200; ++i) message += "\u00e9";
+    status.sensors = {{"imu", 0.0, false, message, {}}};
+
+    const std::string line = systemd_status(status);
+
+    EXPECT_TRUE(line.ends_with("\u00e9")) << line;
+  }
+}
+
 TEST(SystemdStatus, SaysWhatWaitsForARestartAndWhyAReloadWasRefused) {
   SystemStatus status;
   status.config.restart = {"cameras", "sim"};

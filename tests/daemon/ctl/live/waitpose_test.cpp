@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <csignal>
+
 #include "tests/daemon/ctl/live/served_status.hpp"
 
 namespace crepes::waitpose_test {
@@ -42,6 +44,22 @@ TEST(Waitpose, RefusesWhoIsNoNeighbor) {
 
   for (const std::string peer : {"r1", "1", "9", "rover"})
     EXPECT_EQ(error_of(daemon, peer), "robot " + peer + ": it is no other robot of this swarm");
+}
+
+TEST(Waitpose, EndsInOrderAtASignal) {
+  const ServedStatus daemon(without_poses());
+  sigset_t interrupt{};
+  sigset_t before{};
+  sigemptyset(&interrupt);
+  sigaddset(&interrupt, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &interrupt, &before);
+  std::raise(SIGINT);
+
+  EXPECT_TRUE(error_of(daemon, "r3").starts_with("stopped: "));
+
+  const timespec at_once{};
+  sigtimedwait(&interrupt, nullptr, &at_once);  // would end this process
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 }  // namespace
