@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <string>
 
 namespace crepes {
 namespace {
@@ -17,8 +18,22 @@ constexpr double kFewFrames = 2.0;  // of a slot
 constexpr double kLongestSlot_ms = 70.0;
 constexpr double kMillisecond = 1e-3;  // s
 
+void doubt_name(const SwarmConfig& swarm, std::size_t i, Doubts& doubts) {
+  const MemberConfig& member = swarm.members[i];
+  const auto doubt = [&](const char* reason) {
+    doubts.push_back({fmt::format("swarm.members[{}].name", i), reason});
+  };
+  for (const char* taken : {"team", "truth", "null"})
+    if (member.name == taken) doubt("means something else in data sets and replays");
+  if (std::ranges::any_of(swarm.members, [&](const MemberConfig& other) {
+        return other.id != member.id && member.name == std::to_string(other.id.value);
+      }))
+    doubt("is the id of another robot: tools would take one for the other");
+}
+
 void doubt_members(const SwarmConfig& swarm, Doubts& doubts) {
   for (std::size_t i = 0; i < swarm.members.size(); ++i) {
+    doubt_name(swarm, i, doubts);
     const MemberConfig& member = swarm.members[i];
     const auto doubt_arm = [&](const char* key, const Eigen::Vector3d& arm, const char* what) {
       const std::string path = fmt::format("swarm.members[{}].{}", i, key);

@@ -24,7 +24,7 @@ int run(int argc, char** argv) {
       "Exit codes: 0 done; 1 wrong input, or no answer (the reason is on stderr); 2 wrong usage.");
   CommandLine line(app);
   for (const auto add : kCommands) add(line);
-  check_numbers(app);
+  check_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "drivers/base/io_failure.hpp"
+
 namespace crepes {
 
 namespace fs = std::filesystem;
@@ -18,8 +20,8 @@ Result<ScratchDirectory> ScratchDirectory::create(const fs::path& keep) {
     return ScratchDirectory(keep, false);
   }
   std::string name = (fs::temp_directory_path(status) / "crepes-XXXXXX").string();
-  if (status || ::mkdtemp(name.data()) == nullptr)
-    return fail(ErrorCode::kIo, name + ": cannot be created");
+  if (status) return fail(ErrorCode::kIo, "TMPDIR or /tmp: " + status.message());
+  if (::mkdtemp(name.data()) == nullptr) return io_failure(name);
   return ScratchDirectory(name, true);
 }
 

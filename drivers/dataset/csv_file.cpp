@@ -10,6 +10,8 @@
 namespace crepes {
 namespace {
 
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // spreadsheets write it before UTF-8
+
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
   while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
@@ -24,6 +26,7 @@ Result<CsvFile> CsvFile::open(const std::filesystem::path& file, std::size_t col
   CREPES_EXPECT(columns > 0 && columns <= kMaxColumns, "more columns than a row holds");
   Result<std::string> text = read_text_file(file);
   if (!text) return tl::unexpected(text.error());
+  if (text->starts_with(kByteOrderMark)) text->erase(0, kByteOrderMark.size());
   CsvFile csv(file, std::move(*text), columns);
   if (header == Header::kHash && !csv.text_.starts_with('#')) {
     faults.add(file, 1, "no header that begins with '#'");

@@ -45,22 +45,29 @@ Result<void> publish_part(const fs::path& file) {
   return fail(ErrorCode::kIo, fmt::format("{}: {}", file.string(), status.message()));
 }
 
+/// Removes what could not be written.
+void discard_part(const fs::path& file) {
+  const fs::path part = part_of(file);
+  std::error_code ignored;
+  if (part != file) fs::remove(part, ignored);
+}
+
 }  // namespace
 
 Result<void> replace_text_file(const fs::path& file, std::string_view text) {
   const fs::path target = target_of(file);
-  const fs::path part = part_of(target);
-  auto done = write_text(part, text, std::ios::trunc);
+  auto done = write_text(part_of(target), text, std::ios::trunc);
   if (done) return publish_part(target);
-  std::error_code ignored;
-  if (part != target) fs::remove(part, ignored);
+  discard_part(target);
   return done;
 }
 
 Result<PartFile> PartFile::create(fs::path file, std::string_view header) {
   file = target_of(file);
-  if (auto done = write_text(part_of(file), header, std::ios::trunc); !done)
+  if (auto done = write_text(part_of(file), header, std::ios::trunc); !done) {
+    discard_part(file);
     return tl::unexpected(done.error());
+  }
   return PartFile(std::move(file));
 }
 
@@ -77,7 +84,10 @@ void PartFile::flush() {
 
 Result<void> PartFile::publish() {
   flush();
-  if (failure_) return tl::unexpected(*failure_);
+  if (failure_) {
+    discard_part(file_);
+    return tl::unexpected(*failure_);
+  }
   return publish_part(file_);
 }
 

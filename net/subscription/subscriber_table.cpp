@@ -60,7 +60,8 @@ Result<void> SubscriberTable::make_room(const Endpoint& client, Timestamp now, b
            entry.second.last_excess >= now - from_seconds(config_.lease_s);
   });
   if (floods == subscribers_.end()) {
-    return fail(ErrorCode::kUsage, fmt::format("too many subscribers at this address, at most {}",
+    return fail(ErrorCode::kUsage, fmt::format("too many subscribers at this address, at most {} "
+                                               "(subscription.max_per_address)",
                                                config_.max_per_address));
   }
   subscribers_.erase(floods);

@@ -269,7 +269,7 @@ TEST(ToolsAlone, ReplayIntoADirectoryOfItsOwnOnly) {
   const Ending into_itself = crepesctl({"replay", swarm, "--out", swarm + "/"});
 
   EXPECT_EQ(nowhere.how, "exit code 2");
-  EXPECT_NE(nowhere.errors.find("names no directory"), std::string::npos) << nowhere.errors;
+  EXPECT_NE(nowhere.errors.find("--out: names nothing"), std::string::npos) << nowhere.errors;
   EXPECT_EQ(into_itself.how, "exit code 1");
   EXPECT_NE(into_itself.errors.find("has a data set"), std::string::npos) << into_itself.errors;
   EXPECT_FALSE(std::filesystem::exists(files.dir() / "report.json"));
@@ -351,6 +351,64 @@ TEST(ToolsAlone, RefuseNumbersThatAreNone) {
     EXPECT_EQ(crepesctl({"replay", "swarm", "--out", "results", seed}).how, "exit code 2") << seed;
     EXPECT_EQ(crepesctl({"codebook", seed}).how, "exit code 2") << seed;
   }
+}
+
+TEST(ToolsAlone, NameNoBoundThatNobodyCouldReach) {
+  const Ending sigma = crepesctl({"waitpose", "--peer", "2", "--max-sigma", "0"});
+  const Ending seed = crepesctl({"demo", "--seed=-1"});
+
+  EXPECT_EQ(sigma.how, "exit code 2");
+  EXPECT_NE(sigma.errors.find("--max-sigma: 0 is no number above 0"), std::string::npos)
+      << sigma.errors;
+  EXPECT_EQ(seed.how, "exit code 2");
+  EXPECT_NE(seed.errors.find("not in range 0 to 2147483647"), std::string::npos) << seed.errors;
+}
+
+TEST(ToolsAlone, TakeNoEmptyNameForTheWorkingDirectory) {
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"record", ""},
+                                                {"view", ""},
+                                                {"replay", "", "--out", "results"},
+                                                {"evaluate", "results", "--truth", ""},
+                                                {"calibrate", "imu", "", "--out", "imu.yaml"},
+                                                {"led", "--port", "", "get"}}) {
+    const Ending ending = crepesctl(words);
+    EXPECT_EQ(ending.how, "exit code 2") << words.front();
+    EXPECT_NE(ending.errors.find("names nothing"), std::string::npos) << ending.errors;
+  }
+}
+
+TEST(ToolsAlone, RefuseOptionsThatChangeNothing) {
+  const TinySwarm files;
+  const std::string swarm = files.dir().string();
+  const std::string out = (files.dir() / "out").string();
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"--delayed", "r1"}, {"--no-forwarding"}}) {
+    std::vector<std::string> all{"replay", swarm, "--out", out};
+    all.insert(all.end(), words.begin(), words.end());
+    EXPECT_EQ(crepesctl(all).how, "exit code 2") << words.front();
+  }
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
+TEST(ToolsAlone, TakeTheBoardsPortBeforeOrBehindWhatToDo) {
+  const Ending before = crepesctl({"led", "--port", "/nonexistent", "get"});
+  const Ending behind = crepesctl({"led", "get", "--port", "/nonexistent"});
+
+  EXPECT_EQ(behind.how, "exit code 1");
+  EXPECT_EQ(behind.errors, before.errors);
+}
+
+TEST(ToolsAlone, LeaveTheEarlierResultWhereTheDiskIsFull) {
+  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+  const auto file = scratch.path() / "codebook.yaml";
+  EXPECT_EQ(crepesctl({"codebook", "--ids", "5", "--out", file}).how, "exit code 0");
+  const std::string before = read_text_file(file).value();
+
+  const Ending ending = run("/bin/sh", {"-c", R"(trap '' XFSZ; ulimit -f 1; exec "$@")", "sh",
+                                        crepesctl_path(), "codebook", "--ids", "5", "--out", file});
+
+  EXPECT_EQ(ending.how, "exit code 1");
+  EXPECT_EQ(read_text_file(file).value(), before);
 }
 
 TEST(ToolsAlone, NameTheNearestSubcommand) {

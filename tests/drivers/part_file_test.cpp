@@ -59,5 +59,14 @@ TEST_F(PartFiles, AreWrittenThroughToADevice) {
   EXPECT_TRUE(fs::is_symlink(path("null")));
 }
 
+TEST_F(PartFiles, LeaveNothingBehindThatCannotBeWritten) {
+  fs::create_symlink("/dev/full", path("a.part"));
+
+  EXPECT_FALSE(PartFile::create(path("a"), "head"));
+
+  EXPECT_FALSE(fs::is_symlink(path("a.part")));
+  EXPECT_TRUE(fs::is_character_file("/dev/full"));
+}
+
 }  // namespace
 }  // namespace crepes::part_file_test

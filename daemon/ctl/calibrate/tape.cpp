@@ -28,7 +28,8 @@ struct TapeFault {
 };
 
 [[noreturn]] void refuse(const YAML::Node& node, std::string_view key, std::string_view reason) {
-  throw TapeFault{node.Mark().line + 1, fmt::format("{}: {}", key, reason)};
+  const int line = std::max(node.Mark().line, 0);  // an empty file has none
+  throw TapeFault{line + 1, fmt::format("{}: {}", key, reason)};
 }
 
 YAML::Node item_of(const YAML::Node& parent, const char* key) {
@@ -40,7 +41,8 @@ YAML::Node item_of(const YAML::Node& parent, const char* key) {
 
 YAML::Node list_of(const YAML::Node& parent, const char* key) {
   const YAML::Node node = item_of(parent, key);
-  if (!node.IsSequence() || node.size() == 0) refuse(node, key, "must be a list");
+  if (!node.IsSequence()) refuse(node, key, "must be a list");
+  if (node.size() == 0) refuse(node, key, "is an empty list");
   return node;
 }
 

@@ -7,7 +7,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -17,6 +16,7 @@
 #include "daemon/ctl/live/screen_text.hpp"
 #include "daemon/ctl/replaceable.hpp"
 #include "drivers/base/number_text.hpp"
+#include "drivers/dataset/part_file.hpp"
 
 namespace crepes {
 namespace {
@@ -49,7 +49,7 @@ class WrappedHelp final : public CLI::Formatter {
 
 std::shared_ptr<CLI::FormatterBase> wrapped_help() { return std::make_shared<WrappedHelp>(); }
 
-void check_numbers(CLI::App& app) {
+void check_values(CLI::App& app) {
   const CLI::Validator finite(
       [](const std::string& text) {
         double number = 0.0;
@@ -64,11 +64,25 @@ void check_numbers(CLI::App& app) {
         return wrong.empty() ? std::string() : fmt::format("{}: {}", text, wrong);
       },
       "");
+  const CLI::Validator not_empty(
+      [](const std::string& text) { return text.empty() ? std::string("names nothing") : ""; }, "");
   for (CLI::Option* option : app.get_options()) {
-    if (option->get_type_name().starts_with("FLOAT")) option->check(finite);
-    if (option->get_type_name().starts_with("UINT")) option->check(natural);
+    const std::string type = option->get_type_name();
+    if (type.starts_with("FLOAT")) option->check(finite);
+    if (type.starts_with("UINT")) option->check(natural);
+    if (type.starts_with("TEXT") && (option->get_required() || option->get_positional()))
+      option->check(not_empty);
   }
-  for (CLI::App* sub : app.get_subcommands({})) check_numbers(*sub);
+  for (CLI::App* sub : app.get_subcommands({})) check_values(*sub);
+}
+
+CLI::Validator above_zero() {
+  const auto refuse = [](const std::string& text) -> std::string {
+    double number = 0.0;
+    const bool is_good = parse_number(text, number).empty() && number > 0.0;
+    return is_good ? "" : text + " is no number above 0";
+  };
+  return {refuse, "POSITIVE"};
 }
 
 CLI::Validator robot_name_or_id() {
@@ -121,11 +135,7 @@ Result<void> write_output(const std::string& text, const OutputFile& file, std::
   if (file.name.empty()) return print_result(text);
   if (!file.force)
     if (auto free = check_replaceable(file.name, mark); !free) return free;
-  std::ofstream out(file.name, std::ios::binary);
-  out << text;
-  out.close();
-  if (out) return {};
-  return fail(ErrorCode::kIo, file.name + ": " + std::generic_category().message(errno));
+  return replace_text_file(file.name, text);
 }
 
 TerminalProgress::TerminalProgress()

@@ -71,8 +71,13 @@ void add_choice(CLI::App* app, const std::string& flag, const std::array<Choice<
 [[nodiscard]] std::shared_ptr<CLI::FormatterBase> wrapped_help();
 
 /// For all options of `app` and its subcommands, refuses NaN and infinity, which checks of a range
-/// let pass, and whole numbers below zero or above 2^64 - 1, which would be taken for others.
-void check_numbers(CLI::App& app);
+/// let pass, and whole numbers below zero or above 2^64 - 1, which would be taken for others. Where
+/// a text is required, it refuses the empty one: a script's unset variable would name the working
+/// directory.
+void check_values(CLI::App& app);
+
+/// Refuses numbers that are not above zero.
+[[nodiscard]] CLI::Validator above_zero();
 
 /// Refuses numbers that are no robot's id.
 [[nodiscard]] CLI::Validator robot_name_or_id();

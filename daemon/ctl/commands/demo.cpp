@@ -45,7 +45,7 @@ void add_demo(CommandLine& line) {
       "what the robots do; default: four");
   sub->add_option("--seed", options.seed, "seed of the world")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   sub->add_option("--port", options.port,
                   "UDP port of the first robot's subscription; the others follow")
       ->capture_default_str()

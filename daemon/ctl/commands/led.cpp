@@ -11,6 +11,7 @@ using LedCommand = Result<std::string> (*)(const LedOptions&);
 CLI::App* add_led_command(CommandLine& line, CLI::App* led, const std::string& name,
                           const std::string& help, LedCommand run_led, LedOptions& options) {
   CLI::App* sub = led->add_subcommand(name, help);
+  sub->fallthrough();  // --port may stand behind it, too
   add_json_flag(sub, options.json);
   line.run(sub, [&options, run_led] { return print_result(run_led(options)); });
   return sub;

@@ -12,8 +12,9 @@ namespace crepes {
 namespace {
 
 std::string text_of(const ReplaySummary& summary, const std::string& out) {
-  return fmt::format("{} robots, {} s, {} poses in {}\n", summary.robots,
-                     fixed(summary.duration_s, 1), summary.poses, out);
+  return fmt::format("{} robot{}, {} s, {} poses in {}\n", summary.robots,
+                     summary.robots == 1 ? "" : "s", fixed(summary.duration_s, 1), summary.poses,
+                     out);
 }
 
 std::string json_of(const ReplaySummary& summary, const std::string& out) {
@@ -32,7 +33,9 @@ Result<ReplaySummary> replay_with_progress(ReplayOptions options) {
 }
 
 Result<void> run_replay(const ReplayOptions& options, bool json) {
-  if (options.out_dir.empty()) return fail(ErrorCode::kUsage, "--out: names no directory");
+  const SensorDelays& delays = options.delays;
+  if (!delays.robots.empty() && delays.camera_s + delays.uwb_s + delays.imu_s == 0.0)
+    return fail(ErrorCode::kUsage, "--delayed: needs --camera-delay, --uwb-delay or --imu-delay");
   const Result<ReplaySummary> summary = replay_with_progress(options);
   if (!summary) return tl::unexpected(summary.error());
   print_skipped(summary->faults);
@@ -70,12 +73,14 @@ void add_replay(CommandLine& line) {
                   "seconds for which a link loses everything; without it, datagrams are lost one "
                   "by one")
       ->check(CLI::Range(0.0, 60.0));
-  sub->add_option("--reach", options.reach_m,
-                  "robots further apart do not hear each other, by truth/ [m]; 0: all do")
-      ->check(CLI::Range(0.0, 1e6));
+  CLI::Option* reach =
+      sub->add_option("--reach", options.reach_m,
+                      "robots further apart do not hear each other, by truth/ [m]; 0: all do")
+          ->check(CLI::Range(0.0, 1e6));
   sub->add_flag("--no-forwarding{false},--forwarding{true}", options.forwards,
                 "with --reach: no flooding, as by batman-adv; robots still forward "
-                "what is marked");
+                "what is marked")
+      ->needs(reach);
   const auto delay = [sub](const std::string& option, double& delay_s, const char* sensor) {
     sub->add_option(option, delay_s,
                     std::string("seconds that pass until the daemon has ") + sensor)

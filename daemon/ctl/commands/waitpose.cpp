@@ -20,7 +20,7 @@ void add_waitpose(CommandLine& line) {
   sub->add_option_function<double>(
          "--max-sigma", [&options](double sigma_m) { options.max_sigma_m = sigma_m; },
          "wait until the sigma of its position is at most this [m]")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   add_json_flag(sub, options.json, "the daemon's own POSE");
   line.run(sub, [&options] { return print_result(wait_for_pose(options)); });
 }

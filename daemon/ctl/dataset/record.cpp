@@ -329,7 +329,8 @@ Result<std::string> run(const RecordOptions& options, BlockStream& daemon, Recor
 
 Result<RecordSummary> record(const RecordOptions& options) {
   std::error_code status;
-  if (std::filesystem::exists(options.dir / "swarm.yaml", status))
+  if (std::filesystem::exists(options.dir / "swarm.yaml", status) ||
+      std::filesystem::exists(options.dir / "crepesd.yaml", status))
     return fail(ErrorCode::kIo, options.dir.string() + ": has a data set already");
   Result<UniqueFd> socket = connect_unix(options.socket);
   if (!socket) {

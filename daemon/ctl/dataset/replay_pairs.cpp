@@ -20,6 +20,15 @@ Result<std::vector<Record>> optional_records(Result<std::vector<Record>> records
   return records;
 }
 
+/// Whether a replay was interrupted there: it gives its files their names at the end.
+bool has_parts(const fs::path& results) {
+  std::error_code status;
+  for (const auto& dir : fs::directory_iterator(results, status))
+    for (const auto& file : fs::directory_iterator(dir.path(), status))
+      if (file.path().extension() == ".part") return true;
+  return false;
+}
+
 }  // namespace
 
 std::vector<PairName> pairs_in(const fs::path& results) {
@@ -48,6 +57,7 @@ Error no_pairs_in(const fs::path& results) {
   if (!fs::is_directory(results, status)) why = ": there is no such directory";
   if (fs::exists(results / "swarm.yaml", status))
     why = ": it is a data set, of which crepesctl replay makes results";
+  if (has_parts(results)) why = ": its replay did not end: replay again";
   return {ErrorCode::kNotFound,
           results.string() + ": no <observer>/<neighbor>.csv of a replay" + why};
 }

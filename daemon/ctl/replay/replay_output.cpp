@@ -70,7 +70,7 @@ void remove_earlier_replay(const fs::path& dir) {
 
 Result<ReplayOutput> ReplayOutput::create(const fs::path& dir, Names names, Detail detail) {
   std::error_code status;
-  if (fs::exists(dir / "swarm.yaml", status)) {
+  if (fs::exists(dir / "swarm.yaml", status) || fs::exists(dir / "crepesd.yaml", status)) {
     return fail(ErrorCode::kConfig, dir.string() +
                                         ": has a data set; the results of a replay need a "
                                         "directory of their own");

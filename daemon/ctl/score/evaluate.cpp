@@ -87,7 +87,7 @@ Row pair_row(const ScoredPair& pair) {
   row.push_back(fixed(median_of(score.nees), 2));
   row.push_back(percent(share_within(score.nees, kNees95)));
   row.push_back(std::to_string(score.divergences));
-  row.push_back(milliseconds(score.max_age));
+  row.push_back(score.rows > 0 ? milliseconds(score.max_age) : "-");
   return row;
 }
 
@@ -210,7 +210,7 @@ Json pair_json(const ScoredPair& pair) {
   json["divergences"] = score.divergences;
   json["bad_covariances"] = score.bad_covariances;
   json["beyond_5_sigma"] = gross_json(score.gross_errors);
-  json["max_age_s"] = to_seconds(score.max_age);
+  if (score.rows > 0) json["max_age_s"] = to_seconds(score.max_age);
   return json;
 }
 

@@ -186,9 +186,8 @@ Result<fs::path> plot(const PlotOptions& options) {
   }
   const auto teams = load_teams(options, pairs);
   if (!teams) return tl::unexpected(teams.error());
-  auto page = PartFile::create(out, page_of(options, pairs, *teams));
-  if (!page) return tl::unexpected(page.error());
-  if (auto done = page->publish(); !done) return tl::unexpected(done.error());
+  if (auto done = replace_text_file(out, page_of(options, pairs, *teams)); !done)
+    return tl::unexpected(done.error());
   return out;
 }
 

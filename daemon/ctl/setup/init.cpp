@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kMembersName = "swarm.yaml";
+constexpr std::string_view kDevicesName = "crepesd.d/10-devices.yaml";
 
 /// Thrown and caught in this file only: the first question without an answer ends the interview.
 struct Unanswered {
@@ -298,10 +299,9 @@ struct PlannedFile {
 };
 
 std::vector<PlannedFile> files_of(const RobotPlan& plan, const InitOptions& options) {
-  std::vector<PlannedFile> files{
-      {options.dir / "crepesd.yaml", robot_file(plan)},
-      {options.dir / "crepesd.d" / "10-devices.yaml", devices_file(plan)},
-      {options.dir / "camchain-imucam.yaml", lens_file(plan)}};
+  std::vector<PlannedFile> files{{options.dir / "crepesd.yaml", robot_file(plan)},
+                                 {options.dir / kDevicesName, devices_file(plan)},
+                                 {options.dir / "camchain-imucam.yaml", lens_file(plan)}};
   std::error_code error;
   const fs::path members = options.dir / kMembersName;
   if (options.robots || !fs::exists(members, error)) files.push_back({members, members_file(plan)});
@@ -372,6 +372,17 @@ std::string text_of(const RobotPlan& plan, const InitOptions& options,
   return text + "\n" + measuring_sheet(plan) + next_steps(plan, options);
 }
 
+/// Devices that nobody has named and none was found of. A valid configuration may do without them.
+void add_missing_devices(const RobotPlan& plan, const fs::path& file,
+                         std::vector<ConfigFault>& warnings) {
+  const auto add_if = [&](bool is_missing, const char* key, const char* reason) {
+    if (is_missing) warnings.push_back({file.string(), 0, key, reason});
+  };
+  add_if(plan.camera.driver == "none", "cameras[0].driver", "is none: crepesctl devices");
+  add_if(plan.imu.port.empty(), "imu.port", "is missing: crepesctl devices");
+  add_if(plan.uwb.port.empty(), "uwb.port", "is missing: crepesctl devices");
+}
+
 Json lines_of(const std::vector<ConfigFault>& faults) {
   Json lines = Json::array();
   for (const ConfigFault& fault : faults) lines.push_back(to_string(fault));
@@ -394,6 +405,7 @@ Result<InitReport> write_plan(const RobotPlan& plan, const InitOptions& options)
   }
   if (auto written = write_files(files); !written) return tl::unexpected(written.error());
   CheckedConfig checked = check_config(options.dir / "crepesd.yaml");
+  add_missing_devices(plan, options.dir / kDevicesName, checked.warnings);
   InitReport report;
   report.text =
       options.json ? json_line(json_of(plan, files, checked)) : text_of(plan, options, files);

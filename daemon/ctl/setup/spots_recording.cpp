@@ -30,15 +30,16 @@ Result<SpotsRecording> load_spots_recording(const SpotsOptions& options, std::si
                 options.source.string() + ": holds a swarm; name the folder of one robot");
   }
   const fs::path own = options.source / fmt::format("cam{}", camera);
-  const bool is_robot = fs::is_directory(own, status);
-  if (is_robot && !fs::exists(own / "data.csv", status) && fs::exists(own / "spots.csv", status)) {
-    auto frames = load_spots(own / "spots.csv", static_cast<std::uint8_t>(camera), faults);
+  const fs::path folder = fs::is_directory(own, status) ? own : options.source;
+  const fs::path spots = folder / "spots.csv";
+  if (!fs::exists(folder / "data.csv", status) && fs::exists(spots, status)) {
+    auto frames = load_spots(spots, static_cast<std::uint8_t>(camera), faults);
     if (!frames) return tl::unexpected(frames.error());
     recording.frames = std::move(*frames);
     if (recording.frames.empty())
-      return fail(ErrorCode::kNotFound, (own / "spots.csv").string() + ": holds no frames");
+      return fail(ErrorCode::kNotFound, spots.string() + ": holds no frames");
   } else {
-    auto pictures = list_pictures(is_robot ? own : options.source, rate_hz);
+    auto pictures = list_pictures(folder, rate_hz);
     if (!pictures) return tl::unexpected(pictures.error());
     recording.pictures = std::move(*pictures);
   }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/reading/config_file.hpp"
+#include "daemon/ctl/dataset/replay_pairs.hpp"
 #include "daemon/ctl/replay/replay_output.hpp"
 #include "daemon/ctl/view/field_of_view.hpp"
 #include "daemon/ctl/view/view_json.hpp"
@@ -164,10 +165,7 @@ Result<RecordedFeed> RecordedFeed::open(const fs::path& results, const fs::path&
                 fmt::format("{0}: a recording; replay it first: crepesctl replay {0} --out DIR",
                             results.string()));
   }
-  if (feed.pairs_.empty()) {
-    return fail(ErrorCode::kNotFound,
-                results.string() + ": no <observer>/<neighbor>.csv of a replay");
-  }
+  if (feed.pairs_.empty()) return tl::unexpected(no_pairs_in(results));
   for (const PairName& pair : feed.pairs_) {
     if (feed.observers_.empty() || feed.observers_.back() != pair.observer)
       feed.observers_.push_back(pair.observer);

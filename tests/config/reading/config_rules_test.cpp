@@ -167,6 +167,8 @@ TEST(ConfigRules, WarnsOfWhatCanHardlyBeMeant) {
   EXPECT_EQ(warnings_of(sound + "net: {interface: lo}\n"),
             "4 swarm.members[0].p_body_led\n4 swarm.members[0].p_body_uwb\n");
   EXPECT_EQ(warnings_of(and_in("[0.1, 0, 0]", "[3, 0, 0]")), "4 swarm.members[0].p_body_led\n");
+  for (const char* name : {"name: truth", "name: \"2\""})
+    EXPECT_EQ(warnings_of(and_in("name: r1", name)), "4 swarm.members[0].name\n") << name;
   EXPECT_EQ(warnings_of(and_in("[0.1, 0, 0]", "[0.1, 0, 0], ring_leds: 8")),
             "4 swarm.members[0].ring_leds\n");
   EXPECT_EQ(warnings_of(and_in("[0.1, 0, 0]", "[0.1, 0, 0], ring_leds: 8, ring_radius_m: 0.03")),

@@ -41,6 +41,7 @@ line.on("message", (bytes) => {
   }
 });
 line.on("error", (fault) => end(1, fault.message));
+process.stdout.on("error", () => process.exit(0)); // its reader has ended, as head does
 
 ask(true);
 const renewal = setInterval(() => { // the lease is ten seconds: a lost datagram does not matter

@@ -16,7 +16,8 @@ ask() {
 # silent when the lease has ended, and nc ends after some seconds of silence.
 trap 'exit 0' TERM
 ask | nc -u -w 5 "$address" "$port" | {
-  perl -e '$/ = "}{"; $| = 1; while (<STDIN>) { chomp; print $. > 1 ? "{" : "", $_, "}\n" or exit }'
+  perl -e '$/ = "}{"; $| = 1; while (<STDIN>) { chomp; print $. > 1 ? "{" : "", $_, "}\n" or exit }
+           $. or warn "no answer from $ARGV[0] port $ARGV[1]\n"' "$address" "$port"
   kill $$
 } &
 wait

@@ -61,6 +61,12 @@ std::string name_of_neighbor(const client::Status::Neighbor& neighbor) {
   return neighbor.name.empty() ? fmt::format("robot {}", neighbor.peer) : neighbor.name;
 }
 
+bool is_silent(const client::Status::Neighbor& neighbor) {
+  constexpr double kLongest_s = 2.0;
+  return !neighbor.reports || neighbor.reports->received == 0 ||
+         neighbor.reports->age_s > kLongest_s;
+}
+
 MeasurementFlow flow_of(const RobotObservation& seen, const client::Status::Neighbor& now,
                         const std::string& kind) {
   const auto then =

@@ -72,6 +72,9 @@ using StatusTotals = client::Status::Totals;
 /// By name, or "robot 3".
 [[nodiscard]] std::string name_of_neighbor(const client::Status::Neighbor& neighbor);
 
+/// Never heard, or not within the last two seconds.
+[[nodiscard]] bool is_silent(const client::Status::Neighbor& neighbor);
+
 /// How many measurements of a kind came, and how many of them were refused as unlikely.
 struct MeasurementFlow {
   std::uint64_t all = 0;

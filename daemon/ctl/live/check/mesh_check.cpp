@@ -38,13 +38,12 @@ void check_air(const client::Status::Mesh& mesh, CheckSection& section) {
 void check_link(const client::Status::Neighbor& neighbor, CheckSection& section) {
   constexpr double kLossy = 0.2;
   constexpr double kLost = 0.6;
-  constexpr double kSilent = 2.0;  // s
   const std::string name = name_of_neighbor(neighbor);
   if (!neighbor.reports || neighbor.reports->received == 0) {
     return section.fault(name + ": never heard",
                          std::string(advice_for(NoPoseReason::kNeverHeard)));
   }
-  if (neighbor.reports->age_s > kSilent) {
+  if (is_silent(neighbor)) {
     return section.fault(
         fmt::format("{}: silent for {} s", name, fixed(neighbor.reports->age_s, 0)),
         std::string(advice_for(NoPoseReason::kSilent)));

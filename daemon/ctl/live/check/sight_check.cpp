@@ -74,7 +74,7 @@ void check_board(const RobotObservation& seen, CheckSection section) {
   bool is_seen = false;
   std::string unseen_by;
   for (const auto& neighbor : seen.after.neighbors) {
-    if (!neighbor.reports || neighbor.reports->received == 0) continue;
+    if (is_silent(neighbor)) continue;  // see mesh
     const MeasurementFlow flow = flow_of(seen, neighbor, "peer_bearing");
     if (flow.all > 0) {
       section.good(fmt::format("{} sees our board, {} times a second", name_of_neighbor(neighbor),
@@ -86,8 +86,9 @@ void check_board(const RobotObservation& seen, CheckSection section) {
   }
   check_foreign(seen, section);
   if (is_seen) return;
-  section.doubt(unseen_by.empty() ? "no neighbor is heard that could see our board"
-                                  : fmt::format("our board is not seen by {}", unseen_by),
+  if (unseen_by.empty())
+    return section.doubt("no neighbor is heard that could see our board", "see mesh, below");
+  section.doubt(fmt::format("our board is not seen by {}", unseen_by),
                 "turn the other robot's camera to this one; are the LEDs on? crepesctl led get");
 }
 

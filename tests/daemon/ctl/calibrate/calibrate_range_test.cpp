@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "config/reading/config_file.hpp"
+#include "daemon/ctl/calibrate/tape.hpp"
 #include "drivers/dataset/dataset_rows.hpp"
 #include "drivers/dataset/robot_folder.hpp"
 #include "tests/daemon/ctl/calibrate/calibrate_fixture.hpp"
@@ -182,6 +183,18 @@ TEST_F(CalibrateRange, SaysWhatIsWrongWithADistance) {
     EXPECT_EQ(report.error().code, ErrorCode::kUsage);
     EXPECT_NE(report.error().message.find(text), std::string::npos) << report.error().message;
   }
+}
+
+TEST_F(CalibrateRange, NamesTheLineOfATapeWithoutSegments) {
+  const auto refused = [this](const std::string& text) {
+    std::ofstream(scratch_.path() / "tape.yaml") << text;
+    const auto tape = load_tape(scratch_.path() / "tape.yaml");
+    return tape ? std::string("none") : tape.error().message;
+  };
+
+  EXPECT_NE(refused("").find("tape.yaml:1: segments: is missing"), std::string::npos);
+  EXPECT_NE(refused("segments: []\n").find("tape.yaml:1: segments: is an empty list"),
+            std::string::npos);
 }
 
 TEST_F(CalibrateRange, WarnsOfATapeThatIsHalfAMeterWrong) {

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <functional>
 #include <string>
 #include <utility>
@@ -107,6 +108,16 @@ TEST_F(Record, IsADataSetFromTheFirstMeasurementOn) {
 
   ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_EQ(readable, 20U);
+}
+
+TEST_F(Record, RefusesTheFolderOfARobotThatWasRecorded) {
+  std::filesystem::create_directories(dir());
+  std::ofstream(dir() / "crepesd.yaml") << "robot: {id: 1}\n";
+
+  const auto summary = run([] { return true; });
+
+  ASSERT_FALSE(summary);
+  EXPECT_NE(summary.error().message.find("has a data set already"), std::string::npos);
 }
 
 TEST_F(Record, KeepsAllButTheLastSecondWhateverEndsIt) {

@@ -184,6 +184,16 @@ TEST(SwarmDataset, ReportsAMissingHeaderAndKeepsTheRow) {
   expect_sizes(swarm.robots[0], kImu, kRanges, kFrames);
 }
 
+TEST(SwarmDataset, ReadsWhatASpreadsheetHasSaved) {
+  const TinySwarm files;
+  files.write("r1/imu0/data.csv", "\xEF\xBB\xBF" + files.read("r1/imu0/data.csv"));
+
+  const SwarmDataset swarm = load_swarm(files.dir()).value();
+
+  EXPECT_EQ(swarm.faults.total(), 0U);
+  expect_sizes(swarm.robots[0], kImu, kRanges, kFrames);
+}
+
 TEST(SwarmDataset, ReportsACameraWithoutCalibration) {
   const TinySwarm files;
   files.write("r1/cam1/spots.csv", files.read("r1/cam0/spots.csv"));

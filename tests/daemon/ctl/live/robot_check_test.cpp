@@ -226,6 +226,17 @@ TEST(RobotCheck, NoticesARobotThatWasNeverHeard) {
             "mesh fault: r2: never heard");
 }
 
+TEST(RobotCheck, DoesNotBlameTheBoardForARobotThatIsSilent) {
+  RobotObservation seen = healthy();
+  seen.after.neighbors[0].reports->age_s = 14.0;
+  seen.after.neighbors[0].measurements["peer_bearing"] =
+      seen.before.neighbors[0].measurements["peer_bearing"];
+
+  EXPECT_EQ(complaints(seen),
+            "board doubt: no neighbor is heard that could see our board\n"
+            "mesh fault: r2: silent for 14 s");
+}
+
 TEST(RobotCheck, SaysNothingOfMeasurementsThatNoEstimateWasThereFor) {
   RobotObservation seen = healthy();
   for (auto* status : {&seen.before, &seen.after}) {

@@ -357,15 +357,17 @@ TEST(ReplayOutput, RemovesTheRobotsOfAnEarlierReplayAndNothingElse) {
     EXPECT_TRUE(fs::exists(dir / file)) << file;
 }
 
-TEST(ReplayOutput, RefusesADirectoryWithADataSet) {
-  const ScratchDirectory scratch = ScratchDirectory::create({}).value();
-  std::ofstream(scratch.path() / "swarm.yaml") << "scenario: tiny\n";
+TEST(ReplayOutput, RefusesADirectoryWithADataSetOrARobotOfOne) {
+  for (const char* file : {"swarm.yaml", "crepesd.yaml"}) {
+    const ScratchDirectory scratch = ScratchDirectory::create({}).value();
+    std::ofstream(scratch.path() / file) << "scenario: tiny\n";
 
-  const auto output = ReplayOutput::create(scratch.path(), kNames);
+    const auto output = ReplayOutput::create(scratch.path(), kNames);
 
-  ASSERT_FALSE(output);
-  EXPECT_EQ(output.error().code, ErrorCode::kConfig);
-  EXPECT_FALSE(fs::exists(scratch.path() / "r1"));
+    ASSERT_FALSE(output) << file;
+    EXPECT_EQ(output.error().code, ErrorCode::kConfig);
+    EXPECT_FALSE(fs::exists(scratch.path() / "r1"));
+  }
 }
 
 TEST(ReplayOutput, ReportsADirectoryThatCannotBe) {

@@ -271,7 +271,9 @@ TEST_F(Evaluate, FindsTheErrorThatWasPutIn) {
   EXPECT_NEAR(pair["position_m"]["rmse"].get<double>(), 0.1, 1e-12);
   EXPECT_NEAR(pair["rotation_deg"]["max"].get<double>(), 0.0, 1e-6);
   EXPECT_NEAR(pair["median_nees"].get<double>(), 1.0, 1e-9);
+  EXPECT_NEAR(pair["max_age_s"].get<double>(), 0.003, 1e-12);
   EXPECT_EQ(json["pairs"][1]["rows"], 0);
+  EXPECT_FALSE(json["pairs"][1].contains("max_age_s"));
   EXPECT_NEAR(json["overall"]["mean_availability"].get<double>(), 0.5, 1e-12);
   EXPECT_NEAR(json["overall"]["mean_position_rmse_m"].get<double>(), 0.1, 1e-12);
 }

@@ -304,6 +304,20 @@ TEST_F(Init, PrintsASheetWithTheAxesAndRoomForEveryRobot) {
   EXPECT_FALSE(report->warnings.empty());  // lever arms that nobody measured
 }
 
+TEST_F(Init, NamesTheDevicesThatAreStillToBeFound) {
+  options_.id = 1;
+  options_.robots = 2;
+  options_.uwb_port = "/dev/ttyUSB7";
+
+  const auto report = run();
+
+  ASSERT_TRUE(report);
+  const std::string to_do = to_string(report->warnings);
+  for (const char* key : {"10-devices.yaml: cameras[0].driver: ", "10-devices.yaml: imu.port: "})
+    EXPECT_NE(to_do.find(key), std::string::npos) << to_do;
+  EXPECT_EQ(to_do.find("uwb.port"), std::string::npos) << to_do;
+}
+
 TEST_F(Init, LeadsToASealedAndSignedMesh) {
   options_.id = 1;
   options_.robots = 2;

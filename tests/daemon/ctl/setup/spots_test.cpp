@@ -177,6 +177,11 @@ TEST_F(Pictures, ThatWereNotRecordedAreReplacedBySpots) {
   EXPECT_EQ(text_.find("exposure"), std::string::npos) << text_;
   EXPECT_NE(text_.find("of spots.csv"), std::string::npos) << text_;
   EXPECT_FALSE(Json::parse(summary_json(*summary)).contains("background"));
+
+  const auto camera = look_at("r1/cam0");
+
+  ASSERT_TRUE(camera) << camera.error().message;
+  EXPECT_EQ(camera->pictures, 100U);
 }
 
 TEST_F(Pictures, InWhichNobodyIsRecognizedComeWithTheReason) {
