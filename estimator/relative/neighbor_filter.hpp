@@ -16,7 +16,7 @@ namespace crepes {
 
 /// Priors of the states, one sigma.
 struct Priors {
-  double speed_mps = 8.0;  ///< of the neighbor relative to us, per axis
+  double speed_mps = 5.0;  ///< of the neighbor relative to us, per axis
   double gyro_bias_radps = 0.0;
   double accel_bias_mps2 = 0.0;
   double gyro_scale = 0.0;   ///< of each entry

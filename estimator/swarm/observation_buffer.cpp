@@ -20,7 +20,7 @@ constexpr Duration kOutOfSight = std::chrono::milliseconds{250};
 constexpr double kOutlierSigma = 0.14;  // m
 // How fast the line of sight may turn because robots pass each other. The gyroscope does not
 // measure this.
-constexpr double kLineRate = 1.0;  // rad/s
+constexpr double kLineRate = 0.3;  // rad/s
 // Errors of the mounting, which do not average out. They also keep the covariance of z regular:
 // p_B_N and p_N_B contain the same distance.
 constexpr double kMountingSigma = 0.01;   // m
@@ -34,18 +34,42 @@ constexpr double kConfirmationAngle = 0.02;  // rad; kLineRate adds to it
 
 bool is_within(Duration apart, Duration reach) { return apart > Duration{0} && apart <= reach; }
 
+/// Another bearing, in the axes at the time of the one that it may confirm.
+struct OtherBearing {
+  double after_s = 0.0;
+  Eigen::Vector3d u = Eigen::Vector3d::UnitX();
+};
+
+/// Whether two others lead to it at a steady rate, as where robots pass each other fast.
+bool is_on_their_line(const Eigen::Vector3d& u, const std::vector<OtherBearing>& others) {
+  constexpr double kMostLineRate = 3.0;  // rad/s
+  const auto lead_to_it = [&](const OtherBearing& a, const OtherBearing& b) {
+    const double between_s = b.after_s - a.after_s;
+    const double beyond_s = std::min(std::abs(a.after_s), std::abs(b.after_s));
+    if (between_s <= 0.0 || beyond_s > between_s) return false;
+    const Eigen::Vector3d rate = (b.u - a.u) / between_s;
+    return rate.norm() < kMostLineRate && (a.u - a.after_s * rate - u).norm() < kConfirmationAngle;
+  };
+  return std::ranges::any_of(others, [&](const OtherBearing& a) {
+    return std::ranges::any_of(others, [&](const OtherBearing& b) { return lead_to_it(a, b); });
+  });
+}
+
 bool is_confirmed(const Bearing& bearing, const std::vector<Bearing>& others, const ImuHistory& imu,
                   Duration reach = kConfirmationTime) {
   Timestamp from = bearing.stamp;  // start of `turn`; all bearings of a frame share it
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-  return std::ranges::any_of(others, [&](const Bearing& other) {
+  std::vector<OtherBearing> near;
+  for (const Bearing& other : others) {
     const Duration apart = std::chrono::abs(other.stamp - bearing.stamp);
-    if (!is_within(apart, reach)) return false;
+    if (!is_within(apart, reach)) continue;
     if (other.stamp != std::exchange(from, other.stamp))
       turn = imu.rotation(other.stamp, bearing.stamp).conjugate();
-    return (turn * other.u_B - bearing.u_B).norm() <
-           kConfirmationAngle + kLineRate * to_seconds(apart);
-  });
+    near.push_back({to_seconds(other.stamp - bearing.stamp), turn * other.u_B});
+    if ((near.back().u - bearing.u_B).norm() < kConfirmationAngle + kLineRate * to_seconds(apart))
+      return true;
+  }
+  return is_on_their_line(bearing.u_B, near);
 }
 
 /// The same where bearings may be far apart: then the next one counts.

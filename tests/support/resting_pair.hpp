@@ -19,7 +19,9 @@ inline const PairMounting kMounting{Eigen::Vector3d::Zero(), Eigen::Vector3d::Ze
 inline FilterSettings settings(Profile profile = Profile::kTight) {
   EstimatorSettings settings;
   settings.filters.profile = profile;
-  return filter_settings(settings);
+  FilterSettings filters = filter_settings(settings);
+  filters.priors.speed_mps = 2.0;  // nobody passes by
+  return filters;
 }
 
 inline Timestamp at_ms(std::int64_t ms) { return Timestamp{std::chrono::milliseconds{ms}}; }

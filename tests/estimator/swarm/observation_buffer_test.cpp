@@ -161,12 +161,12 @@ TEST_F(Sighted, BelievesAPeerWhoseBearingsAreFarApart) {
 
   EXPECT_EQ(reason(peer(later)), NoPoseReason::kNone);  // 0.26 s after the one before
   Bearing glint = peer(later);
-  glint.u_B = so3_exp(0.2 * neighbor_.tilt->up_B) * glint.u_B;
+  glint.u_B = so3_exp(0.4 * neighbor_.tilt->up_B) * glint.u_B;
   EXPECT_EQ(reason(glint), NoPoseReason::kDoesNotSeeUs);
 
   // One that is near decides alone.
   Bearing between = peer(later - 50ms);
-  between.u_B = so3_exp(0.2 * neighbor_.tilt->up_B) * between.u_B;
+  between.u_B = so3_exp(0.4 * neighbor_.tilt->up_B) * between.u_B;
   buffer_.add_peer_bearing(between);
   EXPECT_EQ(reason(peer(later)), NoPoseReason::kDoesNotSeeUs);
 }
