@@ -21,7 +21,7 @@ namespace crepes {
 ///
 /// In a formation that turns about a point, neighbors stay where they are in the body, and the bank
 /// of the turn tilts the horizon: as if the IMU lay on its side. So a rotation must explain the
-/// turns much better than neighbors that turn with the robot do, too.
+/// turns better than neighbors that turn with the robot do, too.
 class MountingEvidence {
  public:
   /// Unit directions of a neighbor before and after a turn by theta [rad], as the IMU reads it.

@@ -26,11 +26,12 @@ constexpr double kLineRate = 0.3;  // rad/s
 constexpr double kMountingSigma = 0.01;   // m
 constexpr double kAttitudeSigma = 0.002;  // rad
 
-// Two bearings confirm each other within this time and angle, after compensation of own rotation.
+// Bearings confirm each other within this time and angle, after compensation of own rotation: two,
+// or three on a line.
 constexpr Duration kConfirmationTime = std::chrono::milliseconds{100};
 // Where the air is short, a report brings one bearing of a neighbor every 0.12 to 0.24 s.
 constexpr Duration kSparseConfirmationTime = std::chrono::milliseconds{300};
-constexpr double kConfirmationAngle = 0.02;  // rad; kLineRate adds to it
+constexpr double kConfirmationAngle = 0.02;  // rad; between two, kLineRate adds to it
 
 bool is_within(Duration apart, Duration reach) { return apart > Duration{0} && apart <= reach; }
 
